@@ -1,0 +1,1 @@
+"""What pose, what energy, what error?"""

@@ -1,0 +1,1 @@
+"""The command ``forcefit``: mounts the three folders' commands, plus ``study``."""

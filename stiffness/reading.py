@@ -1,0 +1,334 @@
+"""Reading other people's files: every mistake gets one message.
+
+A message names the file, the place in it, what was found and what was expected, and
+the nearest valid name where a name is wrong.  :class:`BadInput` is a ``ValueError``;
+the command line prints it and leaves with exit status 2.
+"""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
+
+
+class BadInput(ValueError):
+    """Something given from outside is not what it should be."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """``'; did you mean "x"?'``, or the list of valid names if none is near."""
+    names = [str(v) for v in valid]
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    if close:
+        return f'; did you mean "{close[0]}"?'
+    shown = ", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")
+    return f"; valid: {shown}" if names else ""
+
+
+def describe(value: object) -> str:
+    """Short description of a wrong value: what was found, never pages of it."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def read_text(path: Path) -> str:
+    r"""Text of a UTF-8 file, with or without a byte order mark.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its text with line ends as ``\n``.
+
+    Raises:
+        BadInput: the file is absent, a folder, unreadable, far too large or not UTF-8.
+    """
+    try:
+        size = path.stat().st_size
+        content = path.read_bytes() if size <= _LARGEST_FILE else b""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise BadInput(f"{path}: cannot be read: {reason}") from None
+    if size > _LARGEST_FILE:
+        raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise BadInput(
+            f"{path}: byte {error.start} is not UTF-8; expected a text file in UTF-8"
+        ) from None
+
+
+def read_toml(path: Path) -> "Table":
+    """Root table of a TOML file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The table, ready to be asked for its keys.
+
+    Raises:
+        BadInput: the file cannot be read or is not TOML.
+    """
+    text = read_text(path)
+    try:
+        return Table(tomllib.loads(text), str(path), "")
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        # Python's own message ends with the line and the column
+        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+        raise BadInput(f"{path}: not valid TOML: {reason}") from None
+
+
+@dataclass(eq=False)
+class Table:
+    """A TOML table that is emptied key by key and refuses what is left over.
+
+    Attributes:
+        content: the table's keys and values.
+        file: name of the file, for messages.
+        place: where in the file, such as ``frame "elbow".link``; empty at the root.
+    """
+
+    content: dict[str, Any]
+    file: str
+    place: str
+    _asked: set[str] = field(default_factory=set)
+
+    def bad(self, key: str, message: str) -> BadInput:
+        """The error for a key of this table, to be raised by the caller."""
+        where = ".".join(part for part in (self.place, key) if part)
+        return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there; it then counts as known."""
+        self._asked.add(key)
+        return key in self.content
+
+    def get(self, key: str, default: object = None) -> Any:
+        """The raw value of a key, or the default."""
+        self._asked.add(key)
+        return self.content.get(key, default)
+
+    def require(self, key: str, expected: str) -> Any:
+        """The raw value of a key that must be there.
+
+        Args:
+            key: its name.
+            expected: what should stand there, for the message.
+
+        Returns:
+            The value.
+
+        Raises:
+            BadInput: the key is missing.
+        """
+        if not self.has(key):
+            near = difflib.get_close_matches(key, set(self.content), n=1, cutoff=0.7)
+            hint = f'; found "{near[0]}" instead' if near else ""
+            raise self.bad(key, f"missing; expected {expected}{hint}")
+        return self.content[key]
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """A string.
+
+        Returns:
+            The string.
+
+        Raises:
+            BadInput: missing without a default, or not a string, or empty.
+        """
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, "a string")
+        if not isinstance(value, str) or not value.strip():
+            raise self.bad(key, f"found {describe(value)}, expected a non-empty string")
+        return value
+
+    def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
+        """A string out of a few.
+
+        Returns:
+            The string.
+
+        Raises:
+            BadInput: missing without a default, or not one of them.
+        """
+        valid = tuple(valid)
+        value = self.text(key, default)
+        if value not in valid:
+            names = " | ".join(f'"{v}"' for v in valid)
+            hint = nearest(value, valid)
+            hint = hint if "did you mean" in hint else ""
+            raise self.bad(key, f"found {describe(value)}, expected {names}{hint}")
+        return value
+
+    def boolean(self, key: str, default: bool) -> bool:
+        """True or false.
+
+        Returns:
+            The value, or the default.
+
+        Raises:
+            BadInput: something else.
+        """
+        value = self.get(key, default)
+        if not isinstance(value, bool):
+            raise self.bad(key, f"found {describe(value)}, expected true or false")
+        return value
+
+    def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
+        """A whole number of at least ``least``.
+
+        Returns:
+            The number.
+
+        Raises:
+            BadInput: missing without a default, or something else.
+        """
+        expected = f"a whole number >= {least}"
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, expected)
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        return value
+
+    def number(
+        self,
+        key: str,
+        unit: str,
+        default: float | None = None,
+        *,
+        above: float = -math.inf,
+        least: float = -math.inf,
+        below: float = math.inf,
+    ) -> float:
+        """A finite number.
+
+        Args:
+            key: its name.
+            unit: for the message.
+            default: taken when the key is absent; absent is an error without one.
+            above: the value must be larger than this.
+            least: the value must not be smaller than this.
+            below: the value must be smaller than this.
+
+        Returns:
+            The number.
+
+        Raises:
+            BadInput: missing without a default, not a number, or out of range.
+        """
+        limits = [
+            f"> {above:g}" if above > -math.inf else "",
+            f">= {least:g}" if least > -math.inf else "",
+            f"< {below:g}" if below < math.inf else "",
+        ]
+        expected = " ".join(["a finite number", *filter(None, limits), f"[{unit}]"])
+        if default is not None and not self.has(key):
+            return default
+        value = _number(self.require(key, expected))
+        if not (math.isfinite(value) and above < value < below and value >= least):
+            found = describe(self.content[key])
+            raise self.bad(key, f"found {found}, expected {expected}")
+        return value
+
+    def array(
+        self,
+        key: str,
+        shape: tuple[int, ...],
+        unit: str,
+        default: NDArray | None = None,
+    ) -> NDArray:
+        """An array of finite numbers of a given shape.
+
+        Returns:
+            The array.
+
+        Raises:
+            BadInput: missing without a default, another shape, or not finite numbers.
+        """
+        size = " rows of ".join(str(n) for n in shape)
+        expected = f"{size} finite numbers [{unit}]"
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, expected)
+        array = number_array(value)
+        if array is None or array.shape != shape or not np.isfinite(array).all():
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        return array
+
+    def table(self, key: str) -> "Table":
+        """A table inside this one.
+
+        Returns:
+            The table.
+
+        Raises:
+            BadInput: missing, or not a table.
+        """
+        value = self.require(key, "a table")
+        if not isinstance(value, dict):
+            raise self.bad(key, f"found {describe(value)}, expected a table")
+        return Table(value, self.file, ".".join(filter(None, (self.place, key))))
+
+    def tables(self, key: str) -> list["Table"]:
+        """The tables of ``[[key]]``, none if the key is absent.
+
+        Returns:
+            One :class:`Table` for each, numbered from 1 in messages.
+
+        Raises:
+            BadInput: the key holds something else.
+        """
+        value = self.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
+            message = f"found {describe(value)}, expected tables [[{key}]]"
+            raise self.bad(key, message)
+        prefix = f"{self.place}." if self.place else ""
+        return [
+            Table(v, self.file, f"{prefix}{key}[{i}]") for i, v in enumerate(value, 1)
+        ]
+
+    def finish(self) -> None:
+        """Refuse whatever was never asked for.
+
+        Raises:
+            BadInput: a key that this table does not have.
+        """
+        for key in self.content:
+            if key not in self._asked:
+                hint = nearest(key, self._asked)
+                raise self.bad("", f'unknown key "{key[:60]}"{hint}')
+
+
+def _number(value: object) -> float:
+    """The number, or nan for anything that is not one (true and false are not)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def number_array(value: object) -> NDArray | None:
+    """Nested lists of numbers as an array; None when ragged or not numbers."""
+    if not isinstance(value, list):
+        return None
+    if value and all(isinstance(v, list) for v in value):
+        rows = [row for row in map(number_array, value) if row is not None]
+        same = len(rows) == len(value) and len({row.shape for row in rows}) == 1
+        return np.array(rows) if same else None
+    numbers = [_number(v) for v in value]
+    proper = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    return np.array(numbers) if proper else None

@@ -1,0 +1,105 @@
+"""Screws and wrenches: small motions and loads, read at a point in some axes.
+
+One convention, written once:
+
+======  =====================  ==============================  ================
+symbol  code                   order                           unit
+======  =====================  ==============================  ================
+s       screw ``(..., 6)``     ``[RX RY RZ TX TY TZ]``         rad, m
+w       wrench ``(..., 6)``    ``[MX MY MZ FX FY FZ]``         N m, N
+C       compliance             ``s = C @ w``                   rad/(N m) .. m/N
+K       stiffness              ``w = K @ s``                   N m/rad .. N/m
+======  =====================  ==============================  ================
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+SCREW = ("RX", "RY", "RZ", "TX", "TY", "TZ")
+WRENCH = ("MX", "MY", "MZ", "FX", "FY", "FZ")
+
+
+def skew(vector: ArrayLike) -> NDArray:
+    """Matrix of the cross product, ``skew(a) @ b == cross(a, b)``.
+
+    Args:
+        vector: (..., 3) any unit.
+
+    Returns:
+        (..., 3, 3) antisymmetric.
+    """
+    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
+    """Matrix that re-reads a screw at another point, in other axes.
+
+    A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame
+    there.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``: the
+    block ``[R 0; [q - p]x R, R]`` of the paper's eqs. (13)-(15), as corrected.
+
+    Wrenches go the other way: one read at ``p`` is ``screw_map(q - p, R).T @ w`` when
+    read at ``q`` in the frame's axes, so that power ``w @ s`` is the same at both.
+
+    Args:
+        offset: (..., 3) [m] from the new point to the old one, in the new axes.
+        rotation: (..., 3, 3) old axes seen from the new ones; the same axes if absent.
+
+    Returns:
+        (..., 6, 6) matrix A with ``new = A @ old``.
+    """
+    offset = np.asarray(offset, dtype=float)
+    R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    A = np.zeros((*np.broadcast_shapes(offset.shape[:-1], R.shape[:-2]), 6, 6))
+    A[..., :3, :3] = A[..., 3:, 3:] = R
+    A[..., 3:, :3] = skew(offset) @ R
+    return A
+
+
+def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
+    """Rotation matrices of rotation vectors.
+
+    Args:
+        rotation_vector: (..., 3) [rad] axis times angle.
+
+    Returns:
+        (..., 3, 3) proper orthogonal matrices.
+    """
+    vectors = np.asarray(rotation_vector, dtype=float)
+    flat = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix()
+    return flat.reshape(*vectors.shape[:-1], 3, 3)
+
+
+def rotation_vector(rotation: ArrayLike) -> NDArray:
+    """Rotation vectors, of length at most pi, of rotation matrices.
+
+    Args:
+        rotation: (..., 3, 3) proper orthogonal matrices.
+
+    Returns:
+        (..., 3) [rad] axis times angle.
+    """
+    matrices = np.asarray(rotation, dtype=float)
+    flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec()
+    return flat.reshape(*matrices.shape[:-2], 3)
+
+
+def transform(translation: ArrayLike, rotation: ArrayLike) -> NDArray:
+    """Homogeneous matrices ``T_a_b`` from where frame b stands in frame a.
+
+    Args:
+        translation: (..., 3) [m] origin of b in the axes of a.
+        rotation: (..., 3, 3) axes of b in the axes of a.
+
+    Returns:
+        (..., 4, 4) with ``T_a_c = T_a_b @ T_b_c``.
+    """
+    translation = np.asarray(translation, dtype=float)
+    R = np.asarray(rotation, dtype=float)
+    T = np.zeros((*np.broadcast_shapes(translation.shape[:-1], R.shape[:-2]), 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, translation, 1.0
+    return T
