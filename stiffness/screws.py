@@ -69,7 +69,7 @@ def rotation_matrix(rotation_vector: ArrayLike) -> NDArray:
     Returns:
         (..., 3, 3) proper orthogonal matrices.
     """
-    vectors = np.asarray(rotation_vector, dtype=float)
+    vectors = np.array(rotation_vector, dtype=float)  # SciPy wants it writable
     flat = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix()
     return flat.reshape(*vectors.shape[:-1], 3, 3)
 
@@ -83,7 +83,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
     Returns:
         (..., 3) [rad] axis times angle.
     """
-    matrices = np.asarray(rotation, dtype=float)
+    matrices = np.array(rotation, dtype=float)
     flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_rotvec()
     return flat.reshape(*matrices.shape[:-2], 3)
 

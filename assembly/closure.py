@@ -1,0 +1,192 @@
+"""Legs and loops must meet: the assembly constraints, linear in the small screws.
+
+Eqs (8) and (16)-(20) for any tree with closures: the screws along the two chains that
+meet at a closure must add up to the same platform-side motion,
+
+    sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0,
+
+sign +1 on the first chain, -1 on the second, 0 off both and on frames they share.
+All screws are read at the platform's origin in base axes, so the multiplier of closure
+k is the wrench its second chain exerts on its first, read there.
+
+======  =============  ==========  ================================================
+symbol  code           shape       meaning
+======  =============  ==========  ================================================
+y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
+u       ``cones``      (6n, nu)    clearances, scaled: discs and intervals of size 1
+q       ``free``       (6n, nq)    motions without bound, in units of their screws
+======  =============  ==========  ================================================
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.links import compliance_factor, joint_compliances, link_compliances
+from assembly.nominal import size_of
+from assembly.posture import Posture
+from assembly.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualJoints:
+    """What may move in a robot, beside its drives: columns of small screws.
+
+    Attributes:
+        robot: of n frames.
+        elastic: (6n, ny) columns of links and joint springs.
+        links: (ny,) bool, columns that belong to links; the others are joints'.
+        cones: (6n, nu) columns of bounded clearances, each the size of its bound.
+        group: (nu,) which cone a column belongs to: two columns for a disc.
+        frame_of: (nu,) row of the frame the cone belongs to.
+        scaled: (nu,) bool, whether the margin's factor scales the cone.
+        free: (6n, nq) unit columns of unbounded motions.
+    """
+
+    robot: Robot
+    elastic: NDArray
+    links: NDArray
+    cones: NDArray
+    group: NDArray
+    frame_of: NDArray
+    scaled: NDArray
+    free: NDArray
+
+    @property
+    def groups(self) -> int:
+        """Number of cones."""
+        return int(self.group.max(initial=-1)) + 1
+
+
+def virtual_joints(
+    robot: Robot, compliant: str = "elastic", bounded_motion: bool = False
+) -> VirtualJoints:
+    """Columns of everything that may move.
+
+    Args:
+        robot: of n frames.
+        compliant: ``"elastic"``, or for problem (21), which has no springs,
+            ``"rigid"`` or ``"free"``: what passive joints with stiffness do.
+        bounded_motion: keep the bounds of passive joints' own motion.  They are large
+            and almost never reached, so they are left out first and checked after.
+
+    Returns:
+        The columns; none elastic unless ``compliant == "elastic"``.
+    """
+    mode = "free" if compliant == "free" else "elastic"
+    bounds = clearance_bounds(robot, mode)
+    play = scales_with_margin(robot)
+    if not bounded_motion:
+        bounds = np.where(~play & (bounds > 0), np.inf, bounds)
+    with_springs = compliant == "elastic"
+    return VirtualJoints(
+        robot, *_elastic(robot, with_springs), *_cones(bounds, play), _free(bounds)
+    )
+
+
+def _elastic(robot: Robot, wanted: bool) -> tuple[NDArray, NDArray]:
+    """Columns of links and springs, and which of them are links'."""
+    columns, is_link = [np.zeros((6 * len(robot.frames), 0))], []
+    kinds = [(link_compliances, True), (joint_compliances, False)] if wanted else []
+    for compliances, link in kinds:
+        for i, C in enumerate(compliances(robot)):
+            L = compliance_factor(C)
+            block = np.zeros((6 * len(robot.frames), L.shape[1]))
+            block[6 * i : 6 * i + 6] = L
+            columns.append(block)
+            is_link += [link] * L.shape[1]
+    return np.hstack(columns), np.array(is_link, dtype=bool)
+
+
+def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Columns of the bounded clearances, their group, frame and whether they scale."""
+    rows, sizes, group, frame_of, scaled = [], [], [], [], []
+    count = 0
+    for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
+        for row in CONES[cone]:
+            rows.append(6 * i + row)
+            sizes.append(bounds[i, cone])
+            group.append(count)
+            frame_of.append(i)
+            scaled.append(play[i, cone])
+        count += 1
+    columns = np.zeros((6 * len(bounds), len(rows)))
+    columns[rows, np.arange(len(rows))] = sizes
+    return (
+        columns,
+        np.array(group, dtype=int),
+        np.array(frame_of, dtype=int),
+        np.array(scaled, dtype=bool),
+    )
+
+
+def _free(bounds: NDArray) -> NDArray:
+    """Unit columns of the motions without bound."""
+    rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
+    columns = np.zeros((6 * len(bounds), len(rows)))
+    columns[rows, np.arange(len(rows))] = 1.0
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """The assembly constraints at a posture.
+
+    Attributes:
+        posture: where the robot stands.
+        rows: (6 closures, 6 n) with rows @ screws = 0 for the total screws: the blocks
+            sign_kj M_j; translations divided by ``size``.
+        platform: (6, 6 n) screws to the platform screw, eq. (8), not scaled.
+        size: [m] reference length.
+    """
+
+    posture: Posture
+    rows: NDArray
+    platform: NDArray
+    size: float
+
+    @cached_property
+    def misfit(self) -> NDArray:
+        """(6 closures,) what the geometric errors leave open, scaled."""
+        return self.rows @ self.posture.robot.errors.ravel()
+
+    @cached_property
+    def error_screw(self) -> NDArray:
+        """(6,) platform screw of the geometric errors alone."""
+        return self.platform @ self.posture.robot.errors.ravel()
+
+
+def linearise(posture: Posture) -> Linearisation:
+    """The assembly constraints (19)-(20) at a posture.
+
+    Args:
+        posture: where the robot stands.
+
+    Returns:
+        The constraint matrix and the map to the platform screw.
+    """
+    robot = posture.robot
+    size = size_of(robot)
+    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+    blocks = closure_signs(robot)[:, :, None, None] * posture.paths
+    rows = np.swapaxes(blocks * scale[:, None], 1, 2)
+    on_path = robot.on_path[robot.index(robot.platform)]
+    platform = np.swapaxes(posture.paths * on_path[:, None, None], 0, 1)
+    count = len(robot.frames)
+    return Linearisation(
+        posture,
+        rows.reshape(6 * len(robot.closures), 6 * count),
+        platform.reshape(6, 6 * count),
+        size,
+    )
+
+
+def closure_signs(robot: Robot) -> NDArray:
+    """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+    paths = robot.on_path.astype(int)
+    pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
+    count = len(robot.frames)
+    return np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)

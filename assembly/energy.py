@@ -1,0 +1,209 @@
+"""The least energy that closes a manipulator, problem (22), and what it costs inside.
+
+======  ====================  ========  ==============================================
+symbol  code                  shape     meaning
+======  ====================  ========  ==============================================
+dx_p    ``platform_screw``    (6,)      platform error at its origin, base axes
+dc      ``clearance_screws``  (n, 6)    play, and the small motion of passive joints
+de, db  ``link_screws`` ..    (n, 6)    deformations of links and joints
+w       ``wrenches``          (n, 6)    through each frame, at it in its axes
+E       ``energy``            J         of all springs
+======  ====================  ========  ==============================================
+
+Wrenches come from the multipliers of the closures, not from eqs (23)-(26): springs in
+series carry the same wrench, which (23) adds to itself, and the paths to the platform
+alone, (24)-(26), sum to zero on an unloaded platform.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.clearance import clearance_bounds, clearance_excess
+from assembly.closure import (
+    Linearisation,
+    VirtualJoints,
+    closure_signs,
+    linearise,
+    virtual_joints,
+)
+from assembly.conic import LeastEnergy, minimise_energy
+from assembly.posture import Posture
+from assembly.reduction import Reduction, reduce_problem
+
+
+class CannotAssemble(Exception):
+    """No play and no elasticity of the model lets the closures hold.
+
+    A result, not a mistake of the caller: some closure is rigid all round.
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """A manipulator forced together at least energy; it exists only if solved.
+
+    Attributes:
+        linearisation: the assembly constraints it satisfies.
+        joints: what was allowed to move.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        elastic: (ny,) [sqrt(2 J)] scaled deformation of the springs.
+        clearances: (nu,) clearances in units of their cones.
+        motions: (nq,) [rad, m] free motions.
+        multipliers: (6 closures,) of the scaled closure rows.
+        bound: [J] certified lower bound of energy minus the load's work.
+        ranks: rows of the closures by what takes them up.
+    """
+
+    linearisation: Linearisation
+    joints: VirtualJoints
+    load: NDArray
+    elastic: NDArray
+    clearances: NDArray
+    motions: NDArray
+    multipliers: NDArray
+    bound: float
+    ranks: dict[str, int]
+
+    @property
+    def posture(self) -> Posture:
+        """Where the robot stands nominally."""
+        return self.linearisation.posture
+
+    @property
+    def energy(self) -> float:
+        """[J] elastic energy stored."""
+        return float(self.elastic @ self.elastic) / 2
+
+    @property
+    def potential(self) -> float:
+        """[J] energy minus the work of the load."""
+        return self.energy - float(self.load @ self.platform_screw)
+
+    @cached_property
+    def clearance_screws(self) -> NDArray:
+        """(n, 6) [rad, m] play, and small motions of passive joints."""
+        play = self.joints.cones @ self.clearances + self.joints.free @ self.motions
+        return play.reshape(-1, 6)
+
+    @cached_property
+    def link_screws(self) -> NDArray:
+        """(n, 6) [rad, m] deformations of the bodies."""
+        return (self.joints.elastic @ (self.elastic * self.joints.links)).reshape(-1, 6)
+
+    @cached_property
+    def joint_screws(self) -> NDArray:
+        """(n, 6) [rad, m] deformations of the joints."""
+        return (self.joints.elastic @ (self.elastic * ~self.joints.links)).reshape(-1, 6)
+
+    @cached_property
+    def screws(self) -> NDArray:
+        """(n, 6) [rad, m] all that happens at each frame, geometric error included."""
+        moved = self.clearance_screws + self.link_screws + self.joint_screws
+        return self.posture.robot.errors + moved
+
+    @cached_property
+    def platform_screw(self) -> NDArray:
+        """(6,) [rad, m] pose error of the platform at its origin, base axes, eq. (8)."""
+        return self.linearisation.platform @ self.screws.ravel()
+
+    @cached_property
+    def closure_wrenches(self) -> NDArray:
+        """(closures, 6) [N m, N] what each closure's second chain exerts on its first.
+
+        At the platform's origin, base axes.  Where rigid parts are overconstrained
+        they are not determined; these are then the smallest ones.
+        """
+        size = self.linearisation.size
+        return self.multipliers.reshape(-1, 6) / np.array([1, 1, 1, size, size, size])
+
+    @cached_property
+    def wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] what the outer part exerts on the inner through each frame.
+
+        At the frame's origin, in its axes; equal to K times the deformation there.
+        """
+        robot = self.posture.robot
+        at_platform = closure_signs(robot).T @ self.closure_wrenches
+        loaded = robot.on_path[robot.index(robot.platform)]
+        at_platform = at_platform + loaded[:, None] * self.load
+        return np.einsum("nji,nj->ni", self.posture.paths, at_platform)
+
+    def closure_residual(self) -> float:
+        """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
+        left = self.linearisation.rows @ self.screws.ravel()
+        return float(np.abs(left).max(initial=0.0))
+
+    def clearance_excess(self) -> float:
+        """[-] by how much the worst clearance leaves its cone, relative to its bound."""
+        bounds = clearance_bounds(self.posture.robot)
+        return clearance_excess(self.clearance_screws, bounds)
+
+    def duality_gap(self) -> float:
+        """[J] certified: the energy is at most this above the least possible."""
+        return max(0.0, self.potential - self.bound)
+
+    def relative_gap(self) -> float:
+        """[-] duality gap relative to the energy stored without any play."""
+        return self.duality_gap() / max(abs(self.potential), self.energy, 1e-300)
+
+
+def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
+    """Close a manipulator at least energy, problem (22), under an optional load.
+
+    Args:
+        posture: where the robot stands; its errors, clearances, links and joint
+            springs are the robot's.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes; energy
+            minus its work is then what is minimised.
+
+    Returns:
+        The assembled manipulator with its certificate.
+
+    Raises:
+        CannotAssemble: a closure is open that no play and no spring can close.
+        FreeMotion: the load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
+    lin = linearise(posture)
+    wrench = None if load is None else np.asarray(load, dtype=float)
+    answer = _solve(lin, virtual_joints(posture.robot), wrench)
+    if answer.clearance_excess() > 1e-9:
+        # the bound of a passive joint's own motion was left out, but it matters
+        joints = virtual_joints(posture.robot, bounded_motion=True)
+        answer = _solve(lin, joints, wrench)
+    return answer
+
+
+def _solve(
+    lin: Linearisation, joints: VirtualJoints, load: NDArray | None
+) -> Assembly:
+    """Reduce, minimise, and go back to all screws."""
+    small = reduce_problem(lin, joints, load)
+    least = _minimise(small)
+    u = least.clearances
+    y = small.springs(u)
+    q = small.motions(u, y)
+    multipliers = small.multipliers(u, least.rigid_multipliers)
+    answer = Assembly(
+        lin, joints, small.load, y, u, q, multipliers, np.nan, small.ranks
+    )
+    shift = answer.potential - least.value  # the load's work, constant in u
+    object.__setattr__(answer, "bound", least.bound + shift)
+    return answer
+
+
+def _minimise(small: Reduction) -> LeastEnergy:
+    """Least energy of a reduced problem; infeasible ones are named."""
+    if small.inconsistent:
+        raise CannotAssemble(
+            f"a rigid part stays open by {small.inconsistent:.3g} (rad, or m per "
+            "reference length): no play or spring acts there"
+        )
+    joints = small.joints
+    least = minimise_energy(small.G, small.h, small.d, small.H, small.k, joints.group)
+    if not least.feasible:
+        raise CannotAssemble("no play within its bounds closes what no spring can")
+    return least

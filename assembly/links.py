@@ -1,0 +1,97 @@
+"""The elasticity of every body and joint of a robot, as compliances."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import (
+    BeamLink,
+    Frame,
+    LibraryLink,
+    MatrixLink,
+    Robot,
+    beam_axis,
+)
+from stiffness.beam import Section, beam_compliance, rectangular_section, round_section
+
+
+def link_compliances(robot: Robot) -> NDArray:
+    """Compliance of every body, K_E^-1 of eq. (6).
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
+    """
+    C = np.zeros((len(robot.frames), 6, 6))
+    for i, frame in enumerate(robot.frames):
+        if frame.link is not None:
+            C[i] = link_compliance(frame)
+    return C
+
+
+def link_compliance(frame: Frame) -> NDArray:
+    """(6, 6) compliance of a frame's own body, at the frame in its axes."""
+    link = frame.link
+    if isinstance(link, MatrixLink):
+        return np.linalg.inv(link.stiffness)
+    if isinstance(link, BeamLink):
+        length, axis = beam_axis(frame)
+        section = beam_section(link)
+        return beam_compliance(
+            length, section, link.young, link.poisson,
+            theory=link.theory, axis=axis, up=link.up,
+        )  # fmt: skip
+    if isinstance(link, LibraryLink):
+        from stiffness.library import read_compliance
+
+        return read_compliance(link.library, link.key)
+    from assembly.mesh_link import mesh_compliance
+
+    return mesh_compliance(frame)
+
+
+def beam_section(link: BeamLink) -> Section:
+    """The section of a beam from its declared numbers."""
+    given = link.section
+    if "radius" in given:
+        inner = given.get("inner_radius", 0.0)
+        return round_section(given["radius"], link.poisson, inner)
+    if "width" in given:
+        return rectangular_section(given["width"], given["height"], link.poisson)
+    return Section(**given)
+
+
+def joint_compliances(robot: Robot) -> NDArray:
+    """Compliance of every joint, K_B^-1; zero where rigid or not given.
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.
+    """
+    C = np.zeros((len(robot.frames), 6, 6))
+    for i, frame in enumerate(robot.frames):
+        if frame.joint_stiffness is not None:
+            soft = np.ix_(*[np.isfinite(np.diag(frame.joint_stiffness))] * 2)
+            C[i][soft] = np.linalg.inv(frame.joint_stiffness[soft])
+    return C
+
+
+def compliance_factor(C: NDArray) -> NDArray:
+    """Factor L of a compliance, C = L L^T, so that screw = L y stores energy y^2/2.
+
+    Args:
+        C: (6, 6) symmetric positive semidefinite, mixed units.
+
+    Returns:
+        (6, r) of full column rank r.
+    """
+    size = np.sqrt(np.diag(C))
+    soft = np.flatnonzero(size > 0)
+    # scaled to a unit diagonal first: rad and m differ by many powers of ten
+    scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
+    L = np.zeros((6, len(soft)))
+    L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
+    return L
