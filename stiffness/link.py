@@ -1,0 +1,165 @@
+"""A link's stiffness, and how good it is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffness.reading import BadInput
+
+
+@dataclass(frozen=True, eq=False)
+class LinkStiffness:
+    """An elastic link between two interfaces, seen from its tip.
+
+    The base is held, a wrench acts on the tip: ``screw = compliance @ wrench``, both
+    read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
+
+    Attributes:
+        method: how it was found, such as ``"Timoshenko beam"``.
+        compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
+        tip: (3,) [m] the point where screws and wrenches are read.
+        base: (3,) [m] the centre of the held interface.
+        stiffness_error: (6, 6) [N m/rad .. N/m] estimate of ``stiffness`` minus the
+            exact one, symmetric; zero for a closed form.
+        mesh: counts, volume and quality of the mesh behind it; empty without one.
+        mass: [kg] of the link, 0 when no density was given.
+        center_of_mass: (3,) [m].
+        inertia: (3, 3) [kg m^2] about the centre of mass.
+        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance, filled in.
+    """
+
+    method: str
+    compliance: NDArray
+    tip: NDArray
+    base: NDArray
+    stiffness_error: NDArray = field(default_factory=lambda: np.zeros((6, 6)))
+    mesh: Mapping[str, Any] = field(default_factory=dict)
+    mass: float = 0.0
+    center_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
+    inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
+    stiffness: NDArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        shapes = {
+            "compliance": (6, 6),
+            "tip": (3,),
+            "base": (3,),
+            "stiffness_error": (6, 6),
+            "center_of_mass": (3,),
+            "inertia": (3, 3),
+        }
+        for name, shape in shapes.items():
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape or not np.isfinite(array).all():
+                raise BadInput(
+                    f"link ({self.method}): {name} has shape {array.shape}, "
+                    f"expected {shape} of finite numbers"
+                )
+            self._store(name, array)
+        check_definite(f"link ({self.method}): compliance", self.compliance)
+        self._store("compliance", (self.compliance + self.compliance.T) / 2)
+        self._store("stiffness", inverted(self.compliance))
+        object.__setattr__(self, "mesh", MappingProxyType(dict(self.mesh)))
+
+    def _store(self, name: str, array: NDArray) -> None:
+        """Keep a locked array under a name."""
+        array.setflags(write=False)
+        object.__setattr__(self, name, array)
+
+    @property
+    def relative_errors(self) -> NDArray:
+        """(6, 6) |error of K| entry by entry, divided by sqrt(K_ii K_jj)."""
+        return np.abs(scaled(self.stiffness_error, self.stiffness))
+
+    @property
+    def relative_error_estimate(self) -> float:
+        """The largest of :attr:`relative_errors`; 0 for a closed form."""
+        return float(self.relative_errors.max())
+
+
+def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
+    """Entries divided by sqrt(K_ii K_jj), so that radians and metres weigh alike.
+
+    Args:
+        matrix: (6, 6) a stiffness, or a difference of two.
+        stiffness: (6, 6) the one whose diagonal sets the scale.
+
+    Returns:
+        (6, 6) [1].
+    """
+    diagonal = np.sqrt(np.diag(np.asarray(stiffness, dtype=float)))
+    return np.asarray(matrix, dtype=float) / np.outer(diagonal, diagonal)
+
+
+def check_definite(who: str, matrix: NDArray) -> None:
+    """Refuse what is not a stiffness or a compliance.
+
+    Args:
+        who: whose matrix it is, for the message.
+        matrix: (6, 6).
+
+    Raises:
+        BadInput: it is not symmetric to 1e-6 of its scale, or not positive definite.
+    """
+    if not np.all(np.diag(matrix) > 0):
+        raise BadInput(f"{who} is not positive definite: its diagonal has a value <= 0")
+    unit = scaled(matrix, matrix)
+    row, column = np.unravel_index(np.argmax(np.abs(unit - unit.T)), unit.shape)
+    if abs(unit[row, column] - unit[column, row]) > 1e-6:
+        raise BadInput(
+            f"{who} is not symmetric: [{row}, {column}] = {matrix[row, column]:.6e} "
+            f"but [{column}, {row}] = {matrix[column, row]:.6e}"
+        )
+    smallest = np.linalg.eigvalsh((unit + unit.T) / 2)[0]
+    if smallest <= 0:
+        raise BadInput(
+            f"{who} is not positive definite: smallest eigenvalue of the scaled "
+            f"matrix is {smallest:.1e}"
+        )
+
+
+def inverted(matrix: NDArray) -> NDArray:
+    """Inverse of a symmetric positive definite matrix of mixed units.
+
+    Args:
+        matrix: (6, 6) a stiffness or a compliance.
+
+    Returns:
+        (6, 6) its inverse, exactly symmetric.
+    """
+    size = np.sqrt(np.diag(matrix))
+    unit = np.linalg.inv(matrix / np.outer(size, size))
+    return (unit + unit.T) / 2 / np.outer(size, size)
+
+
+def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
+    """The same link, described in other axes with the same origin.
+
+    Args:
+        link: the link.
+        rotation: (3, 3) old axes seen from the new ones, proper orthogonal.
+
+    Returns:
+        The link with everything it has turned.
+
+    Raises:
+        BadInput: the matrix is not a rotation.
+    """
+    R = np.asarray(rotation, dtype=float)
+    proper = R.shape == (3, 3) and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-9)
+    if not proper or np.linalg.det(R) < 0:
+        raise BadInput("turn_link: the 3 by 3 matrix is not a rotation")
+    A = np.kron(np.eye(2), R)
+    return replace(
+        link,
+        compliance=A @ link.compliance @ A.T,
+        stiffness_error=A @ link.stiffness_error @ A.T,
+        tip=R @ link.tip,
+        base=R @ link.base,
+        center_of_mass=R @ link.center_of_mass,
+        inertia=R @ link.inertia @ R.T,
+    )

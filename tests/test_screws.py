@@ -1,0 +1,75 @@
+"""Screws and wrenches: the laws of the one convention."""
+
+import numpy as np
+import pytest
+
+from stiffness.screws import (
+    rotation_matrix,
+    rotation_vector,
+    screw_map,
+    skew,
+    transform,
+)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1)
+
+
+def test_skew_is_the_cross_product(rng):
+    a, b = rng.normal(size=(2, 7, 3))
+    np.testing.assert_allclose(
+        np.einsum("nij,nj->ni", skew(a), b), np.cross(a, b), atol=1e-15
+    )
+
+
+def test_a_turn_about_z_moves_a_point_on_x_along_y():
+    """Read at p = q + x: offset q - p = -x; t_p = t_q + r x (p - q) = z x x = y."""
+    moved = screw_map([-1.0, 0, 0]) @ [0, 0, 1e-3, 0, 0, 0]
+    np.testing.assert_allclose(moved, [0, 0, 1e-3, 0, 1e-3, 0], atol=0)
+
+
+def test_power_is_the_same_at_every_point(rng):
+    """screw_map.T carries wrenches the other way, in turned axes too."""
+    A = screw_map(rng.normal(size=3), rotation_matrix(rng.normal(size=3)))
+    screw, wrench = rng.normal(size=(2, 6))
+    assert (A.T @ wrench) @ screw == pytest.approx(wrench @ (A @ screw), rel=1e-13)
+
+
+def test_a_force_has_the_moment_of_its_arm():
+    """A force fy at p = x, read at q = 0: mz = +1 (p is ahead of q along x)."""
+    wrench_at_q = screw_map([-1.0, 0, 0]).T @ [0, 0, 0, 0, 1.0, 0]
+    np.testing.assert_allclose(wrench_at_q, [0, 0, 1, 0, 1, 0], atol=0)
+
+
+def test_maps_compose(rng):
+    a, b = rng.normal(size=(2, 3))
+    R, S = rotation_matrix(rng.normal(size=(2, 3)))
+    np.testing.assert_allclose(
+        screw_map(b, S) @ screw_map(a, R), screw_map(b + S @ a, S @ R), atol=1e-14
+    )
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-4, 1.0])
+def test_small_screws_are_derivatives_of_finite_motions(rng, size):
+    """Error of the small screw is of second order: below its squared size."""
+    turn, point = size * rng.normal(size=3), rng.normal(size=3)
+    moved = (rotation_matrix(turn) - np.eye(3)) @ point
+    screw = screw_map(-point) @ np.r_[turn, 0, 0, 0]
+    angle = np.linalg.norm(turn)
+    assert np.linalg.norm(moved - screw[3:]) <= angle**2 * np.linalg.norm(point)
+
+
+def test_rotation_vectors_return(rng):
+    vectors = rng.normal(size=(2, 5, 3)) / 2
+    matrices = rotation_matrix(vectors)
+    assert matrices.shape == (2, 5, 3, 3)
+    np.testing.assert_allclose(rotation_vector(matrices), vectors, atol=1e-14)
+
+
+def test_transforms_chain(rng):
+    R, S = rotation_matrix(rng.normal(size=(2, 3)))
+    p, q = rng.normal(size=(2, 3))
+    chained = transform(p, R) @ transform(q, S)
+    np.testing.assert_allclose(chained, transform(p + R @ q, R @ S), atol=1e-14)
