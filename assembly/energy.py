@@ -54,6 +54,7 @@ class Assembly:
         motions: (nq,) [rad, m] free motions.
         multipliers: (6 closures,) of the scaled closure rows.
         bound: [J] certified lower bound of energy minus the load's work.
+        energy_without_play: [J] what closing would cost with all clearances at zero.
         ranks: rows of the closures by what takes them up.
     """
 
@@ -65,6 +66,7 @@ class Assembly:
     motions: NDArray
     multipliers: NDArray
     bound: float
+    energy_without_play: float
     ranks: dict[str, int]
 
     @property
@@ -96,7 +98,8 @@ class Assembly:
     @cached_property
     def joint_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the joints."""
-        return (self.joints.elastic @ (self.elastic * ~self.joints.links)).reshape(-1, 6)
+        springs = self.elastic * ~self.joints.links
+        return (self.joints.elastic @ springs).reshape(-1, 6)
 
     @cached_property
     def screws(self) -> NDArray:
@@ -106,7 +109,7 @@ class Assembly:
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(6,) [rad, m] pose error of the platform at its origin, base axes, eq. (8)."""
+        """(6,) [rad, m] platform's pose error at its origin, base axes, eq. (8)."""
         return self.linearisation.platform @ self.screws.ravel()
 
     @cached_property
@@ -137,7 +140,7 @@ class Assembly:
         return float(np.abs(left).max(initial=0.0))
 
     def clearance_excess(self) -> float:
-        """[-] by how much the worst clearance leaves its cone, relative to its bound."""
+        """[-] by how much the worst clearance leaves its cone, relative to its size."""
         bounds = clearance_bounds(self.posture.robot)
         return clearance_excess(self.clearance_screws, bounds)
 
@@ -146,8 +149,12 @@ class Assembly:
         return max(0.0, self.potential - self.bound)
 
     def relative_gap(self) -> float:
-        """[-] duality gap relative to the energy stored without any play."""
-        return self.duality_gap() / max(abs(self.potential), self.energy, 1e-300)
+        """[-] duality gap relative to the energy, or a millionth of that without play.
+
+        Inside an assembly zone the least energy is zero, and no relative gap to it.
+        """
+        scale = max(self.energy, 1e-6 * self.energy_without_play, 1e-300)
+        return self.duality_gap() / scale
 
 
 def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
@@ -177,9 +184,7 @@ def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     return answer
 
 
-def _solve(
-    lin: Linearisation, joints: VirtualJoints, load: NDArray | None
-) -> Assembly:
+def _solve(lin: Linearisation, joints: VirtualJoints, load: NDArray | None) -> Assembly:
     """Reduce, minimise, and go back to all screws."""
     small = reduce_problem(lin, joints, load)
     least = _minimise(small)
@@ -187,12 +192,11 @@ def _solve(
     y = small.springs(u)
     q = small.motions(u, y)
     multipliers = small.multipliers(u, least.rigid_multipliers)
-    answer = Assembly(
-        lin, joints, small.load, y, u, q, multipliers, np.nan, small.ranks
-    )
-    shift = answer.potential - least.value  # the load's work, constant in u
-    object.__setattr__(answer, "bound", least.bound + shift)
-    return answer
+    bound = least.bound + small.offset
+    return Assembly(
+        lin, joints, small.load, y, u, q, multipliers, bound,
+        small.energy_without_play, small.ranks,
+    )  # fmt: skip
 
 
 def _minimise(small: Reduction) -> LeastEnergy:

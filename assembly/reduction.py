@@ -52,6 +52,7 @@ class Reduction:
         basis: (6 closures, m) orthonormal, orthogonal to all free motions.
         rigid: (m, p) rows of ``basis`` combined into those of H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
+        spread: (ny, r) orthonormal, from the small problem's springs to all of them.
         ranks: what was decided: free, elastic, rigid, redundant rows.
     """
 
@@ -82,6 +83,18 @@ class Reduction:
         pull = rows.T @ self.preload + platform.T @ self.load
         return self.joints.elastic.T @ pull
 
+    @property
+    def offset(self) -> float:
+        """[J] energy minus the load's work, beyond the small problem's objective."""
+        lin, alone = self.linearisation, self.load_springs
+        work = self.load @ lin.error_screw + self.preload @ lin.misfit
+        return -float(alone @ alone) / 2 - float(work)
+
+    @property
+    def energy_without_play(self) -> float:
+        """[J] what closing would cost if every bounded clearance stayed at zero."""
+        return float(self.h @ self.h) / 2
+
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
         """(nq,) free motions of least size that go with clearances and springs."""
         A = self.linearisation.rows
@@ -90,7 +103,7 @@ class Reduction:
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=_RANK)[0]
 
     def multipliers(self, u: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """(6 closures,) scaled wrenches in the closures; least norm where not unique."""
+        """(6 closures,) scaled closure wrenches, the least where not unique."""
         own = self.spread @ (self.G @ u + self.h)
         inner = self.elastic_inverse.T @ own + self.rigid @ rigid_multipliers
         return self.preload + self.basis @ inner

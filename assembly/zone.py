@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import svd
 
+from assembly.clearance import clearance_bounds, clearance_excess, scales_with_margin
 from assembly.closure import Linearisation, VirtualJoints, linearise, virtual_joints
 from assembly.conic import cone_sizes, least_factor
 from assembly.posture import Posture
@@ -57,33 +58,33 @@ def zone_margin(posture: Posture, compliant: str = "rigid") -> Zone:
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     lin = linearise(posture)
-    zone, play = _margin(lin, virtual_joints(posture.robot, compliant))
-    limited = virtual_joints(posture.robot, compliant, bounded_motion=True)
-    if limited.cones.shape[1] > play and zone.margin:
-        # some passive joint's range is bounded: does the margin respect it?
-        pass
+    zone, screws = _margin(lin, virtual_joints(posture.robot, compliant))
+    bounds = clearance_bounds(posture.robot, compliant)
+    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
+    if zone.margin is not None and clearance_excess(screws, ranges) > 1e-9:
+        # the range of a passive joint's motion was left out, but it matters
+        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
+        zone, _ = _margin(lin, joints)
     return zone
 
 
-def _margin(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, int]:
-    """Margin of one set of columns."""
+def _margin(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, NDArray]:
+    """Margin with one set of columns, and the clearance screws that attain it."""
     small = reduce_problem(lin, joints)
+    nowhere = np.zeros((len(joints.robot.frames), 6))
     if small.inconsistent:
-        return Zone(None, None), 0
-    return Zone(*_least(small.H, small.k, joints)), joints.cones.shape[1]
-
-
-def _least(
-    B: NDArray, right: NDArray, joints: VirtualJoints
-) -> tuple[float | None, float | None]:
-    """Least factor and its bound."""
-    if not np.any(right):
-        return 0.0, 0.0
-    U, S, Vt = svd(B, full_matrices=False)
-    t, y = least_factor(Vt, U.T @ right / S, joints.group, joints.scaled)
+        return Zone(None, None), nowhere
+    if not np.any(small.k):
+        return Zone(0.0, 0.0), nowhere
+    # orthonormal rows, whatever the units of the closures
+    U, S, B = svd(small.H, full_matrices=False)
+    right = U.T @ small.k / S
+    t, u, y = least_factor(B, right, joints.group, joints.scaled)
     if t is None:
-        return None, None
-    return t, _margin_bound(Vt, U.T @ right / S, joints, y)
+        return Zone(None, None), nowhere
+    motions = small.motions(u, np.zeros(joints.elastic.shape[1]))
+    screws = joints.cones @ u + joints.free @ motions
+    return Zone(t, _margin_bound(B, right, joints, y)), screws.reshape(-1, 6)
 
 
 def _margin_bound(

@@ -1,0 +1,32 @@
+"""Robots that come with forcefit; each is a table of numbers in a file of its own."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from assembly.robot import Robot
+from assembly.robot_file import read_robot
+from assembly.robots.irsbot2 import irsbot2
+from stiffness.reading import BadInput, nearest
+
+BUILT_IN: dict[str, Callable[[], Robot]] = {"irsbot2": irsbot2}
+
+
+def load_robot(name: str | Path) -> Robot:
+    """A built-in robot by its name, or the robot of a file.
+
+    Args:
+        name: such as ``"irsbot2"``, or the path of a robot file.
+
+    Returns:
+        The robot.
+
+    Raises:
+        BadInput: neither a built-in name nor a file, or the file breaks a rule.
+    """
+    if str(name) in BUILT_IN:
+        return BUILT_IN[str(name)]()
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        hint = nearest(str(name), BUILT_IN)
+        raise BadInput(f'"{str(name)[:80]}": neither a built-in robot nor a file{hint}')
+    return read_robot(path)
