@@ -149,10 +149,8 @@ class Assembly:
         return max(0.0, self.potential - self.bound)
 
     def relative_gap(self) -> float:
-        """[-] duality gap relative to the energy, or a millionth of that without play.
-
-        Inside an assembly zone the least energy is zero, and no relative gap to it.
-        """
+        """[-] duality gap relative to energy, or to 1e-6 of that without play."""
+        # inside an assembly zone the least energy is zero, and no gap relative to it
         scale = max(self.energy, 1e-6 * self.energy_without_play, 1e-300)
         return self.duality_gap() / scale
 

@@ -13,7 +13,7 @@ Eq. (14) is off by one as printed: its product down to h = j maps a screw writte
 frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x R, R]``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -129,6 +129,34 @@ def place_robot(
     if not track.reached[0]:
         raise BadInput(f"{robot.name}: {miss(robot, track, target, 0)}")
     return _posture(robot, track, 0)
+
+
+def parse_assignments(texts: Iterable[str], option: str) -> dict[str, float]:
+    """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
+
+    Args:
+        texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        option: whose they are, for messages.
+
+    Returns:
+        The numbers by name.
+
+    Raises:
+        BadInput: not of that form, not a finite number, or a name given twice.
+    """
+    values: dict[str, float] = {}
+    for part in ",".join(texts).split(","):
+        name, equals, text = (piece.strip() for piece in part.partition("="))
+        try:
+            value = float(text)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
+        if name in values:
+            raise BadInput(f'{option}: "{name[:60]}" is given twice')
+        values[name] = _finite(f"{option} {name[:60]}", value)
+    return values
 
 
 def pose_target(pose: Mapping[str, float]) -> Target:
