@@ -382,6 +382,18 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     Raises:
         OSError: the file cannot be written.
     """
+    Path(path).write_text(robot_text(robot), encoding="utf-8")
+
+
+def robot_text(robot: Robot) -> str:
+    """The robot file of a robot, as text.
+
+    Args:
+        robot: any.
+
+    Returns:
+        TOML in the public format, all digits kept.
+    """
     lines = [f"name = {_toml(robot.name)}"]
     if robot.description:
         lines.append(f"description = {_toml(robot.description)}")
@@ -391,7 +403,7 @@ def write_robot(robot: Robot, path: Path | str) -> None:
         lines += [f"{k} = {_toml(v)}" for k, v in frame_table(frame).items()]
     for pair in robot.closures:
         lines += ["", "[[closure]]", f"frames = {_toml(list(pair))}"]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def frame_table(frame: Frame) -> dict[str, Any]:
