@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffness.reading import BadInput, nearest
+from stiffness.reading import BadInput, nearest, quoted
 from stiffness.screws import rotation_matrix, transform
 
 JOINTS = ("fixed", "revolute", "prismatic")
@@ -230,7 +230,7 @@ class Robot:
             return self._rows[name]
         except KeyError:
             hint = nearest(name, self._rows)
-            raise BadInput(f'{self.name}: no frame "{name[:60]}"{hint}') from None
+            raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
         """The frame of a name; see :meth:`index` for the error."""
@@ -308,16 +308,21 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
         BadInput: two frames share a name, a parent is missing, or parents form a ring.
     """
     frames = tuple(frames)
-    names = [f.name for f in frames]
+    rows: dict[str, int] = {}
     for i, frame in enumerate(frames):
-        if frame.name in names[:i] or frame.name == BASE:
-            why = "is the robot's root" if frame.name == BASE else "is given twice"
-            raise BadInput(f'frame "{frame.name}": this name {why}; names are unique')
-        if frame.parent not in names and frame.parent != BASE:
-            hint = nearest(frame.parent, [*names, BASE])
+        if frame.name == BASE or frame.name in rows:
+            first = f"frame[{rows[frame.name] + 1}]" if frame.name in rows else "root"
             raise BadInput(
-                f'frame "{frame.name}".parent: found "{frame.parent[:60]}", '
-                f"expected a frame of this robot{hint}"
+                f"frame[{i + 1}].name: found {quoted(frame.name)}, the name of the "
+                f"{first}; expected another"
+            )
+        rows[frame.name] = i
+    for frame in frames:
+        if frame.parent not in rows and frame.parent != BASE:
+            hint = nearest(frame.parent, [*rows, BASE])
+            raise BadInput(
+                f"frame {quoted(frame.name)}.parent: found {quoted(frame.parent)}, "
+                f'expected a frame of this robot or "base"{hint}'
             )
     children: dict[str, list[Frame]] = {}
     for frame in frames:
@@ -332,8 +337,8 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
     for frame in frames:
         if frame.name not in depth:
             raise BadInput(
-                f'frame "{frame.name}".parent: "{frame.parent}" leads round a ring of '
-                'frames; expected parents to lead to "base"'
+                f"frame {quoted(frame.name)}.parent: found {quoted(frame.parent)}, and "
+                'from there on a ring of parents; expected them to lead to "base"'
             )
     return _stable(frames, depth)
 

@@ -1,12 +1,12 @@
 """Reading other people's files: every mistake gets one message.
 
 A message names the file, the place in it, what was found and what was expected, and
-the nearest valid name where a name is wrong.  :class:`BadInput` is a ``ValueError``;
-the command line prints it and leaves with exit status 2.
+the nearest valid name where a name is wrong; ``stiffness/message.py`` words it.
 """
 
 import difflib
 import math
+import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -16,27 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.message import BadInput, describe, nearest, one_line, printable, quoted
+
+__all__ = [
+    "BadInput",
+    "Table",
+    "describe",
+    "nearest",
+    "number_array",
+    "quoted",
+    "read_text",
+    "read_toml",
+]
+
 _LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
-
-
-class BadInput(ValueError):
-    """Something given from outside is not what it should be."""
-
-
-def nearest(name: str, valid: Iterable[str]) -> str:
-    """``'; did you mean "x"?'``, or the list of valid names if none is near."""
-    names = [str(v) for v in valid]
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    if close:
-        return f'; did you mean "{close[0]}"?'
-    shown = ", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")
-    return f"; valid: {shown}" if names else ""
-
-
-def describe(value: object) -> str:
-    """Short description of a wrong value: what was found, never pages of it."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+_DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
 
 
 def read_text(path: Path) -> str:
@@ -80,11 +74,17 @@ def read_toml(path: Path) -> "Table":
         BadInput: the file cannot be read or is not TOML.
     """
     text = read_text(path)
+    if _DEEP_KEY.search(text):  # tomllib would take minutes over it
+        raise BadInput(f"{path}: not valid TOML: nested too deeply")
     try:
         return Table(tomllib.loads(text), str(path), "")
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        # Python's own message ends with the line and the column
-        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+    except RecursionError:
+        raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
+    except tomllib.TOMLDecodeError as error:  # its text ends with line and column
+        reason = one_line(str(error), 200)
+        raise BadInput(f"{path}: not valid TOML: {reason}") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        reason = "found a whole number of thousands of digits"
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
 
 
@@ -133,24 +133,44 @@ class Table:
         """
         if not self.has(key):
             near = difflib.get_close_matches(key, set(self.content), n=1, cutoff=0.7)
-            hint = f'; found "{near[0]}" instead' if near else ""
+            hint = f"; found {quoted(near[0])} instead" if near else ""
             raise self.bad(key, f"missing; expected {expected}{hint}")
         return self.content[key]
 
-    def text(self, key: str, default: str | None = None) -> str:
-        """A string.
+    def text(
+        self,
+        key: str,
+        default: str | None = None,
+        *,
+        expected: str = "a string",
+        longest: int = 4000,
+    ) -> str:
+        """A string of one line.
+
+        Args:
+            key: its name.
+            default: taken when the key is absent; absent is an error without one.
+            expected: what should stand there, for the message.
+            longest: most characters it may have.
 
         Returns:
             The string.
 
         Raises:
-            BadInput: missing without a default, or not a string, or empty.
+            BadInput: missing without a default, not a string, empty, too long, or
+                with line breaks or other control characters.
         """
         if default is not None and not self.has(key):
             return default
-        value = self.require(key, "a string")
+        value = self.require(key, expected)
         if not isinstance(value, str) or not value.strip():
-            raise self.bad(key, f"found {describe(value)}, expected a non-empty string")
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        if len(value) > longest:
+            found = f"found {quoted(value)} of {len(value)} characters"
+            raise self.bad(key, f"{found}, expected at most {longest}")
+        if not printable(value):
+            message = f"found {describe(value)}, expected no control characters"
+            raise self.bad(key, message)
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
@@ -163,9 +183,9 @@ class Table:
             BadInput: missing without a default, or not one of them.
         """
         valid = tuple(valid)
-        value = self.text(key, default)
+        names = " | ".join(f'"{v}"' for v in valid)
+        value = self.text(key, default, expected=names)
         if value not in valid:
-            names = " | ".join(f'"{v}"' for v in valid)
             hint = nearest(value, valid)
             hint = hint if "did you mean" in hint else ""
             raise self.bad(key, f"found {describe(value)}, expected {names}{hint}")
@@ -211,6 +231,7 @@ class Table:
         above: float = -math.inf,
         least: float = -math.inf,
         below: float = math.inf,
+        largest: float = math.inf,
     ) -> float:
         """A finite number.
 
@@ -221,6 +242,7 @@ class Table:
             above: the value must be larger than this.
             least: the value must not be smaller than this.
             below: the value must be smaller than this.
+            largest: no sound value is larger than this, either sign.
 
         Returns:
             The number.
@@ -240,6 +262,10 @@ class Table:
         if not (math.isfinite(value) and above < value < below and value >= least):
             found = describe(self.content[key])
             raise self.bad(key, f"found {found}, expected {expected}")
+        if abs(value) > largest:
+            found = describe(self.content[key])
+            expected = f"a number of size at most {largest:g} [{unit}]"
+            raise self.bad(key, f"found {found}, expected {expected}")
         return value
 
     def array(
@@ -248,8 +274,17 @@ class Table:
         shape: tuple[int, ...],
         unit: str,
         default: NDArray | None = None,
+        *,
+        largest: float = math.inf,
     ) -> NDArray:
         """An array of finite numbers of a given shape.
+
+        Args:
+            key: its name.
+            shape: expected.
+            unit: for the message.
+            default: taken when the key is absent; absent is an error without one.
+            largest: no sound entry is larger than this, either sign.
 
         Returns:
             The array.
@@ -264,6 +299,9 @@ class Table:
         value = self.require(key, expected)
         array = number_array(value)
         if array is None or array.shape != shape or not np.isfinite(array).all():
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        if np.abs(array).max(initial=0.0) > largest:
+            expected = f"numbers of size at most {largest:g} [{unit}]"
             raise self.bad(key, f"found {describe(value)}, expected {expected}")
         return array
 
@@ -308,7 +346,7 @@ class Table:
         for key in self.content:
             if key not in self._asked:
                 hint = nearest(key, self._asked)
-                raise self.bad("", f'unknown key "{key[:60]}"{hint}')
+                raise self.bad("", f"unknown key {quoted(key)}{hint}")
 
 
 def _number(value: object) -> float:
@@ -318,7 +356,7 @@ def _number(value: object) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.inf
+        return math.nan
 
 
 def number_array(value: object) -> NDArray | None:
@@ -329,6 +367,12 @@ def number_array(value: object) -> NDArray | None:
         rows = [row for row in map(number_array, value) if row is not None]
         same = len(rows) == len(value) and len({row.shape for row in rows}) == 1
         return np.array(rows) if same else None
-    numbers = [_number(v) for v in value]
-    proper = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    return np.array(numbers) if proper else None
+    return np.array([_number(v) for v in value]) if _proper(value) else None
+
+
+def _proper(values: list) -> bool:
+    """Whether all are numbers that a float can hold; nan and inf are, true is not."""
+    given = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    return given and not any(
+        isinstance(v, int) and v.bit_length() > 1023 for v in values
+    )

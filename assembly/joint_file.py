@@ -1,0 +1,122 @@
+"""What a robot file says of a joint's imperfections: its play, its stiffness."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import Clearance
+from stiffness.reading import Table, describe, number_array
+
+LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
+LARGEST = 1e40  # in SI: beyond any stiffness, section or density; its inverse below
+_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
+
+
+def read_clearance(table: Table) -> Clearance | None:
+    """The ``clearance`` table, None if absent.
+
+    Args:
+        table: of a ``[[frame]]``.
+
+    Returns:
+        The bounds that are given.
+
+    Raises:
+        BadInput: an unknown key, or not a finite number >= 0.
+    """
+    if not table.has("clearance"):
+        return None
+    inner = table.table("clearance")
+    bounds = {
+        key: inner.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        for key, unit in _CLEARANCE.items()
+        if inner.has(key)
+    }
+    inner.finish()
+    return Clearance(**bounds)
+
+
+def read_joint_stiffness(table: Table) -> NDArray | None:
+    """K_B as a full matrix; infinities only on its diagonal.
+
+    Args:
+        table: of a ``[[frame]]``.
+
+    Returns:
+        (6, 6) [N m/rad .. N/m] symmetric positive definite, None if absent.
+
+    Raises:
+        BadInput: another shape, or not a stiffness.
+    """
+    key = "joint_stiffness"
+    if not table.has(key):
+        return None
+    value = table.content[key]
+    expected = "6 diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"
+    K = number_array(value)
+    if K is None or K.shape not in {(6,), (6, 6)} or np.isnan(K).any():
+        raise table.bad(key, f"found {describe(value)}, expected {expected}")
+    if K.ndim == 1:
+        if K.min() <= 0:
+            raise table.bad(key, f"found {K.min():g} in it, expected {expected}")
+        K = np.diag(K)
+    rigid = np.isposinf(np.diag(K))
+    around = (rigid[:, None] | rigid) & ~np.eye(6, dtype=bool)
+    soft = np.ix_(~rigid, ~rigid)
+    if np.any(K[around] != 0.0) or not np.isfinite(K[soft]).all():
+        raise table.bad(
+            key,
+            f"found {describe(value)}; expected inf only on the diagonal, the rest of "
+            "its row and column zero",
+        )
+    K[soft] = definite(table, key, K[soft])
+    return K
+
+
+def definite(table: Table, key: str, K: NDArray) -> NDArray:
+    """A stiffness matrix, refused unless it is symmetric positive definite.
+
+    Args:
+        table: where it was read.
+        key: of it there.
+        K: (n, n) [N m/rad .. N/m] finite; any part of a stiffness.
+
+    Returns:
+        (n, n) the same, exactly symmetric.
+
+    Raises:
+        BadInput: it is not; a term that shows it is given, counted from 1.
+    """
+    if not K.size:
+        return K
+    diagonal = np.diag(K)
+    i = int(np.argmin(diagonal))
+    if diagonal[i] <= 0:
+        where = f"term [{i + 1}, {i + 1}] of the diagonal"
+        raise table.bad(
+            key,
+            f"not positive definite: found {diagonal[i]:g} as {where}, expected > 0",
+        )
+    if diagonal.max() > LARGEST or diagonal.min() < 1 / LARGEST:
+        i = int(np.argmax(np.abs(np.log(diagonal))))
+        expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
+        found = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
+        raise table.bad(key, f"{found}, {expected}")
+    # scaled to a unit diagonal, so that rad and m weigh alike
+    size = np.sqrt(diagonal)
+    unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)
+    asymmetry = np.abs(unit - unit.T)
+    if asymmetry.max() > 1e-6:
+        a, b = np.unravel_index(int(np.argmax(asymmetry)), K.shape)
+        raise table.bad(
+            key,
+            f"not symmetric: found [{a + 1}, {b + 1}] = {K[a, b]:.6e} but "
+            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected them equal",
+        )
+    least = np.linalg.eigvalsh((unit + unit.T) / 2).min()
+    if least <= 1e-13:
+        raise table.bad(
+            key,
+            f"not positive definite: found {least:.1e} as smallest eigenvalue once "
+            "scaled to a unit diagonal, expected > 0",
+        )
+    return np.where(K == K.T, K, K / 2 + K.T / 2)
