@@ -1,0 +1,80 @@
+"""Finite rigid motions as 4 by 4 matrices, for the simulation's side of a comparison.
+
+Written apart from :mod:`stiffness.screws` on purpose: a mistake in the placement of
+frames must not reach both sides.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+
+def matrix(rotation: NDArray, translation: ArrayLike) -> NDArray:
+    """(4, 4) from axes (3, 3) and origin (3,) [m]."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, translation
+    return T
+
+
+def turned(rotation_vector: ArrayLike) -> NDArray:
+    """(3, 3) rotation by a vector [rad]."""
+    return Rotation.from_rotvec(np.array(rotation_vector, dtype=float)).as_matrix()
+
+
+def turn_of(R: NDArray) -> NDArray:
+    """(3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+def placement(rotation_vector: ArrayLike, translation: ArrayLike) -> NDArray:
+    """(4, 4) of a rotation vector [rad] and a translation [m], both in the old axes."""
+    return matrix(turned(rotation_vector), translation)
+
+
+def shifted(translation: ArrayLike) -> NDArray:
+    """(4, 4) of a translation alone."""
+    return matrix(np.eye(3), translation)
+
+
+def inverse(T: NDArray) -> NDArray:
+    """(4, 4) the motion back."""
+    return matrix(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
+
+
+def exponential(screw: NDArray) -> NDArray:
+    """Finite motion of a constant screw acting for unit time.
+
+    Args:
+        screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m].
+
+    Returns:
+        (4, 4).
+    """
+    return matrix(turned(screw[:3]), _mean_turn(screw[:3]) @ screw[3:])
+
+
+def logarithm(T: NDArray) -> NDArray:
+    """Constant screw that makes a finite motion in unit time.
+
+    Args:
+        T: (4, 4) of a rotation by less than pi.
+
+    Returns:
+        (6,) [rad, m], the inverse of :func:`exponential`.
+    """
+    angles = turn_of(T[:3, :3])
+    return np.concatenate([angles, np.linalg.solve(_mean_turn(angles), T[:3, 3])])
+
+
+def _mean_turn(angles: NDArray) -> NDArray:
+    """(3, 3) mean of the rotations met on the way to a rotation vector."""
+    a = float(np.linalg.norm(angles))
+    x, y, z = angles
+    W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if a < 1e-3:  # the closed form cancels; the next terms are below 1e-15
+        first, second = 1 / 2 - a**2 / 24, 1 / 6 - a**2 / 120
+    else:
+        first, second = 2 * (math.sin(a / 2) / a) ** 2, (a - math.sin(a)) / a**3
+    return np.eye(3) + first * W + second * W @ W
