@@ -1,1 +1,74 @@
 """The command ``forcefit``: mounts the three folders' commands, plus ``study``."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import assembly.cli
+import stiffness.cli
+import validation.cli
+from stiffness.reading import BadInput
+
+app = typer.Typer(
+    help="Forced assembly of parallel manipulators: stiffness, energy, pose error, "
+    "and the proof of each number. SI units; screws [R T], wrenches [M F].",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.add_typer(stiffness.cli.app, name="stiffness", help="How stiff is a link?")
+app.add_typer(assembly.cli.app, name="assembly", help="What pose, energy, error?")
+app.add_typer(validation.cli.app, name="validation", help="Is it true?")
+
+
+@app.command()
+def study(
+    file: Annotated[Path, typer.Argument(help="Study file (TOML).")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder to write.")
+    ] = None,
+    json: Annotated[
+        str | None, typer.Option("--json", help="Results as JSON; - is stdout.")
+    ] = None,
+) -> None:
+    """Run the main job: one robot, every check the file names, to one report.
+
+    Writes report.html (self-contained), results.json and results.nc into the folder
+    the study file names.
+    """
+    from validation.study import run_study
+
+    validation.cli.finish_study(run_study(file, output), json)
+
+
+def main() -> None:
+    """Run the command; bad input is one line on stderr and exit status 2."""
+    try:
+        status = app(standalone_mode=False)
+    except BadInput as error:
+        sys.exit(_complain(str(error), 2))
+    except (KeyboardInterrupt, typer.Abort):
+        sys.exit(_complain("interrupted", 130))
+    except typer.Exit as error:
+        sys.exit(error.exit_code)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except Exception as error:
+        # an option misspelt or missing: the parser's own kind of error
+        if not hasattr(error, "format_message"):
+            raise
+        sys.exit(_complain(error.format_message(), 2))
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _complain(message: str, status: int) -> int:
+    """A message on stderr."""
+    print(f"forcefit: {message}", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,188 @@
+"""The commands ``forcefit assembly ...``: parse, call one function, print or save."""
+
+import json as json_module
+import math
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from assembly.posture import parse_assignments
+from stiffness.reading import BadInput, nearest
+from stiffness.screws import WRENCH
+
+app = typer.Typer(no_args_is_help=True)
+
+RobotArgument = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="A robot file, or a built-in name.")
+]
+PoseOption = Annotated[
+    list[str] | None,
+    typer.Option("--pose", help="Nominal platform pose, such as tx=0.1,tz=-0.5."),
+]
+JointOption = Annotated[
+    list[str] | None,
+    typer.Option("--joint", help="Actuated coordinates, such as leg1.drive=0.1."),
+]
+LoadOption = Annotated[
+    list[str] | None,
+    typer.Option("--load", help="Load on the platform, such as fx=10,mz=1."),
+]
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", help="Write results as JSON to a file; - is stdout."),
+]
+
+
+def parse_load(texts: list[str] | None) -> list[float] | None:
+    """Wrench ``[mx my mz fx fy fz]`` from ``--load``; None if not given.
+
+    Args:
+        texts: such as ``["fx=10,mz=1"]``.
+
+    Returns:
+        Six numbers [N m, N].
+
+    Raises:
+        BadInput: an unknown component or not a number.
+    """
+    if not texts:
+        return None
+    names = [name.lower() for name in WRENCH]
+    given = parse_assignments(texts, "--load")
+    for name in given:
+        if name not in names:
+            hint = nearest(name, names)
+            raise BadInput(f'--load: unknown component "{name}"{hint}')
+    return [given.get(name, 0.0) for name in names]
+
+
+def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
+    """The posture that ``--pose`` or ``--joint`` asks for; home if neither."""
+    from assembly.posture import place_robot
+    from assembly.robots import load_robot
+
+    return place_robot(
+        load_robot(robot),
+        pose=parse_assignments(pose, "--pose") if pose else None,
+        joints=parse_assignments(joint, "--joint") if joint else None,
+    )
+
+
+def write_json(results: dict, target: str | None) -> None:
+    """Write results to a file, whole or not at all, or to standard output.
+
+    Args:
+        results: plain values; infinities and NaN become null.
+        target: a path, ``"-"`` for standard output, None for nowhere.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    if target is None:
+        return
+    text = json_module.dumps(plain(results), indent=1, allow_nan=False)
+    if target == "-":
+        print(text)
+        return
+    path = Path(target)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def plain(value: Any) -> Any:
+    """Arrays as lists, numbers that are not finite as None, keys as text."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+@contextmanager
+def progress_bar(what: str) -> Generator[Any, None, None]:
+    """A progress bar on stderr; yields ``update(done, total)``."""
+    from rich.console import Console
+    from rich.progress import Progress, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (*Progress.get_default_columns()[:-1], TimeElapsedColumn())
+    columns = (*columns, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@app.command()
+def solve(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Close the robot at least energy: pose error, energy, wrenches, zone margin."""
+    from assembly.results import solution_of, solution_text
+
+    results = solution_of(posture_of(robot, pose, joint), parse_load(load))
+    write_json(results, json)
+    if json != "-":
+        print(solution_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
+def sweep(
+    robot: RobotArgument,
+    grid: Annotated[
+        str, typer.Option(help="Such as tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the maps, as PNG, SVG or PDF.")
+    ] = None,
+) -> None:
+    """Margins, energy and platform error over a grid of platform poses."""
+    from assembly.plot import map_figure
+    from assembly.robots import load_robot
+    from assembly.sweep import parse_grid, save_dataset, sweep_poses
+
+    machine, axes = load_robot(robot), parse_grid(grid)
+    with progress_bar("postures") as update:
+        data = sweep_poses(machine, axes, update)
+    save_dataset(data, output)
+    if figure is not None:
+        map_figure(data).savefig(figure, dpi=150)
+    counts = data["status"].to_series().value_counts()
+    print(", ".join(f"{name}: {count}" for name, count in counts.items()))
+
+
+@app.command()
+def show(
+    robot: RobotArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="PNG file.")],
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    exaggeration: Annotated[
+        float | None, typer.Option(help="Factor on displacements.", min=0.0)
+    ] = None,
+) -> None:
+    """Draw the nominal and the forced robot, displacements exaggerated."""
+    from assembly.energy import solve_assembly
+    from assembly.plot import robot_plotter
+
+    answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
+    plotter = robot_plotter(answer, exaggeration)
+    plotter.screenshot(str(output))
+    plotter.close()

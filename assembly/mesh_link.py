@@ -1,0 +1,104 @@
+"""K_E of a mesh link, put where the robot has it: turned from mesh to frame axes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import Frame, MeshLink
+from stiffness.link import LinkStiffness, turn_link
+from stiffness.reading import BadInput
+from stiffness.screws import rotation_matrix
+
+
+def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
+    """Stiffness of a frame's mesh link by finite elements, in the frame's axes.
+
+    Args:
+        frame: one with a :class:`assembly.robot.MeshLink`.
+        accuracy: asked of every entry, relative to sqrt(K_ii K_jj).
+
+    Returns:
+        The link, read at the tip interface's centre, which is the frame's origin.
+
+    Raises:
+        BadInput: the surface or an interface is not usable, or the distance of the
+            interfaces is not that of the two origins.
+        ValueError: the frame has no mesh link.
+    """
+    from stiffness.fea import mesh_link
+    from stiffness.interface import parse_interface
+
+    link = frame.link
+    if not isinstance(link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    place = f'frame "{frame.name}".link.mesh'
+    solved = mesh_link(
+        link.surface,
+        parse_interface(link.base, f"{place}.base"),
+        parse_interface(link.tip, f"{place}.tip"),
+        link.young, link.poisson,
+        unit=link.unit, accuracy=accuracy, interface=link.interface,
+    )  # fmt: skip
+    # from the parent's origin to this frame's, in this frame's axes
+    span = rotation_matrix(frame.rotation).T @ frame.translation
+    turn = mesh_rotation(solved.tip - solved.base, span, link.up, link.frame_up)
+    _check_tip(place, turn @ (solved.tip - solved.base), span)
+    return turn_link(solved, turn)
+
+
+def mesh_compliance(frame: Frame) -> NDArray:
+    """(6, 6) compliance of a frame's mesh link; see :func:`mesh_link_stiffness`."""
+    return mesh_link_stiffness(frame).compliance
+
+
+def mesh_rotation(
+    mesh_span: NDArray,
+    span: NDArray,
+    up: tuple[float, float, float] | None = None,
+    frame_up: tuple[float, float, float] | None = None,
+) -> NDArray:
+    """Rotation from mesh axes to frame axes that lays one span along the other.
+
+    Args:
+        mesh_span: (3,) [m] base to tip in the mesh's axes.
+        span: (3,) [m] parent's origin to the frame's, in the frame's axes.
+        up: a direction in the mesh's axes that fixes the roll, with ``frame_up``.
+        frame_up: the same direction in the frame's axes.
+
+    Returns:
+        (3, 3) the rotation; the smallest one if no roll is given.
+    """
+    a, b = mesh_span / np.linalg.norm(mesh_span), span / np.linalg.norm(span)
+    if up is not None and frame_up is not None:
+        return _triad(b, np.array(frame_up)) @ _triad(a, np.array(up)).T
+    axis = np.cross(a, b)
+    sine, cosine = float(np.linalg.norm(axis)), float(a @ b)
+    if sine < 1e-15:
+        if cosine > 0:
+            return np.eye(3)
+        # half a turn: about any axis across, the one nearest to a coordinate axis
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
+    return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
+
+
+def _triad(along: NDArray, up: NDArray) -> NDArray:
+    """Right-handed axes: first along, third as near to up as possible."""
+    side = np.cross(up, along)
+    side = side / np.linalg.norm(side)
+    return np.column_stack([along, side, np.cross(along, side)])
+
+
+def _check_tip(place: str, tip: NDArray, wanted: NDArray) -> None:
+    """The interfaces must be as far apart as the origins they stand for."""
+    length = float(np.linalg.norm(wanted))
+    if np.linalg.norm(tip - wanted) > 1e-6 + 1e-3 * length:
+        raise BadInput(
+            f"{place}: the tip interface's centre lies at {_point(tip)} from the base's "
+            f"centre, the frame's origin at {_point(wanted)} from its parent's; "
+            "expected the same point within 1e-6 m + 0.1 % of the length"
+        )
+
+
+def _point(p: NDArray) -> str:
+    """Coordinates for a message."""
+    return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

@@ -1,0 +1,187 @@
+"""Figures of assemblies: maps over the workspace, and the robot itself, deformed.
+
+Functions take a result and return a figure or a plotter; none solves, shows or saves.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.energy import Assembly
+from stiffness.screws import rotation_matrix, screw_map
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+_MAPS = (
+    ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
+    ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r"),
+    ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
+    ("translation", 1e3, "platform position error [mm]", "viridis"),
+    ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
+)
+
+
+def map_figure(data: "xarray.Dataset") -> "Figure":
+    """Maps over a two-dimensional grid: margins, energy and platform error.
+
+    Args:
+        data: of :func:`assembly.sweep.sweep_poses` over two pose components with more
+            than one value each.
+
+    Returns:
+        A figure with a panel for each quantity; the line in the margins is 1, inside
+        which the manipulator assembles rigidly.
+
+    Raises:
+        ValueError: the grid does not have two such axes.
+    """
+    from matplotlib.figure import Figure
+
+    names = [d for d in data.dims if d != "screw" and data.sizes[d] > 1]
+    if len(names) != 2:
+        raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
+    x, y = (str(name) for name in names)
+    data = data.squeeze(drop=True)
+    figure = Figure(figsize=(11, 9), layout="constrained")
+    panels = figure.subplots(3, 2).ravel()
+    for panel, (key, scale, title, colours) in zip(panels, _MAPS, strict=False):
+        values = _quantity(data, key).transpose(y, x) * scale
+        finite = values.where(np.isfinite(values))
+        image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
+        figure.colorbar(image, ax=panel)
+        inside = bool((finite < 1).any()) and bool((finite > 1).any())
+        if key.startswith("margin") and inside and min(finite.shape) > 1:
+            panel.contour(data[x], data[y], finite, levels=[1.0], colors="cyan")
+        panel.set(title=title, xlabel=f"{x} [m]", ylabel=f"{y} [m]", aspect="equal")
+    _states(panels[-1], data, x, y)
+    return figure
+
+
+def _quantity(data: "xarray.Dataset", key: str) -> Any:
+    """A variable of the data set, or the size of half the platform screw."""
+    halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+    if key not in halves:
+        return data[key]
+    part = data["platform_screw"].isel(screw=halves[key])
+    return np.sqrt((part**2).sum("screw", skipna=False))
+
+
+def _states(panel: Any, data: "xarray.Dataset", x: str, y: str) -> None:
+    """Which points were solved, as text and colour."""
+    names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
+    order = {name: i for i, name in enumerate(names)}
+    codes = np.vectorize(order.get)(data["status"].transpose(y, x).values.astype(str))
+    panel.pcolormesh(data[x], data[y], codes, cmap="Set2", vmin=0, vmax=7)
+    said = ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
+    panel.set(title=said, xlabel=f"{x} [m]", ylabel=f"{y} [m]", aspect="equal")
+
+
+def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
+    """Draw the nominal robot (grey) and the forced one (coloured), exaggerated.
+
+    Args:
+        answer: an assembled robot.
+        exaggeration: factor on all displacements, written on the picture; if absent,
+            such that the largest shows as a tenth of the robot and no turn as more
+            than 0.5 rad.
+
+    Returns:
+        A pyvista plotter, off screen; the caller shows it or takes a screenshot.
+    """
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    # without a display VTK looks for other ways to draw, and says so on stderr
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    bodies = displaced_bodies(answer)
+    size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
+    factor = exaggeration or _exaggeration(bodies, size)
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 800))
+    for i, frame in enumerate(answer.posture.robot.frames):
+        start, end = bodies.starts[i], bodies.ends[i]
+        if np.linalg.norm(end - start) < 1e-9:
+            continue
+        grey = pyvista.Line(start, end).tube(radius=0.005 * size)
+        plotter.add_mesh(grey, color="lightgrey")
+        line = pyvista.Spline(_shape(bodies, i, factor), 40).tube(radius=0.008 * size)
+        plotter.add_mesh(line, color="crimson" if frame.link else "steelblue")
+    said = f"displacements x {factor:g}; red: elastic links; grey: nominal"
+    plotter.add_text(said, font_size=9)
+    plotter.add_axes()
+    plotter.view_vector((0.55, -1.0, 0.35))
+    return plotter
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Where each body of an assembled robot runs, and how it moves and bends.
+
+    Attributes:
+        starts: (n, 3) [m] nominal start of each frame's body, base axes.
+        ends: (n, 3) [m] nominal end.
+        start_screws: (n, 6) [rad, m] small screw of the start, read there.
+        end_screws: (n, 6) [rad, m] small screw of the end, read there.
+        bends: (n, 3) [rad] elastic rotation of the end against the start.
+    """
+
+    starts: NDArray
+    ends: NDArray
+    start_screws: NDArray
+    end_screws: NDArray
+    bends: NDArray
+
+
+def displaced_bodies(answer: Assembly) -> Bodies:
+    """Follow the small screws down the tree: errors and links bodies, then joints.
+
+    Args:
+        answer: an assembled robot of n frames.
+
+    Returns:
+        All bodies, in the robot's order of frames.
+    """
+    posture = answer.posture
+    turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
+    body = turned @ (posture.robot.errors + answer.link_screws)[..., None]
+    joint = turned @ (answer.clearance_screws + answer.joint_screws)[..., None]
+    ends = posture.transforms[:, :3, 3]
+    starts, at_start, at_end = np.zeros_like(ends), *np.zeros((2, len(ends), 6))
+    for i, parent in enumerate(posture.robot.parents):
+        if parent >= 0:
+            starts[i] = ends[parent]
+            at_start[i] = at_end[parent] + joint[parent, :, 0]
+        carried = screw_map(starts[i] - ends[i]) @ at_start[i]
+        at_end[i] = carried + body[i, :, 0]
+    bends = turned @ answer.link_screws[..., None]
+    return Bodies(starts, ends, at_start, at_end, bends[:, :3, 0])
+
+
+def _exaggeration(bodies: Bodies, size: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that keeps the picture readable."""
+    shift = float(np.abs(bodies.end_screws[:, 3:]).max()) or 1.0
+    turn = float(np.abs(bodies.end_screws[:, :3]).max()) or 1.0
+    most = min(0.1 * size / shift, 0.5 / turn)
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(power * max(d for d in (1, 2, 5) if d * power <= most * (1 + 1e-12)))
+
+
+def _shape(bodies: Bodies, i: int, factor: float) -> NDArray:
+    """(20, 3) points of a displaced body: a cubic, as a beam bends."""
+    a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
+    b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
+    if not np.any(bodies.bends[i]):
+        return np.linspace(a, b, 20)
+    bend = rotation_matrix(factor * bodies.bends[i])
+    chord = b - a
+    # the end turns by twice what the chord leaves of the bend, in a beam's first shape
+    slope_a, slope_b = bend.T @ chord, bend @ chord
+    slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
+    s = np.linspace(0, 1, 20)[:, None]
+    return (
+        (2 * s**3 - 3 * s**2 + 1) * a + (s**3 - 2 * s**2 + s) * slope_a
+        + (3 * s**2 - 2 * s**3) * b + (s**3 - s**2) * slope_b
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""What an assembly tells machines (the keys of the public format) and people."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.conic import SolverFailed
+from assembly.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.mobility import mobility
+from assembly.posture import Posture
+from assembly.reduction import FreeMotion
+from assembly.zone import zone_margin
+
+
+def solution_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, Any]:
+    """Everything ``assembly solve`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The keys of the public format; ``status`` is ``"ok"``, or says what could not
+        be answered, and the answer is then null.
+    """
+    robot = posture.robot
+    names = [f.name for f in robot.frames]
+    results: dict[str, Any] = {
+        "robot": robot.name,
+        "status": "ok",
+        "pose": posture.pose(),
+        "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
+        "nominal_mismatch": posture.mismatch,
+        "mobility": vars(mobility(posture)),
+        "load": np.zeros(6) if load is None else np.asarray(load),
+    }
+    empty = {"energy": None, "platform_screw": None, "frames": None, "closures": None}
+    try:
+        rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
+        results["zone"] = {
+            "assemblable": rigid.assemblable,
+            "assemblable_free": free.assemblable,
+            "margin": rigid.margin,
+            "margin_free": free.margin,
+            "margin_bound": rigid.bound,
+            "margin_free_bound": free.bound,
+        }
+        return results | _answer(solve_assembly(posture, load))
+    except CannotAssemble as error:
+        return results | empty | {"status": "cannot assemble", "reason": str(error)}
+    except FreeMotion as error:
+        return results | empty | {"status": "no equilibrium", "reason": str(error)}
+    except SolverFailed as error:
+        return results | empty | {"status": "solver failed", "reason": str(error)}
+
+
+def _answer(answer: Assembly) -> dict[str, Any]:
+    """The part that only a solved assembly has."""
+    robot = answer.posture.robot
+    frames = {
+        f.name: {
+            "clearance": answer.clearance_screws[i],
+            "link": answer.link_screws[i],
+            "joint": answer.joint_screws[i],
+            "wrench": answer.wrenches[i],
+        }
+        for i, f in enumerate(robot.frames)
+    }
+    closures = [
+        {"frames": list(pair), "wrench": answer.closure_wrenches[k]}
+        for k, pair in enumerate(robot.closures)
+    ]
+    certificate = {
+        "closure_residual": answer.closure_residual(),
+        "reference_length": answer.linearisation.size,
+        "clearance_excess": answer.clearance_excess(),
+        "duality_gap": answer.duality_gap(),
+        "relative_gap": answer.relative_gap(),
+    }
+    return {
+        "energy": answer.energy,
+        "potential": answer.potential,
+        "platform_screw": answer.platform_screw,
+        "frames": frames,
+        "closures": closures,
+        "certificate": certificate,
+        "ranks": answer.ranks,
+    }
+
+
+def solution_text(results: dict[str, Any]) -> str:
+    """A solution for people: a few lines.
+
+    Args:
+        results: of :func:`solution_of`.
+
+    Returns:
+        Text without colours.
+    """
+    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    if "zone" in results:
+        zone = results["zone"]
+        lines.append(
+            f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
+            f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
+        )
+    if results["status"] != "ok":
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    screw, certificate = results["platform_screw"], results["certificate"]
+    lines += [
+        f"energy: {results['energy']:.6g} J",
+        f"platform error: {_numbers(screw[:3] * 1e3)} mrad, "
+        f"{_numbers(screw[3:] * 1e3)} mm",
+        f"certificate: closure residual {certificate['closure_residual']:.1e}, "
+        f"clearance excess {certificate['clearance_excess']:.1e}, "
+        f"gap {certificate['duality_gap']:.1e} J "
+        f"({certificate['relative_gap']:.1e} relative)",
+    ]
+    return "\n".join(lines)
+
+
+def _factor(value: float | None) -> str:
+    """A margin, or that there is none."""
+    return "none" if value is None else f"{value:.4g}"
+
+
+def _numbers(values: Any) -> str:
+    """Numbers in brackets."""
+    return "[" + " ".join(f"{v:.4g}" for v in values) + "]"

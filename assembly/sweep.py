@@ -1,0 +1,200 @@
+"""Margin, energy and platform error over a grid of postures, as a labelled data set."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.conic import SolverFailed
+from assembly.energy import CannotAssemble, solve_assembly
+from assembly.posture import POSE, Posture, place_many
+from assembly.robot import Robot
+from assembly.robot_file import frame_table
+from assembly.zone import ASSEMBLABLE, zone_margin
+from stiffness.reading import BadInput, nearest
+from stiffness.screws import SCREW
+
+if TYPE_CHECKING:
+    import xarray
+
+_LARGEST_GRID = 10_000_000  # points; more is a slip of the step
+_POINT = {
+    "margin": "1", "margin_free": "1", "energy": "J", "closure_residual": "1",
+    "clearance_excess": "1", "duality_gap": "J",
+}  # fmt: skip
+_MEANING = {
+    "margin": "factor on all clearances at which it just assembles, compliant rigid",
+    "margin_free": "the same, compliant joints free about their own axis",
+    "energy": "least elastic energy that closes it, eq. (22)",
+    "platform_screw": "pose error at the platform's origin, base axes",
+    "status": "ok, out of reach, cannot assemble, or solver failed",
+}
+
+
+def parse_grid(text: str) -> dict[str, NDArray]:
+    """Axes of a grid from text such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+
+    Args:
+        text: for each pose component ``start:stop:step`` [m or rad], or one number.
+            Both ends count when (stop - start)/step is whole within 1e-9.
+
+    Returns:
+        Values by pose component, in the order given.
+
+    Raises:
+        BadInput: not of that form, or far too many points.
+    """
+    axes: dict[str, NDArray] = {}
+    for part in text.split(","):
+        name, _, spec = (piece.strip() for piece in part.partition("="))
+        if name not in POSE:
+            hint = nearest(name, POSE)
+            raise BadInput(f'grid: unknown pose component "{name[:60]}"{hint}')
+        if name in axes:
+            raise BadInput(f'grid: "{name}" is given twice')
+        axes[name] = _axis(name, spec)
+    if np.prod([float(len(v)) for v in axes.values()]) > _LARGEST_GRID:
+        raise BadInput(f"grid: more than {_LARGEST_GRID} points; is a step too small?")
+    return axes
+
+
+def _axis(name: str, spec: str) -> NDArray:
+    """Values of one axis."""
+    expected = "expected START:STOP:STEP or one number"
+    try:
+        numbers = [float(piece) for piece in spec.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in {1, 3} or not np.isfinite(numbers).all():
+        raise BadInput(f'grid {name}: found "{spec[:60]}", {expected}')
+    if len(numbers) == 1:
+        return np.array(numbers)
+    start, stop, step = numbers
+    if step == 0 or (stop - start) / step < 0:
+        raise BadInput(
+            f"grid {name}: step {step:g} never leads from {start:g} to {stop:g}"
+        )
+    count = (stop - start) / step
+    if count > _LARGEST_GRID:
+        raise BadInput(f"grid {name}: {count:.3g} points; is the step too small?")
+    return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
+
+
+def sweep_poses(
+    robot: Robot,
+    axes: Mapping[str, NDArray],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> "xarray.Dataset":
+    """Solve (21) and (22) at every pose of a grid.
+
+    Args:
+        robot: with its errors, clearances and stiffnesses.
+        axes: values [m or rad] by pose component; components not named are free.
+        progress: called after each point with the number done and the total.
+
+    Returns:
+        Data set over the axes: ``margin``, ``margin_free``, ``energy``,
+        ``platform_screw``, certificates and ``status``; NaN where there is no answer,
+        and the status then says why.
+
+    Raises:
+        BadInput: the robot's closures do not hold in its home pose.
+    """
+    shape = tuple(len(v) for v in axes.values())
+    poses = np.full((int(np.prod(shape)), 6), np.nan)
+    mesh = np.meshgrid(*axes.values(), indexing="ij")
+    for name, values in zip(axes, mesh, strict=True):
+        poses[:, POSE.index(name)] = values.ravel()
+    postures, reasons = place_many(robot, poses)
+    rows = []
+    for i, (posture, reason) in enumerate(zip(postures, reasons, strict=True)):
+        rows.append(_point(posture, reason))
+        progress(i + 1, len(poses))
+    return _dataset(robot, axes, shape, rows)
+
+
+def _point(posture: Posture | None, reason: str) -> dict:
+    """Everything at one posture; a point that fails says so and stops nothing."""
+    row: dict = dict.fromkeys(_POINT, np.nan)
+    row |= {"platform_screw": np.full(6, np.nan), "status": "ok", "reason": ""}
+    if posture is None:
+        return row | {"status": "out of reach", "reason": reason}
+    try:
+        for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
+            margin = zone_margin(posture, compliant).margin
+            row[key] = np.inf if margin is None else margin
+        answer = solve_assembly(posture)
+    except CannotAssemble as error:
+        return row | {"status": "cannot assemble", "reason": str(error)}
+    except SolverFailed as error:
+        return row | {"status": "solver failed", "reason": str(error)}
+    return row | {
+        "energy": answer.energy,
+        "platform_screw": answer.platform_screw,
+        "closure_residual": answer.closure_residual(),
+        "clearance_excess": answer.clearance_excess(),
+        "duality_gap": answer.duality_gap(),
+    }
+
+
+def _dataset(
+    robot: Robot, axes: Mapping[str, NDArray], shape: tuple[int, ...], rows: list[dict]
+) -> "xarray.Dataset":
+    """The data set with its units and where it came from."""
+    import xarray
+
+    dims = tuple(axes)
+    units = {name: "m" if name.startswith("t") else "rad" for name in axes}
+    data = {
+        key: (dims, np.array([r[key] for r in rows]).reshape(shape), {"units": unit})
+        for key, unit in _POINT.items()
+    }
+    screws = np.array([r["platform_screw"] for r in rows]).reshape(*shape, 6)
+    data["platform_screw"] = ((*dims, "screw"), screws, {"units": "rad, m"})
+    for key in ("status", "reason"):
+        text = np.array([r[key] for r in rows], dtype=object).reshape(shape)
+        data[key] = (dims, text, {})
+    for key, meaning in _MEANING.items():
+        data[key][2]["long_name"] = meaning
+    coordinates = {k: (k, v, {"units": units[k]}) for k, v in axes.items()}
+    attributes = {
+        "robot": robot.name,
+        "robot_sha256": robot_hash(robot),
+        "program": f"forcefit {version('forcefit')}",
+    }
+    return xarray.Dataset(data, {**coordinates, "screw": list(SCREW)}, attributes)
+
+
+def robot_hash(robot: Robot) -> str:
+    """SHA-256 of all that a robot file says of a robot, for provenance."""
+    said = [robot.platform, robot.closures, [frame_table(f) for f in robot.frames]]
+    return hashlib.sha256(json.dumps(said, default=str).encode()).hexdigest()
+
+
+def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
+    """Write a data set as NetCDF, whole or not at all.
+
+    Args:
+        data: of :func:`sweep_poses`.
+        path: of the new file; it replaces an old one only once it is complete.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        data.to_netcdf(part, engine="h5netcdf")
+        part.replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
+    """Bool over the grid: where the margin says it goes together rigidly."""
+    return np.asarray(data[key] <= ASSEMBLABLE)
