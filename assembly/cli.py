@@ -1,7 +1,5 @@
 """The commands ``forcefit assembly ...``: parse, call one function, print or save."""
 
-import json as json_module
-import math
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +10,7 @@ import typer
 from assembly.posture import parse_assignments
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import WRENCH
+from stiffness.writing import write_json
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -69,44 +68,6 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
         pose=parse_assignments(pose, "--pose") if pose else None,
         joints=parse_assignments(joint, "--joint") if joint else None,
     )
-
-
-def write_json(results: dict, target: str | None) -> None:
-    """Write results to a file, whole or not at all, or to standard output.
-
-    Args:
-        results: plain values; infinities and NaN become null.
-        target: a path, ``"-"`` for standard output, None for nowhere.
-
-    Raises:
-        BadInput: the file cannot be written.
-    """
-    if target is None:
-        return
-    text = json_module.dumps(plain(results), indent=1, allow_nan=False)
-    if target == "-":
-        print(text)
-        return
-    path = Path(target)
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(text + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
-
-
-def plain(value: Any) -> Any:
-    """Arrays as lists, numbers that are not finite as None, keys as text."""
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 @contextmanager

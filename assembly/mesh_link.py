@@ -93,8 +93,8 @@ def _check_tip(place: str, tip: NDArray, wanted: NDArray) -> None:
     length = float(np.linalg.norm(wanted))
     if np.linalg.norm(tip - wanted) > 1e-6 + 1e-3 * length:
         raise BadInput(
-            f"{place}: the tip interface's centre lies at {_point(tip)} from the base's "
-            f"centre, the frame's origin at {_point(wanted)} from its parent's; "
+            f"{place}: the tip interface's centre lies at {_point(tip)} from the "
+            f"base's, the frame's origin at {_point(wanted)} from its parent's; "
             "expected the same point within 1e-6 m + 0.1 % of the length"
         )
 

@@ -1,0 +1,331 @@
+"""One self-contained page of a study, and its results for machines."""
+
+import base64
+import html
+import io
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.reading import BadInput
+from stiffness.screws import SCREW
+from stiffness.writing import write_json
+from validation.study import StudyResults
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
+       padding: 0 1rem; color: #222; }
+h1 { font-size: 1.7rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem;
+     border-bottom: 1px solid #ddd; }
+table { border-collapse: collapse; font-size: .85rem; margin: .8rem 0; }
+td, th { border: 1px solid #ddd; padding: .2rem .55rem; text-align: right; }
+th { background: #f5f5f5; } td:first-child, th:first-child { text-align: left; }
+.verdict { font-size: 1.1rem; padding: .7rem 1rem; border-left: .4rem solid; }
+.good { border-color: #2a7; background: #f0faf5; }
+.bad { border-color: #c33; background: #fdf1f1; }
+figure { margin: 1rem 0; } img { max-width: 100%; }
+figcaption, .note { color: #555; font-size: .85rem; }
+"""
+
+
+def write_study(results: StudyResults) -> Path:
+    """Write ``report.html``, ``results.json`` and ``results.nc`` of a study.
+
+    Args:
+        results: of :func:`validation.study.run_study`.
+
+    Returns:
+        The folder.
+
+    Raises:
+        BadInput: the folder cannot be written.
+    """
+    from assembly.sweep import save_dataset
+
+    folder = results.study.folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        page = folder / "report.html.part"
+        page.write_text(report_page(results), encoding="utf-8")
+        page.replace(folder / "report.html")
+    except OSError as error:
+        raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
+    write_json(results_table(results), str(folder / "results.json"))
+    if results.maps is not None:
+        save_dataset(results.maps, folder / "results.nc")
+    return folder
+
+
+def results_table(results: StudyResults) -> dict[str, Any]:
+    """Everything a study found, as plain values."""
+    table: dict[str, Any] = {
+        "program": f"forcefit {version('forcefit')}",
+        "title": results.study.title,
+        "errors": results.study.errors,
+        "links": results.study.source,
+        "passed": results.passed,
+        "solution": results.solution,
+        "reference": results.reference,
+        "stiffness": results.stiffness,
+    }
+    if results.crosscheck is not None:
+        table["crosscheck"] = results.crosscheck.table()
+    if results.maps is not None:
+        table["maps"] = map_summary(results.maps)
+    return table
+
+
+def map_summary(maps: Any) -> dict[str, Any]:
+    """Least, median and largest value of each map, and the counts of the statuses."""
+    names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
+    summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
+    for key in ("margin", "margin_free", "energy"):
+        values = maps[key].values[np.isfinite(maps[key].values)]
+        if len(values):
+            summary[key] = [values.min(), float(np.median(values)), values.max()]
+    share = (maps["margin_free"] <= 1 + 1e-6).sum() / (maps["status"] == "ok").sum()
+    return summary | {"share_assemblable_free": float(share)}
+
+
+def report_page(results: StudyResults) -> str:
+    """The page as HTML with its pictures inside."""
+    study, robot = results.study, results.robot
+    parts = [
+        f"<h1>{html.escape(study.title)}</h1>",
+        f"<p class=note>{html.escape(robot.name)}: {html.escape(robot.description)}. "
+        f"{len(robot.frames)} frames, {len(robot.closures)} closures; "
+        f"{html.escape(study.errors)}; link stiffness: {study.source}. "
+        f"forcefit {version('forcefit')}. SI units, screws [R T], wrenches [M F].</p>",
+        _verdict(results),
+        _solution(results),
+    ]
+    if results.reference is not None:
+        parts.append(_reference(results))
+    if results.stiffness:
+        parts.append(_stiffness(results.stiffness))
+    if results.maps is not None:
+        parts.append(_maps(results))
+    if results.answer is not None and "picture" in study.checks:
+        parts.append(_picture(results))
+    if results.crosscheck is not None:
+        parts.append(_crosscheck(results))
+    parts.append(_left_out())
+    body = "\n".join(parts)
+    return (
+        "<!doctype html><html lang=en><head><meta charset=utf-8>"
+        "<meta name=viewport content='width=device-width'>"
+        f"<title>{html.escape(study.title)}</title><style>{_STYLE}</style></head>"
+        f"<body>{body}</body></html>\n"
+    )
+
+
+def _verdict(results: StudyResults) -> str:
+    """The honest sentence at the top."""
+    solution = results.solution
+    if solution["status"] != "ok":
+        said = f"No answer at this pose: {solution['status']}, {solution['reason']}."
+        return f"<p class='verdict bad'>{html.escape(said)}</p>"
+    zone = solution["zone"]
+    if zone["assemblable"] or zone["assemblable_free"]:
+        goes = "It goes together by its clearances alone"
+        goes += "" if zone["assemblable"] else " if its compliant joints turn freely"
+    else:
+        goes = (
+            f"It goes together only by force: {solution['energy']:.4g} J, since all "
+            f"clearances would have to be {_number(zone['margin_free'])} times as large"
+        )
+    screw = solution["platform_screw"]
+    goes += (
+        f". The platform ends up {1e3 * np.linalg.norm(screw[3:]):.3g} mm and "
+        f"{1e3 * np.linalg.norm(screw[:3]):.3g} mrad from its nominal pose."
+    )
+    checks = [c for c in (results.reference, results.crosscheck) if c is not None]
+    said = f" {len(checks)} independent check{'s' if len(checks) != 1 else ''} of these"
+    said += " numbers " + ("passed." if results.passed else "did not all pass.")
+    kind = "good" if results.passed else "bad"
+    return f"<p class='verdict {kind}'>{html.escape(goes + said)}</p>"
+
+
+def _solution(results: StudyResults) -> str:
+    """The assembly at the study's pose, with its certificate."""
+    solution = results.solution
+    pose = ", ".join(f"{k} = {v:.6g}" for k, v in solution["pose"].items())
+    parts = [f"<h2>Assembly at one pose</h2><p>Nominal pose: {pose} [m, rad].</p>"]
+    rows = [[k, str(v)] for k, v in solution["mobility"].items()]
+    zone = solution.get("zone", {})
+    for key in ("margin", "margin_free"):
+        rows.append([f"zone {key}, eq. (21)", _number(zone.get(key))])
+    if solution["status"] == "ok":
+        rows.append(["energy, eq. (22) [J]", f"{solution['energy']:.9g}"])
+        for name, value in zip(SCREW, solution["platform_screw"], strict=True):
+            rows.append([f"platform error {name} [rad, m]", f"{value:.6e}"])
+        for key, value in solution["certificate"].items():
+            rows.append([f"certificate: {key}", f"{value:.2e}"])
+    parts.append(_table(["quantity", "value"], rows))
+    if solution["status"] == "ok":
+        parts.append(_wrenches(results))
+    return "".join(parts)
+
+
+def _wrenches(results: StudyResults) -> str:
+    """Wrench through each elastic link."""
+    frames = results.solution["frames"]
+    rows = [
+        [html.escape(f.name), *(f"{v:.4g}" for v in frames[f.name]["wrench"])]
+        for f in results.robot.frames
+        if f.link is not None
+    ]
+    head = ["link", "MX", "MY", "MZ [N m]", "FX", "FY", "FZ [N]"]
+    return (
+        "<p>Wrench each elastic link transmits, at its tip in its own axes:</p>"
+        + _table(head, rows)
+    )
+
+
+def _reference(results: StudyResults) -> str:
+    """The printed problems solved again."""
+    reference, solution = results.reference, results.solution
+    assert reference is not None
+    ours = {"energy": solution["energy"], "margin": solution["zone"]["margin"]}
+    ours["margin_free"] = solution["zone"]["margin_free"]
+    rows = [
+        [k, _number(ours[k], 10), _number(reference[k], 10), f"{d:.1e}"]
+        for k, d in reference["relative_difference"].items()
+    ]
+    return (
+        "<h2>The same problems as printed, in cvxpy</h2>"
+        "<p>Every screw of every frame a variable, every constraint an equation of the "
+        f"paper; differences must stay below {reference['tolerance']:g}.</p>"
+        + _table(["", "reduced problem", "cvxpy", "relative difference"], rows)
+    )
+
+
+def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
+    """Beam against finite elements."""
+    from validation.plot import stiffness_figure
+
+    name, found = next(iter(stiffness.items()))
+    alike = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
+    rows = []
+    for i, j in zip(*np.nonzero(np.triu(np.abs(found["beam"]) > 0)), strict=True):
+        beam, fea = found["beam"][i, j], found["fea"][i, j]
+        rows.append([f"{SCREW[i]}, {SCREW[j]}", f"{beam:.6g}", f"{fea:.6g}",
+                     f"{100 * (fea / beam - 1):+.2f} %"])  # fmt: skip
+    count = found["mesh"].get("tetrahedra", "?")
+    return (
+        f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
+        f"{html.escape(name)}{alike}, {count} quadratic tetrahedra, estimated error "
+        f"{100 * found['relative_error_estimate']:.2g} %. A solid held at a "
+        "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
+        "shear (Euler-Bernoulli) is stiffer still: a few per cent between the two "
+        "columns are physics, not an error.</p>"
+        + _table(
+            ["entry [N m/rad .. N/m]", "beam", "finite elements", "difference"], rows
+        )
+        + _figure(stiffness_figure(found["beam"], found["fea"]), "K_E entry by entry.")
+    )
+
+
+def _maps(results: StudyResults) -> str:
+    """Maps over the grid."""
+    from assembly.plot import map_figure
+
+    summary = map_summary(results.maps)
+    rows = [
+        [key, *(f"{v:.4g}" for v in summary[key])]
+        for key in ("margin", "margin_free", "energy")
+        if key in summary
+    ]
+    said = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
+    share = 100 * summary["share_assemblable_free"]
+    axes = [d for d in results.maps.dims if d != "screw" and results.maps.sizes[d] > 1]
+    picture = ""
+    if len(axes) == 2:
+        picture = _figure(map_figure(results.maps), "Maps over the grid.")
+    return (
+        f"<h2>Over the workspace</h2><p>{html.escape(said)}. Assembles rigidly with "
+        f"compliant joints free at {share:.1f} % of the points.</p>"
+        + _table(["", "least", "median", "largest"], rows)
+        + picture
+    )
+
+
+def _picture(results: StudyResults) -> str:
+    """The robot, deformed."""
+    from assembly.plot import robot_plotter
+
+    assert results.answer is not None
+    plotter = robot_plotter(results.answer)
+    pixels = plotter.screenshot(return_img=True)
+    plotter.close()
+    caption = "Nominal (grey) and forced robot; the exaggeration is on the picture."
+    return "<h2>The forced robot</h2>" + _image(_png(pixels), caption)
+
+
+def _crosscheck(results: StudyResults) -> str:
+    """VJM against the multibody simulation."""
+    from validation.plot import slope_figure
+
+    check = results.crosscheck
+    assert check is not None
+    return (
+        "<h2>Against a multibody simulation</h2><p>The same forced assembly, without "
+        "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
+        "A linearised model must differ from it by the square of the errors' size: "
+        f"slope 2. Measured: {check.slope:.3f}.</p>"
+        + _table(check.header(), check.rows())
+        + _figure(slope_figure(check), "Difference of the platform's pose.")
+    )
+
+
+def _left_out() -> str:
+    """What the model does not contain."""
+    return (
+        "<h2>What this leaves out</h2><p>Small screws: the closures are linear in "
+        "them, and the cross-check above shows what that costs at these errors. Links act at "
+        "their ends; no contact stiffness, friction, temperature or dynamics. The "
+        "cross-check leaves the clearances out on both sides.</p>"
+    )
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    """An HTML table."""
+    top = "".join(f"<th>{html.escape(h)}</th>" for h in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in row) + "</tr>"
+        for row in rows
+    )
+    return f"<table><tr>{top}</tr>{body}</table>"
+
+
+def _number(value: float | None, digits: int = 6) -> str:
+    """A number, or that there is none."""
+    return "none" if value is None else f"{value:.{digits}g}"
+
+
+def _figure(figure: Any, caption: str) -> str:
+    """A matplotlib figure as an image of the page."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return _image(buffer.getvalue(), caption)
+
+
+def _png(pixels: NDArray) -> bytes:
+    """PNG of an RGB picture."""
+    from matplotlib.image import imsave
+
+    buffer = io.BytesIO()
+    imsave(buffer, pixels, format="png")
+    return buffer.getvalue()
+
+
+def _image(png: bytes, caption: str) -> str:
+    """A picture inside the page."""
+    data = base64.b64encode(png).decode()
+    return (
+        f"<figure><img alt='{html.escape(caption)}' src='data:image/png;base64,{data}'>"
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+    )
