@@ -285,8 +285,8 @@ def _left_out() -> str:
     """What the model does not contain."""
     return (
         "<h2>What this leaves out</h2><p>Small screws: the closures are linear in "
-        "them, and the cross-check above shows what that costs at these errors. Links act at "
-        "their ends; no contact stiffness, friction, temperature or dynamics. The "
+        "them, and the cross-check above shows what that costs at these errors. Links "
+        "act at their ends; no contact stiffness, friction, temperature or dynamics. The "
         "cross-check leaves the clearances out on both sides.</p>"
     )
 

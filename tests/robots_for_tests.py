@@ -1,0 +1,72 @@
+"""Robots the tests share: the paper's with the reference draws, and tiny ones."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.robots.irsbot2 import NAMES, irsbot2
+
+NUMBERS = json.loads((Path(__file__).parent / "irsbot2_numbers.json").read_text())
+
+
+def paper_frame(key):
+    """Frame name of the reference's ``leg1_frame8``: the paper's index counts from 1."""
+    leg, index = key.split("_frame")
+    return f"{leg}.{NAMES[int(index) - 1]}"
+
+
+def irsbot2_with(case, scale=1.0):
+    """The paper's robot with the errors of one reference draw."""
+    robot = irsbot2()
+    errors = np.zeros((len(robot.frames), 6))
+    for key, value in case["dl"].items():
+        errors[robot.index(paper_frame(key))] = value
+    return robot.with_errors(scale * errors)
+
+
+def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):
+    """Two links on the x axis that meet end to end, ``gap`` [6] apart.
+
+    Link 1 starts at the base, link 2 at a mount 2 lengths away and runs back.  Both
+    are springs of 6 equal diagonal terms, read where they meet.
+    """
+    K = [np.diag([k] * 6) for k in stiffnesses]
+    frames = (
+        Frame("one", translation=[length, 0, 0], link=MatrixLink(K[0])),
+        Frame("mount", translation=[2 * length, 0, 0]),
+        Frame("two", "mount", [-length, 0, 0], link=MatrixLink(K[1]),
+              geometric_error=gap),
+        Frame("joint", "one", clearance=clearance),
+        Frame("end_one", "joint"),
+        Frame("end_two", "two"),
+    )  # fmt: skip
+    return Robot("beams", "end_one", frames, (("end_one", "end_two"),))
+
+
+def planar_four_bar(crank=0.1, coupler=0.3, rocker=0.25, ground=0.3, errors=None):
+    """Grashof four-bar in the x-y plane, crank along x at home, elastic coupler."""
+    # the coupler's far end, above the ground link, by the law of cosines
+    reach = ground - crank
+    x = (coupler**2 - rocker**2 + reach**2) / (2 * reach)
+    y = np.sqrt(coupler**2 - x**2)
+    angle = np.arctan2(y, x)
+    back = np.arctan2(y, crank + x - ground)
+    frames = (
+        Frame("crank", joint="revolute", actuated=True),
+        Frame("pin_a", "crank", [crank, 0, 0], [0, 0, angle], joint="revolute"),
+        Frame("pin_b", "pin_a", [coupler, 0, 0], joint="revolute",
+              link=BeamLink({"radius": 0.01}, 70e9, 0.33)),
+        Frame("end_a", "pin_b"),
+        Frame("rocker", translation=[ground, 0, 0], rotation=[0, 0, back],
+              joint="revolute"),
+        Frame("end_b", "rocker", [rocker, 0, 0], [0, 0, angle - back]),
+    )  # fmt: skip
+    robot = Robot("four_bar", "end_a", frames, (("end_a", "end_b"),))
+    return robot if errors is None else robot.with_errors(errors)
+
+
+def small_clearance(radial=20e-6, axial=30e-6, tilt=5e-4, spin=None):
+    """A joint's play at a usual size."""
+    return Clearance(radial=radial, axial=axial, tilt=tilt, spin=spin)
