@@ -9,6 +9,7 @@ Two departures from the print: screws are in mrad and mm (the solver's tolerance
 something then), and a rigid direction is a screw fixed at zero.
 """
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from assembly.clearance import CONES, clearance_bounds, scales_with_margin
 from assembly.links import joint_compliances, link_compliances
 from assembly.posture import Posture
 
+OPTIMAL = {"optimal", "optimal_inaccurate"}
 _UNIT = 1e-3  # screws are in mrad and mm here
 
 
@@ -58,8 +60,8 @@ def reference_energy(
                 root = np.linalg.cholesky(K).T * _UNIT
                 energies.append(cp.sum_squares(root @ screws[j, soft]) / 2)
     work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
-    energy = sum(energies)
-    _solve(cp.Problem(cp.Minimize(energy - work), constraints))
+    energy = sum(energies, start=cp.Constant(0.0))
+    _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
 
@@ -84,7 +86,7 @@ def reference_margin(posture: Posture, compliant: str = "rigid") -> float | None
     errors = posture.robot.errors / _UNIT
     constraints += _assembly_constraints(posture, x_p, errors + c)
     problem = cp.Problem(cp.Minimize(t), constraints)
-    _solve(problem)
+    _solve(problem, OPTIMAL | {"infeasible"})
     return None if problem.status == "infeasible" else float(t.value)
 
 
@@ -116,11 +118,16 @@ def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
     return [x_p == end(robot.platform), *meets]
 
 
-def _solve(problem: Any) -> None:
-    """Solve with tight tolerances; complain if there is no answer."""
+def _solve(problem: Any, allowed: set[str]) -> None:
+    """Solve with tight tolerances; complain if the answer is not of a kind allowed."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
-    problem.solve(solver=cp.CLARABEL, **tight)
-    if problem.status not in {"optimal", "optimal_inaccurate", "infeasible"}:
+    try:
+        with warnings.catch_warnings():  # of inaccuracy: the status tells, too
+            warnings.simplefilter("ignore")
+            problem.solve(solver=cp.CLARABEL, **tight)
+    except cp.error.SolverError as error:
+        raise RuntimeError(f"cvxpy: {error}") from None
+    if problem.status not in allowed:
         raise RuntimeError(f"cvxpy: the problem is {problem.status}")

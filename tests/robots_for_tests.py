@@ -7,12 +7,13 @@ import numpy as np
 
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
+from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NUMBERS = json.loads((Path(__file__).parent / "irsbot2_numbers.json").read_text())
 
 
 def paper_frame(key):
-    """Frame name of the reference's ``leg1_frame8``: the paper's index counts from 1."""
+    """Frame name of the reference's ``leg1_frame8``; its index counts from 1."""
     leg, index = key.split("_frame")
     return f"{leg}.{NAMES[int(index) - 1]}"
 
@@ -70,3 +71,58 @@ def planar_four_bar(crank=0.1, coupler=0.3, rocker=0.25, ground=0.3, errors=None
 def small_clearance(radial=20e-6, axial=30e-6, tilt=5e-4, spin=None):
     """A joint's play at a usual size."""
     return Clearance(radial=radial, axial=axial, tilt=tilt, spin=spin)
+
+
+def random_robot(rng, legs=2, joints=3, link_share=0.7, branched=False):
+    """Legs of random bodies and joints from the base to one platform.
+
+    Joints are fixed, revolute or prismatic, passive, driven or compliant, some with
+    play; some bodies are elastic.  The nominal closures hold by construction.
+    """
+    platform = _random_transform(rng)
+    frames, tips = [], []
+    for leg in range(legs):
+        above, T = "base", np.eye(4)
+        for k in range(joints):
+            name = f"leg{leg}.f{k}"
+            step = _random_transform(rng)
+            frames.append(_random_frame(rng, name, above, step, link_share))
+            above, T = name, T @ step
+        last = np.linalg.inv(T) @ platform
+        frames.append(Frame(f"leg{leg}.tip", above, last[:3, 3],
+                            rotation_vector(last[:3, :3]),
+                            geometric_error=_error(rng)))  # fmt: skip
+        tips.append(f"leg{leg}.tip")
+    pairs = tuple((tips[0], tip) for tip in tips[1:])
+    return Robot("random", tips[0], tuple(frames), pairs)
+
+
+def _random_transform(rng):
+    return transform(rng.uniform(-0.5, 0.5, 3), rotation_matrix(rng.uniform(-2, 2, 3)))
+
+
+def _error(rng):
+    return rng.uniform(-1, 1, 6) * rng.choice([1e-4, 1e-3, 1e-2])
+
+
+def _random_frame(rng, name, parent, step, link_share):
+    part = {}
+    if rng.random() < link_share:
+        B = rng.normal(size=(6, 6))
+        unit = B @ B.T + 0.5 * np.eye(6)
+        size = np.array([1e3] * 3 + [3e4] * 3) * 10 ** rng.uniform(-1, 2)
+        part["link"] = MatrixLink(unit * np.outer(size, size) / size.mean())
+    kind = rng.choice(["fixed", "passive", "driven", "compliant"])
+    if kind != "fixed":
+        part["joint"] = str(rng.choice(["revolute", "prismatic"]))
+        part["actuated"] = kind == "driven"
+    if kind == "compliant" or (kind == "driven" and rng.random() < 0.5):
+        soft = 10.0 ** rng.uniform(0, 8, 6)
+        soft[rng.random(6) < 0.3] = np.inf
+        own = 5 if part["joint"] == "prismatic" else 2
+        soft[own] = 10 ** rng.uniform(0, 3)
+        part["joint_stiffness"] = np.diag(soft)
+    if rng.random() < 0.6:
+        part["clearance"] = Clearance(*rng.choice([0.0, 1e-5, 1e-4, 1e-3], 3))
+    return Frame(name, parent, step[:3, 3], rotation_vector(step[:3, :3]),
+                 geometric_error=_error(rng), **part)  # fmt: skip

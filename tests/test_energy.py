@@ -1,0 +1,224 @@
+"""Laws and closed forms of problem (22), and a second road for random robots."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assembly.energy import CannotAssemble, solve_assembly
+from assembly.posture import home_posture, place_robot
+from assembly.reduction import FreeMotion
+from assembly.reference import reference_energy
+from assembly.robot import Clearance, Frame, MatrixLink, Robot
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    planar_four_bar,
+    random_robot,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_two_springs_in_series_take_the_gap(axis):
+    """Energy g^2/2 k1 k2/(k1 + k2) for a gap along one axis, by hand."""
+    gap = np.zeros(6)
+    gap[axis] = 2e-4
+    k1, k2 = 1e6, 3e6
+    answer = solve_assembly(home_posture(coaxial_beams(gap, (k1, k2))))
+    series = k1 * k2 / (k1 + k2)
+    assert answer.energy == pytest.approx(series * 2e-4**2 / 2, rel=1e-12)
+    one, two = (answer.posture.robot.index(n) for n in ("one", "two"))
+    # link 1 is pulled towards the gap by k2/(k1 + k2) of it, and pulls with k1
+    assert answer.link_screws[one, axis] == pytest.approx(1.5e-4, rel=1e-12)
+    assert answer.wrenches[one, axis] == pytest.approx(series * 2e-4, rel=1e-12)
+    assert answer.wrenches[two, axis] == pytest.approx(-series * 2e-4, rel=1e-12)
+    wrench = answer.closure_wrenches[0]
+    assert wrench[axis] == pytest.approx(series * 2e-4, rel=1e-12)
+    assert answer.platform_screw[axis] == pytest.approx(1.5e-4, rel=1e-12)
+
+
+@pytest.mark.parametrize(("gap", "left"), [(5e-5, 0.0), (1.5e-4, 5e-5)])
+def test_play_is_used_up_before_anything_bends(gap, left):
+    """Radial play of 1e-4 m: the springs only see what it leaves of the gap."""
+    play = Clearance(radial=1e-4)
+    direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
+    robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=play)
+    answer = solve_assembly(home_posture(robot))
+    assert answer.energy == pytest.approx(0.5e6 * left**2 / 2, rel=1e-9, abs=1e-15)
+    assert answer.clearance_excess() < 1e-12
+    if left:
+        found = answer.clearance_screws[robot.index("joint")]
+        assert np.allclose(found, 1e-4 * direction, atol=1e-12)
+
+
+def test_wrench_is_stiffness_times_deformation_everywhere():
+    """w = K_E e = K_B b: the multipliers against eq. (6)."""
+    posture = place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0.1})
+    answer = solve_assembly(posture, load=[1.0, 2.0, 3.0, 40.0, 50.0, 60.0])
+    from assembly.links import joint_compliances, link_compliances
+
+    robot = posture.robot
+    for compliances, screws in (
+        (link_compliances(robot), answer.link_screws),
+        (joint_compliances(robot), answer.joint_screws),
+    ):
+        for C, screw, wrench in zip(compliances, screws, answer.wrenches, strict=True):
+            size = np.sqrt(2 * answer.energy * np.diag(C))
+            assert np.all(np.abs(C @ wrench - screw) <= 1e-8 * size + 1e-18)
+
+
+@pytest.mark.parametrize("scale", [0.1, 3.0])
+def test_errors_and_clearances_times_s_give_energy_times_s_squared(scale):
+    case = NUMBERS["cases"][0]
+    robot = irsbot2_with(case)
+    scaled = replace(
+        robot.with_errors(robot.errors * scale),
+        frames=tuple(
+            replace(
+                f,
+                geometric_error=f.geometric_error * scale,
+                clearance=f.clearance
+                and Clearance(*(scale * v for v in vars(f.clearance).values())),
+            )
+            for f in robot.frames
+        ),
+    )
+    pose = {"tx": 0.1, "tz": -0.4}
+    one = solve_assembly(place_robot(robot, pose=pose))
+    other = solve_assembly(place_robot(scaled, pose=pose))
+    assert other.energy == pytest.approx(scale**2 * one.energy, rel=1e-8)
+    assert np.allclose(
+        other.platform_screw, scale * one.platform_screw, rtol=1e-5, atol=1e-9 * scale
+    )
+
+
+def test_swapping_the_chains_of_a_closure_changes_only_its_wrenchs_sign():
+    robot = irsbot2_with(NUMBERS["cases"][1])
+    swapped = replace(robot, closures=tuple((b, a) for a, b in robot.closures))
+    pose = {"tx": -0.2, "tz": -0.45}
+    one = solve_assembly(place_robot(robot, pose=pose))
+    other = solve_assembly(place_robot(swapped, pose=pose))
+    assert other.energy == pytest.approx(one.energy, rel=1e-10)
+    scale = np.abs(one.closure_wrenches[-1]).reshape(2, 3).max(axis=1).repeat(3)
+    left = (other.closure_wrenches[-1] + one.closure_wrenches[-1]) / scale
+    assert np.abs(left).max() < 1e-6
+
+
+def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
+    """Another reference point on the same body: a rigid body's small motion."""
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    arm = np.array([0.03, -0.2, 0.11])
+    tool = Frame("tool", "leg1.tip", arm)
+    moved = replace(robot, frames=(*robot.frames, tool), platform="tool")
+    one = solve_assembly(place_robot(robot, pose={"tx": 0.0}))
+    other = solve_assembly(place_robot(moved, pose={"tx": arm[0]}))
+    assert other.energy == pytest.approx(one.energy, rel=1e-10)
+    expected = one.platform_screw.copy()
+    expected[3:] += np.cross(expected[:3], arm)
+    assert np.allclose(other.platform_screw, expected, rtol=0, atol=1e-11)
+
+
+def test_serial_cantilever_under_load_is_the_compliance_times_the_load():
+    K = np.diag([2e3, 3e3, 4e3, 5e5, 6e5, 7e5])
+    robot = Robot("arm", "tip", (Frame("tip", link=MatrixLink(K)),))
+    load = np.array([1.0, -2.0, 3.0, -40.0, 50.0, 60.0])
+    answer = solve_assembly(home_posture(robot), load)
+    expected = np.linalg.solve(K, load)
+    assert np.allclose(answer.platform_screw, expected, rtol=1e-12)
+    assert answer.energy == pytest.approx(load @ expected / 2, rel=1e-12)
+    assert answer.potential == pytest.approx(-load @ expected / 2, rel=1e-12)
+    assert answer.duality_gap() <= 1e-12 * answer.energy
+
+
+def test_serial_arm_moves_by_its_errors_exactly_to_first_order():
+    """No closure, no load: eq. (8) with the errors alone, by finite motion."""
+    error = np.array([1, -2, 3, 4, 5, -6.0]) * 1e-6
+    frames = (
+        Frame("a", translation=[0.1, 0.2, 0.3], rotation=[0.3, 0.1, -0.2],
+              joint="revolute", actuated=True, position=0.4, geometric_error=error),
+        Frame("b", "a", [0.4, 0, 0], [0, 0.7, 0]),
+    )  # fmt: skip
+    robot = Robot("arm", "b", frames)
+    screw = solve_assembly(home_posture(robot)).platform_screw
+    # the same error as a finite motion of frame a's far side, before its joint turns
+    from scipy.spatial.transform import RigidTransform
+
+    small = RigidTransform.from_exp_coords(error).as_matrix()
+    T = home_posture(robot).transforms
+    moved = T[0] @ small @ np.linalg.inv(T[0]) @ T[1]
+    assert np.allclose(screw[3:], moved[:3, 3] - T[1, :3, 3], rtol=0, atol=1e-11)
+
+
+def test_a_rigid_open_closure_cannot_be_assembled():
+    robot = planar_four_bar()
+    rigid = replace(robot, frames=tuple(replace(f, link=None) for f in robot.frames))
+    errors = np.zeros((6, 6))
+    errors[2] = [1e-3, 0, 0, 0, 0, 1e-4]  # out of the plane: no joint takes it up
+    with pytest.raises(CannotAssemble, match="stays open by 0.00"):
+        solve_assembly(home_posture(rigid.with_errors(errors)))
+
+
+def test_a_load_along_a_free_motion_has_no_equilibrium():
+    frames = (Frame("slide", joint="prismatic"), Frame("tip", "slide"))
+    robot = Robot("slider", "tip", frames)
+    with pytest.raises(FreeMotion, match="the load drives a motion"):
+        solve_assembly(home_posture(robot), [0, 0, 0, 0, 0, 1.0])
+    across = solve_assembly(home_posture(robot), [0, 0, 0, 1.0, 0, 0])
+    assert across.energy == 0.0
+
+
+def test_play_bound_of_a_passive_joint_holds_where_it_matters():
+    """A passive slider bounded to +-1e-4 m: the spring takes the rest of the gap."""
+    frames = (
+        Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
+        Frame("slide", "link", joint="prismatic", clearance=Clearance(axial=1e-4)),
+        Frame("end", "slide"),
+        Frame("wall", translation=[0, 0, 0.5],
+              geometric_error=[0, 0, 0, 0, 0, 3e-4]),
+    )  # fmt: skip
+    robot = Robot("slider", "end", frames, (("end", "wall"),))
+    answer = solve_assembly(home_posture(robot))
+    assert answer.energy == pytest.approx(1e6 * (2e-4) ** 2 / 2, rel=1e-9)
+    assert answer.clearance_screws[1, 5] == pytest.approx(1e-4, rel=1e-9)
+    unbounded = replace(robot, frames=(frames[0], replace(frames[1], clearance=None),
+                                       *frames[2:]))  # fmt: skip
+    assert solve_assembly(home_posture(unbounded)).energy == pytest.approx(0, abs=1e-20)
+
+
+def test_frames_in_another_order_give_the_same_answer():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    turned = Robot(robot.name, robot.platform, robot.frames[::-1], robot.closures)
+    one = solve_assembly(home_posture(robot))
+    other = solve_assembly(home_posture(turned))
+    assert other.energy == pytest.approx(one.energy, rel=1e-10)
+    name = "leg2.link_b"
+    a, b = one.wrenches[robot.index(name)], other.wrenches[turned.index(name)]
+    assert np.allclose(a, b, rtol=1e-6, atol=1e-6 * np.abs(a).max())
+
+
+@settings(deadline=None, max_examples=25)
+@given(seed=seeds, legs=st.integers(1, 3), joints=st.integers(1, 3))
+def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
+    """Tolerance 1e-6 of the energy without play: what cvxpy's solver reaches."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs, joints)
+    load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10] if rng.random() < 0.5 else None
+    posture = home_posture(robot)
+    try:
+        answer = solve_assembly(posture, load)
+    except (CannotAssemble, FreeMotion):
+        with pytest.raises(RuntimeError, match="infeasible|unbounded|failed"):
+            reference_energy(posture, load)
+        return
+    scale = max(answer.energy, 1e-6 * answer.energy_without_play, 1e-9)
+    assert answer.duality_gap() < 1e-8 * scale + 1e-14 * abs(answer.potential)
+    assert answer.closure_residual() < 1e-11
+    assert answer.clearance_excess() < 1e-9
+    energy, screw = reference_energy(posture, load)
+    work = 0.0 if load is None else load @ screw
+    assert energy - work == pytest.approx(answer.potential, rel=1e-6, abs=1e-6 * scale)
