@@ -61,6 +61,12 @@ def scales_with_margin(robot: Robot) -> NDArray:
     return scaled
 
 
+def has_bounded_motion(robot: Robot) -> bool:
+    """Whether some passive joint's own motion has a bound."""
+    own = ~scales_with_margin(robot)
+    return bool(np.isfinite(clearance_bounds(robot)[own]).any())
+
+
 def clearance_excess(screws: NDArray, bounds: NDArray) -> float:
     """By how much the worst clearance screw leaves its cone, eqs (2)-(5).
 

@@ -21,7 +21,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.clearance import clearance_bounds, clearance_excess
+from assembly.clearance import (
+    clearance_bounds,
+    clearance_excess,
+    has_bounded_motion,
+)
 from assembly.closure import (
     Linearisation,
     VirtualJoints,
@@ -31,7 +35,7 @@ from assembly.closure import (
 )
 from assembly.conic import LeastEnergy, minimise_energy
 from assembly.posture import Posture
-from assembly.reduction import Reduction, reduce_problem
+from assembly.reduction import FreeMotion, Reduction, reduce_problem
 
 
 class CannotAssemble(Exception):
@@ -174,12 +178,17 @@ def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     """
     lin = linearise(posture)
     wrench = None if load is None else np.asarray(load, dtype=float)
-    answer = _solve(lin, virtual_joints(posture.robot), wrench)
-    if answer.clearance_excess() > 1e-9:
-        # the bound of a passive joint's own motion was left out, but it matters
-        joints = virtual_joints(posture.robot, bounded_motion=True)
-        answer = _solve(lin, joints, wrench)
-    return answer
+    robot = posture.robot
+    try:
+        answer = _solve(lin, virtual_joints(robot), wrench)
+    except FreeMotion:
+        if not has_bounded_motion(robot):
+            raise
+    else:
+        if answer.clearance_excess() <= 1e-9:
+            return answer
+    # the bound of a passive joint's own motion was left out, but it matters
+    return _solve(lin, virtual_joints(robot, bounded_motion=True), wrench)
 
 
 def _solve(lin: Linearisation, joints: VirtualJoints, load: NDArray | None) -> Assembly:
