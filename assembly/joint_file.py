@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.robot import Clearance
-from stiffness.reading import Table, describe, number_array
+from stiffness.reading import Table, describe, find_fault, number_array
 
 LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
 LARGEST = 1e40  # in SI: beyond any stiffness, section or density; its inverse below
@@ -54,7 +54,9 @@ def read_joint_stiffness(table: Table) -> NDArray | None:
     expected = "6 diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"
     K = number_array(value)
     if K is None or K.shape not in {(6,), (6, 6)} or np.isnan(K).any():
-        raise table.bad(key, f"found {describe(value)}, expected {expected}")
+        shape = (6, 6) if isinstance(value, list) and _has_rows(value) else (6,)
+        found = find_fault(value, shape, infinite=True)
+        raise table.bad(key, f"found {found}, expected {expected}")
     if K.ndim == 1:
         if K.min() <= 0:
             raise table.bad(key, f"found {K.min():g} in it, expected {expected}")
@@ -70,6 +72,11 @@ def read_joint_stiffness(table: Table) -> NDArray | None:
         )
     K[soft] = definite(table, key, K[soft])
     return K
+
+
+def _has_rows(value: list) -> bool:
+    """Whether a list holds lists."""
+    return any(isinstance(row, list) for row in value)
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:

@@ -1,29 +1,22 @@
 """The ``link`` table of a robot file, in and out: what makes a body elastic."""
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.joint_file import LARGEST, LARGEST_LENGTH, definite
 from assembly.robot import (
     BeamLink,
-    Frame,
     LibraryLink,
     Link,
     MatrixLink,
     MeshLink,
-    Robot,
 )
-from stiffness.beam import section_axes
-from stiffness.reading import BadInput, Table, describe, quoted
-from stiffness.screws import rotation_matrix
+from stiffness.reading import Table, describe, quoted
 
 _SMALLEST_LENGTH = 1e-12  # [m] below any machine
-_SAME_POINT = 1e-9  # [m] two origins nearer than this are one
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
@@ -145,9 +138,24 @@ def _interface(mesh: Table, key: str) -> Any:
     from stiffness.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
-    with np.errstate(all="ignore"):
-        parse_interface(value, f"{mesh.file}: {mesh.place}.{key}")
+    if isinstance(value, dict):
+        _check_interface_table(mesh.table(key))
+    parse_interface(value, f"{mesh.file}: {mesh.place}.{key}")
     return value
+
+
+def _check_interface_table(table: Table) -> None:
+    """``{ plane = { point, normal }, radius }`` or ``{ bore = { ... } }``."""
+    kind, direction = ("bore", "axis") if table.has("bore") else ("plane", "normal")
+    inner = table.table(kind)
+    inner.array("point", (3,), "m", largest=LARGEST_LENGTH)
+    inner.require(direction, "3 finite numbers [direction]")
+    _direction(inner, direction)
+    outer = inner if kind == "bore" else table
+    if kind == "bore" or table.has("radius"):
+        _size(outer, "radius", "m")
+    inner.finish()
+    table.finish()
 
 
 def _library_link(link: Table) -> LibraryLink:
@@ -197,69 +205,6 @@ def _path(table: Table, key: str, path: str) -> Path:
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected a file")
     return Path(table.file).parent / path
-
-
-def with_spans(robot: Robot, home: NDArray) -> Robot:
-    """The robot with every link's length known and sound.
-
-    A beam runs between the two origins at home.  Below a prismatic joint that is not
-    at zero there, the frame's translation is not that span: it is written out.
-
-    Args:
-        robot: as read.
-        home: (n,) [rad or m] joint coordinates in the home pose.
-
-    Returns:
-        The robot, some of its beams with ``length`` and ``axis``.
-
-    Raises:
-        BadInput: two origins coincide, or a direction lies along its beam.
-    """
-    links: dict[str, Link] = {}
-    for i, frame in enumerate(robot.frames):
-        parent = robot.parents[i]
-        slides = parent >= 0 and robot.frames[parent].joint == "prismatic"
-        shift = float(home[parent]) if slides else 0.0
-        shift = shift if abs(shift) > _SAME_POINT else 0.0
-        if isinstance(frame.link, BeamLink):
-            links[frame.name] = _with_span(frame, frame.link, shift)
-        elif isinstance(frame.link, MeshLink):
-            _span(frame, 0.0)
-            if shift:
-                raise BadInput(
-                    f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic "
-                    f"joint whose home position is {shift:g} m; expected 0 (write that "
-                    "length as a translation)"
-                )
-    return robot.with_links(links) if links else robot
-
-
-def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """A beam of known length, its ``up`` checked."""
-    if link.length is None or link.axis is None:
-        axis = _span(frame, shift)
-        length = float(np.linalg.norm(axis))
-        x, y, z = (axis / length).tolist()
-        answer = replace(link, length=length, axis=(x, y, z)) if shift else link
-    else:
-        axis, answer = np.array(link.axis), link
-    try:
-        section_axes(axis, link.up)
-    except BadInput as error:
-        place = f"frame {quoted(frame.name)}.link.beam.up"
-        raise BadInput(f"{place}: {error}; expected another direction") from None
-    return answer
-
-
-def _span(frame: Frame, shift: float) -> NDArray:
-    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
-    span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
-    if np.linalg.norm(span) < _SAME_POINT:
-        raise BadInput(
-            f"frame {quoted(frame.name)}.link: found no distance from the parent; "
-            'expected a translation, or a beam with "length" and "axis"'
-        )
-    return span
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def home_posture(robot: Robot) -> Posture:
     actuated = np.array([f.actuated for f in robot.frames])
     here = np.where(actuated, robot.positions, np.nan)
     track = follow(robot, robot.positions, Target(coordinates=here[None]), steps=1)
-    if track.mismatch[0] >= _HOME_TOLERANCE:
+    if not track.mismatch[0] < _HOME_TOLERANCE:
         k = int(np.argmax(track.closure_mismatch[0]))
         a, b = robot.closures[k]
         raise BadInput(

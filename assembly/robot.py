@@ -311,10 +311,11 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
     rows: dict[str, int] = {}
     for i, frame in enumerate(frames):
         if frame.name == BASE or frame.name in rows:
-            first = f"frame[{rows[frame.name] + 1}]" if frame.name in rows else "root"
+            row = rows.get(frame.name)
+            whose = "the root" if row is None else f"frame[{row + 1}]"
             raise BadInput(
-                f"frame[{i + 1}].name: found {quoted(frame.name)}, the name of the "
-                f"{first}; expected another"
+                f"frame[{i + 1}].name: found {quoted(frame.name)}, already the name of "
+                f"{whose}; expected another"
             )
         rows[frame.name] = i
     for frame in frames:

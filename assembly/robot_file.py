@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.joint_file import LARGEST_LENGTH, read_clearance, read_joint_stiffness
-from assembly.link_file import link_table, read_link, with_spans
+from assembly.link_file import link_table, read_link
+from assembly.link_span import with_spans
 from assembly.posture import home_posture
 from assembly.robot import (
     BASE,

@@ -39,7 +39,7 @@ def quoted(name: str) -> str:
 
 def nearest(name: str, valid: Iterable[str]) -> str:
     """``'; did you mean "x"?'``, or the list of valid names if none is near."""
-    names = [str(v) for v in valid]
+    names = list(dict.fromkeys(str(v) for v in valid))
     close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if close:
         return f"; did you mean {quoted(close[0])}?"

@@ -22,6 +22,7 @@ __all__ = [
     "BadInput",
     "Table",
     "describe",
+    "find_fault",
     "nearest",
     "number_array",
     "quoted",
@@ -255,7 +256,8 @@ class Table:
             f">= {least:g}" if least > -math.inf else "",
             f"< {below:g}" if below < math.inf else "",
         ]
-        expected = " ".join(["a finite number", *filter(None, limits), f"[{unit}]"])
+        range_ = " and ".join(filter(None, limits))
+        expected = " ".join(filter(None, ["a finite number", range_, f"[{unit}]"]))
         if default is not None and not self.has(key):
             return default
         value = _number(self.require(key, expected))
@@ -299,7 +301,8 @@ class Table:
         value = self.require(key, expected)
         array = number_array(value)
         if array is None or array.shape != shape or not np.isfinite(array).all():
-            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+            found = find_fault(value, shape)
+            raise self.bad(key, f"found {found}, expected {expected}")
         if np.abs(array).max(initial=0.0) > largest:
             expected = f"numbers of size at most {largest:g} [{unit}]"
             raise self.bad(key, f"found {describe(value)}, expected {expected}")
@@ -359,6 +362,31 @@ def _number(value: object) -> float:
         return math.nan
 
 
+def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
+    """What is wrong with numbers of a given shape, and where, counted from 1.
+
+    Args:
+        value: nested lists that are not that, or something else.
+        shape: expected.
+        infinite: whether inf is a number here.
+
+    Returns:
+        The wrong entry or row with its place, or the whole, shortened.
+    """
+    if not isinstance(value, list):
+        return describe(value)
+    if len(value) != shape[0]:
+        return f"{describe(value)} of length {len(value)}"
+    for i, inner in enumerate(value, 1):
+        if len(shape) > 1:
+            fault = find_fault(inner, shape[1:], infinite)
+            if fault:
+                return f"{fault} in row {i}"
+        elif not (math.isfinite(x := _number(inner)) or (infinite and math.isinf(x))):
+            return f"{describe(inner)} as number {i}"
+    return ""
+
+
 def number_array(value: object) -> NDArray | None:
     """Nested lists of numbers as an array; None when ragged or not numbers."""
     if not isinstance(value, list):
@@ -372,7 +400,4 @@ def number_array(value: object) -> NDArray | None:
 
 def _proper(values: list) -> bool:
     """Whether all are numbers that a float can hold; nan and inf are, true is not."""
-    given = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-    return given and not any(
-        isinstance(v, int) and v.bit_length() > 1023 for v in values
-    )
+    return all(isinstance(v, float) or not math.isnan(_number(v)) for v in values)
