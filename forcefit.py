@@ -10,6 +10,7 @@ import assembly.cli
 import stiffness.cli
 import validation.cli
 from stiffness.reading import BadInput
+from stiffness.writing import write_json
 
 app = typer.Typer(
     help="Forced assembly of parallel manipulators: stiffness, energy, pose error, "
@@ -29,18 +30,28 @@ def study(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder to write.")
     ] = None,
-    json: Annotated[
-        str | None, typer.Option("--json", help="Results as JSON; - is stdout.")
-    ] = None,
+    json: assembly.cli.JsonOption = None,
 ) -> None:
     """Run the main job: one robot, every check the file names, to one report.
 
     Writes report.html (self-contained), results.json and results.nc into the folder
-    the study file names.
+    the study file names.  Exit status 1 if a check fails.
     """
-    from validation.study import run_study
+    from validation.report import results_table, verdict, write_study
+    from validation.study import read_study, run_study
 
-    validation.cli.finish_study(run_study(file, output), json)
+    asked = read_study(file, output)
+    with assembly.cli.progress_bars() as update:
+        results = run_study(asked, update)
+        update("report", 0, 1)
+        folder = write_study(results)
+        update("report", 1, 1)
+    write_json(results_table(results), json)
+    if json != "-":
+        print(verdict(results))
+        print(f"report: {folder / 'report.html'}")
+    if not results.passed:
+        raise typer.Exit(1)
 
 
 def main() -> None:

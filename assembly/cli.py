@@ -71,16 +71,31 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
 
 
 @contextmanager
-def progress_bar(what: str) -> Generator[Any, None, None]:
-    """A progress bar on stderr; yields ``update(done, total)``."""
+def progress_bars() -> Generator[Any, None, None]:
+    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each."""
     from rich.console import Console
-    from rich.progress import Progress, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (*Progress.get_default_columns()[:-1], TimeElapsedColumn())
-    columns = (*columns, TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TimeElapsedColumn(), TimeRemainingColumn(),
+    )  # fmt: skip
+    tasks: dict[str, Any] = {}
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+
+        def update(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bars.add_task(what, total=total)
+            bars.update(tasks[what], completed=done, total=total)
+
+        yield update
 
 
 @app.command()
@@ -119,8 +134,8 @@ def sweep(
     from assembly.sweep import parse_grid, save_dataset, sweep_poses
 
     machine, axes = load_robot(robot), parse_grid(grid)
-    with progress_bar("postures") as update:
-        data = sweep_poses(machine, axes, update)
+    with progress_bars() as update:
+        data = sweep_poses(machine, axes, lambda d, n: update("postures", d, n))
     save_dataset(data, output)
     if figure is not None:
         map_figure(data).savefig(figure, dpi=150)

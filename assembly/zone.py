@@ -18,7 +18,7 @@ from assembly.clearance import clearance_bounds, clearance_excess, scales_with_m
 from assembly.closure import Linearisation, VirtualJoints, linearise, virtual_joints
 from assembly.conic import cone_sizes, least_factor
 from assembly.posture import Posture
-from assembly.reduction import reduce_problem
+from assembly.reduction import Reduction, reduce_problem
 
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
@@ -71,20 +71,28 @@ def zone_margin(posture: Posture, compliant: str = "rigid") -> Zone:
 def _margin(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, NDArray]:
     """Margin with one set of columns, and the clearance screws that attain it."""
     small = reduce_problem(lin, joints)
-    nowhere = np.zeros((len(joints.robot.frames), 6))
+    zone, u = _least(small)
+    if zone.margin is None:
+        return zone, np.zeros((len(joints.robot.frames), 6))
+    motions = small.motions(u, np.zeros(joints.elastic.shape[1]))
+    screws = joints.cones @ u + joints.free @ motions
+    return zone, screws.reshape(-1, 6)
+
+
+def _least(small: Reduction) -> tuple[Zone, NDArray]:
+    """Margin of a reduced problem, and the clearances that attain it."""
+    joints = small.joints
+    u = np.zeros(joints.cones.shape[1])
     if small.inconsistent:
-        return Zone(None, None), nowhere
+        return Zone(None, None), u
     if not np.any(small.k):
-        return Zone(0.0, 0.0), nowhere
+        return Zone(0.0, 0.0), u
     # orthonormal rows, whatever the units of the closures
     U, S, B = svd(small.H, full_matrices=False)
     right = U.T @ small.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
-    if t is None:
-        return Zone(None, None), nowhere
-    motions = small.motions(u, np.zeros(joints.elastic.shape[1]))
-    screws = joints.cones @ u + joints.free @ motions
-    return Zone(t, _margin_bound(B, right, joints, y)), screws.reshape(-1, 6)
+    bound = None if t is None else _margin_bound(B, right, joints, y)
+    return Zone(t, bound), u
 
 
 def _margin_bound(

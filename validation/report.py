@@ -124,29 +124,39 @@ def report_page(results: StudyResults) -> str:
 
 def _verdict(results: StudyResults) -> str:
     """The honest sentence at the top."""
+    kind = "good" if results.passed else "bad"
+    return f"<p class='verdict {kind}'>{html.escape(verdict(results))}</p>"
+
+
+def verdict(results: StudyResults) -> str:
+    """What the study found, in three sentences.
+
+    Args:
+        results: of :func:`validation.study.run_study`.
+
+    Returns:
+        Plain text.
+    """
     solution = results.solution
     if solution["status"] != "ok":
-        said = f"No answer at this pose: {solution['status']}, {solution['reason']}."
-        return f"<p class='verdict bad'>{html.escape(said)}</p>"
+        return f"No answer at this pose: {solution['status']}, {solution['reason']}."
     zone = solution["zone"]
     if zone["assemblable"] or zone["assemblable_free"]:
         goes = "It goes together by its clearances alone"
         goes += "" if zone["assemblable"] else " if its compliant joints turn freely"
     else:
-        goes = (
-            f"It goes together only by force: {solution['energy']:.4g} J, since all "
-            f"clearances would have to be {_number(zone['margin_free'])} times as large"
-        )
+        goes = f"It goes together only by force: {solution['energy']:.4g} J"
+        if zone["margin_free"] is not None:
+            goes += f", its play being {zone['margin_free']:.3g} times too small"
     screw = solution["platform_screw"]
-    goes += (
-        f". The platform ends up {1e3 * np.linalg.norm(screw[3:]):.3g} mm and "
+    ends = (
+        f"The platform ends up {1e3 * np.linalg.norm(screw[3:]):.3g} mm and "
         f"{1e3 * np.linalg.norm(screw[:3]):.3g} mrad from its nominal pose."
     )
     checks = [c for c in (results.reference, results.crosscheck) if c is not None]
-    said = f" {len(checks)} independent check{'s' if len(checks) != 1 else ''} of these"
-    said += " numbers " + ("passed." if results.passed else "did not all pass.")
-    kind = "good" if results.passed else "bad"
-    return f"<p class='verdict {kind}'>{html.escape(goes + said)}</p>"
+    how = "passed" if results.passed else "did not all pass"
+    said = f"Independent checks of these numbers: {len(checks)}; they {how}."
+    return f"{goes}. {ends} {said if checks else ''}".strip()
 
 
 def _solution(results: StudyResults) -> str:
@@ -286,8 +296,8 @@ def _left_out() -> str:
     return (
         "<h2>What this leaves out</h2><p>Small screws: the closures are linear in "
         "them, and the cross-check above shows what that costs at these errors. Links "
-        "act at their ends; no contact stiffness, friction, temperature or dynamics. The "
-        "cross-check leaves the clearances out on both sides.</p>"
+        "act at their ends; no contact stiffness, friction, temperature or dynamics. "
+        "The cross-check leaves the clearances out on both sides.</p>"
     )
 
 
