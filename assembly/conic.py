@@ -183,13 +183,14 @@ def least_factor(
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
     equal = hstack([csc_matrix(B / rows[:, None]), csc_matrix((m, 1))])
     cones = hstack([limits, csc_matrix(factors[:, None])])
-    A = vstack([equal, cones], format="csc")
-    b = np.concatenate([right / rows / size, radii])
+    positive = csc_matrix(([-1.0], ([0], [nu])), shape=(1, nu + 1))  # t >= 0
+    A = vstack([equal, positive, cones], format="csc")
+    b = np.concatenate([right / rows / size, [0.0], radii])
     q = np.zeros(nu + 1)
     q[-1] = 1.0
     P = csc_matrix((nu + 1, nu + 1))
     for regularisation in _REGULARISATIONS:
-        x, z, status = _clarabel(P, q, A, b, m, group, regularisation)
+        x, z, status = _clarabel(P, q, A, b, m, group, regularisation, positive=1)
         if status in {"Solved", "PrimalInfeasible"}:
             break
     if status == "PrimalInfeasible":
@@ -219,7 +220,7 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
 
 def _clarabel(
     P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, equal: int, group: NDArray,
-    regularisation: float,
+    regularisation: float, positive: int = 0,
 ) -> tuple[NDArray | None, NDArray | None, str]:  # fmt: skip
     """Minimise x.P.x/2 + q.x, A x + s = b: primal, dual (None if unusable), status."""
     import clarabel
@@ -231,6 +232,7 @@ def _clarabel(
     settings.static_regularization_enable = regularisation > 0
     settings.static_regularization_constant = regularisation
     cones = [clarabel.ZeroConeT(equal)] if equal else []
+    cones += [clarabel.NonnegativeConeT(positive)] if positive else []
     cones += [clarabel.SecondOrderConeT(int(n) + 1) for n in np.bincount(group)]
     answer = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
     status = str(answer.status)

@@ -48,7 +48,7 @@ def test_no_factor_helps_where_there_is_no_play():
 
 
 def test_passive_joints_take_up_what_they_can_for_nothing():
-    """Errors in the plane of a four-bar: its pins take them up; across, nothing does."""
+    """A four-bar's pins take up errors in its plane; across, nothing does."""
     errors = np.zeros((6, 6))
     errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]
     robot = planar_four_bar(errors=errors)
