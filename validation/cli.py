@@ -1,0 +1,89 @@
+"""The commands ``forcefit validation ...``: parse, call one function, print or save."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from assembly.cli import (
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    parse_load,
+    posture_of,
+)
+from stiffness.reading import BadInput
+from stiffness.writing import write_json
+
+app = typer.Typer(no_args_is_help=True)
+
+
+@app.callback()
+def validation() -> None:
+    """Is it true?"""
+
+
+def parse_scales(text: str) -> list[float]:
+    """Factors on the errors, from ``--scale``.
+
+    Args:
+        text: such as ``"1,0.5,0.25"``.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        BadInput: something in it is not a number > 0, or there is only one.
+    """
+    try:
+        scales = [float(part) for part in text.split(",")]
+    except ValueError:
+        scales = []
+    if len(set(scales)) < 2 or not all(0 < s < float("inf") for s in scales):
+        raise BadInput(
+            f'--scale: found "{text[:60]}", expected at least two different numbers '
+            "> 0, such as 1,0.5,0.25"
+        )
+    return scales
+
+
+@app.command()
+def crosscheck(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    scale: Annotated[
+        str, typer.Option(help="Factors on errors and load, largest first.")
+    ] = "1,0.5,0.25,0.125",
+    links: Annotated[
+        str, typer.Option(help="How the simulation models links: beam | spring.")
+    ] = "beam",
+    json: JsonOption = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
+    ] = None,
+) -> None:
+    """Compare with a multibody simulation at several scales of the errors.
+
+    Joint clearances are left out on both sides.  Exit status 1 when a check fails.
+    """
+    from validation.crosscheck import (
+        crosscheck_text,
+        try_crosscheck,
+    )
+
+    scales = parse_scales(scale)
+    posture = posture_of(robot, pose, joint)
+    answer, failure = try_crosscheck(posture, scales, parse_load(load), links)
+    write_json(failure if answer is None else answer.table(), json)
+    if json != "-":
+        print(failure["reason"] if answer is None else crosscheck_text(answer))
+    if answer is not None and figure is not None:
+        from validation.plot import slope_figure
+
+        slope_figure(answer).savefig(figure, dpi=150)
+    if answer is None or not answer.passed:
+        raise typer.Exit(1)
