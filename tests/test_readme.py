@@ -1,0 +1,43 @@
+"""The README's example and equation map are true."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_python_example_runs_and_is_short():
+    (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.S)
+    assert len(code.strip().splitlines()) <= 20
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
+                          check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("goes together rigidly: ")
+    assert len(done.stdout.splitlines()) == 4
+
+
+def test_every_module_of_the_equation_map_exists():
+    rows = [line for line in README.splitlines() if line.startswith("| (")]
+    names = {
+        n for row in rows for n in re.findall(r"`((?:stiffness|assembly)\.\S+)`", row)
+    }
+    assert len(names) >= 7
+    for name in names:
+        assert (ROOT / (name.replace(".", "/") + ".py")).is_file(), name
+
+
+def test_every_link_of_the_readme_leads_somewhere():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
+@pytest.mark.parametrize("command", ["make study", "make test"])
+def test_the_two_commands_are_targets(command):
+    assert command in README
+    target = command.split()[1]
+    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), flags=re.M)
