@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.robot import Clearance
-from stiffness.reading import Table, describe, find_fault, number_array
+from stiffness.reading import Table, find_fault, number_array
 
 LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
 LARGEST = 1e40  # in SI: beyond any stiffness, section or density; its inverse below
@@ -62,13 +62,15 @@ def read_joint_stiffness(table: Table) -> NDArray | None:
             raise table.bad(key, f"found {K.min():g} in it, expected {expected}")
         K = np.diag(K)
     rigid = np.isposinf(np.diag(K))
-    around = (rigid[:, None] | rigid) & ~np.eye(6, dtype=bool)
     soft = np.ix_(~rigid, ~rigid)
-    if np.any(K[around] != 0.0) or not np.isfinite(K[soft]).all():
+    wrong = (rigid[:, None] | rigid) & (K != 0.0) | ~np.isfinite(K)
+    wrong &= ~np.diag(rigid)
+    if wrong.any():
+        i, j = np.argwhere(wrong)[0]
         raise table.bad(
             key,
-            f"found {describe(value)}; expected inf only on the diagonal, the rest of "
-            "its row and column zero",
+            f"found {K[i, j]:g} at [{i + 1}, {j + 1}]; expected inf only on the "
+            "diagonal, the rest of its row and column zero",
         )
     K[soft] = definite(table, key, K[soft])
     return K

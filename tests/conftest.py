@@ -1,0 +1,25 @@
+"""What several test files need."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers that are the same in every run."""
+    return np.random.default_rng(20)
+
+
+@pytest.fixture
+def write_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
+    """A function that writes a robot file and returns its path."""
+
+    def write(content: str | bytes) -> Path:
+        path = tmp_path / "robot.toml"
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
