@@ -132,6 +132,30 @@ def test_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
     np.testing.assert_allclose(wrenches[0], own, rtol=1e-6)
 
 
+@pytest.mark.parametrize("links", ["beam", "spring"])
+@pytest.mark.parametrize("elements", [1, 3])
+def test_a_cantilever_sags_under_its_weight(links, elements):
+    """q L^4 / 8EI + q L^2 / 2GA, for elements and for a 6 by 6 spring.
+
+    Scaled down to 1e-4 m/s^2, where the sag is linear to 1e-9.
+    """
+    L, g, rho, offset = 0.5, 1e-4, 2700.0, 0.1
+    posture = cantilever(
+        replace(FLAT, density=rho), mass=2.0, centre_of_mass=[offset, 0, 0]
+    )
+    second = 0.05**3 * 0.02 / 12
+    area = 1e-3 * 10 * (1 + NU) / (12 + 11 * NU)
+    q, P = rho * 1e-3 * g, 2.0 * g
+    expected = q * L**4 / (8 * E * second) + q * L**2 / (2 * G * area)
+    expected += P * L**3 / (3 * E * second) + P * L / (G * area)
+    expected += P * offset * L**2 / (2 * E * second)
+    K = {"tip": tip_stiffness(posture.robot.frame("tip"))}
+    answer = simulate_assembly(
+        posture, links=links, stiffness=K, gravity=[0, -g, 0], elements=elements
+    )
+    assert answer.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
+
+
 def test_an_infinite_stiffness_locks_its_axis():
     """A drive that yields only about z, by M / k; the other axes do not move."""
     K = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])

@@ -27,13 +27,13 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
 from stiffness.beam import Section, rectangular_section, round_section
 from stiffness.reading import BadInput
+from validation.exudyn_model import Closure, Elastic, Model, Place
+from validation.exudyn_model import SimulationFailed as SimulationFailed
 from validation.motion import (
-    exponential,
     inverse,
     logarithm,
     matrix,
@@ -44,27 +44,7 @@ from validation.motion import (
 )
 
 LINKS = ("beam", "spring")
-_SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
-_CLOSING = np.diag([1e10] * 6)  # [N m/rad, N/m] of the connectors that shut closures
 _IDLE = 1e-6  # [N m/rad, N/m] holds passive joints that nothing else holds
-_SHUT = 1e-12  # [rad, m] largest component a closure may keep open
-_LOAD_STEPS = 4
-_CLOSING_STEPS = 30
-_NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
-
-
-class SimulationFailed(RuntimeError):
-    """No equilibrium was found.
-
-    Attributes:
-        robot: name of the robot.
-        status: what happened, in a few words.
-    """
-
-    def __init__(self, robot: str, status: str) -> None:
-        super().__init__(f"{robot}: the multibody simulation failed: {status}")
-        self.robot = robot
-        self.status = status
 
 
 class Placed(Protocol):
@@ -121,6 +101,7 @@ def simulate_assembly(
     links: str = "beam",
     stiffness: Mapping[str, ArrayLike] | None = None,
     load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
     elements: int = 4,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
@@ -134,6 +115,8 @@ def simulate_assembly(
             links that become springs and whose matrix the robot does not give.
         load: (6,) [N m, N] on the platform at its origin, base axes; its direction
             stays.
+        gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
+            weigh; other links, whose mass is not known, do not.
         elements: beam elements per link.
 
     Returns:
@@ -148,12 +131,14 @@ def simulate_assembly(
     started = time.perf_counter()
     given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
     springs = _link_springs(posture.robot, links, given)
-    model = _Model(posture.robot.name)
+    model = Model(*_import_exudyn(), posture.robot.name)
     try:
         tree = _build(model, posture, scale, springs, elements)
         if load is not None:
             wrench = np.asarray(load, dtype=float)
             model.add_load(tree.before[posture.robot.platform], wrench)
+        if gravity is not None:
+            _weigh(model, posture.robot, tree, np.asarray(gravity, dtype=float))
         model.solve(tree.closures)
         return _read(model, posture.robot, tree, started)
     finally:
@@ -195,70 +180,11 @@ def _link_springs(
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
-    """A point and axes fixed to a body of the model.
-
-    Attributes:
-        body: Exudyn's number of the body.
-        start: (4, 4) where the body is built, seen from the base.
-        local: (4, 4) the place seen from the body.
-    """
-
-    body: int
-    start: NDArray
-    local: NDArray
-
-    @property
-    def built(self) -> NDArray:
-        """(4, 4) where the place is built, seen from the base."""
-        return self.start @ self.local
-
-    def moved(self, T: NDArray) -> "_Place":
-        """Another place on the same body; ``T`` is how this one sees it."""
-        return replace(self, local=self.local @ T)
-
-
-@dataclass(frozen=True, eq=False)
-class _Elastic:
-    """An elastic part between two places that coincide when it is stress-free.
-
-    Attributes:
-        near: place on the inner body.
-        far: place on the outer body.
-        parts: Exudyn's numbers, of one connector or of the elements of a beam.
-        beam: which of the two.
-    """
-
-    near: _Place
-    far: _Place
-    parts: tuple[int, ...]
-    beam: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class _Closure:
-    """Two places that a connector pulls together.
-
-    Attributes:
-        first: place on the first chain.
-        second: place on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain; it is moved.
-        connector: Exudyn's number of the connector.
-        shut: (4, 4) the second place seen from the first when closed, nominally.
-    """
-
-    first: _Place
-    second: _Place
-    marker: int
-    connector: int
-    shut: NDArray
-
-
-@dataclass(frozen=True, eq=False)
 class _Tree:
     """What was built.
 
     Attributes:
+        bodies: places of the frames on their bodies, before any play or joint spring.
         before: places of the frames before their own motion.
         links: elastic bodies by frame.
         joints: joint springs by frame.
@@ -267,16 +193,17 @@ class _Tree:
         platform: (4, 4) nominal platform, seen from the base.
     """
 
-    before: dict[str, _Place]
-    links: dict[str, _Elastic]
-    joints: dict[str, _Elastic]
-    idle: list[_Elastic]
-    closures: list[_Closure]
+    bodies: dict[str, Place]
+    before: dict[str, Place]
+    links: dict[str, Elastic]
+    joints: dict[str, Elastic]
+    idle: list[Elastic]
+    closures: list[Closure]
     platform: NDArray
 
 
 def _build(
-    model: "_Model",
+    model: Model,
     posture: Placed,
     scale: float,
     springs: Mapping[str, NDArray],
@@ -284,11 +211,12 @@ def _build(
 ) -> _Tree:
     """The open, stress-free robot with its errors, and its closures."""
     robot = posture.robot
-    before: dict[str, _Place] = {}
+    bodies: dict[str, Place] = {}
+    before: dict[str, Place] = {}
     after = {BASE: model.ground}
-    links: dict[str, _Elastic] = {}
-    joints: dict[str, _Elastic] = {}
-    idle: list[_Elastic] = []
+    links: dict[str, Elastic] = {}
+    joints: dict[str, Elastic] = {}
+    idle: list[Elastic] = []
     for frame, q in zip(robot.frames, posture.coordinates, strict=True):
         error = scale * frame.geometric_error
         place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
@@ -299,6 +227,7 @@ def _build(
         elif isinstance(frame.link, BeamLink):
             links[frame.name] = _add_beam(model, place, frame, frame.link, elements)
             place = links[frame.name].far
+        bodies[frame.name] = place
         K = frame.joint_stiffness
         if K is not None and np.isfinite(np.diag(K)).any():
             joints[frame.name] = model.add_spring(place, K)
@@ -314,7 +243,7 @@ def _build(
     for a, b in robot.closures:
         shut = inverse(nominal[a]) @ nominal[b]  # what rounded files leave is no error
         closures.append(model.add_closure(before[a], before[b], shut))
-    return _Tree(before, links, joints, idle, closures, nominal[robot.platform])
+    return _Tree(bodies, before, links, joints, idle, closures, nominal[robot.platform])
 
 
 def _nominal(posture: Placed) -> dict[str, NDArray]:
@@ -336,19 +265,51 @@ def _own_motion(frame: Frame, q: float) -> NDArray:
 
 
 def _add_beam(
-    model: "_Model", place: _Place, frame: Frame, link: BeamLink, elements: int
-) -> _Elastic:
+    model: Model, place: Place, frame: Frame, link: BeamLink, elements: int
+) -> Elastic:
     """A straight beam, clamped to the place's body so that it ends at the place."""
-    if link.length is not None and link.axis is not None:
-        length, x = link.length, np.array(link.axis)
-    else:
-        x = turned(frame.rotation).T @ frame.translation
-        length = float(np.linalg.norm(x))
+    length, x = _span(frame, link)
     axes = matrix(_section_axes(x, link.up), np.zeros(3))
     base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
     K = _section_stiffness(link, length / elements)
-    parts, tip = model.add_beam(base, length, K, elements)
-    return _Elastic(place, tip.moved(inverse(axes)), parts, beam=True)
+    parts, nodes = model.add_beam(base, length, K, elements)
+    return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
+
+
+def _span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
+    """[m] length of a beam, and (3,) its direction in the frame's axes, any length."""
+    if link.length is not None and link.axis is not None:
+        return link.length, np.array(link.axis)
+    x = turned(frame.rotation).T @ frame.translation
+    return float(np.linalg.norm(x)), x
+
+
+def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
+    """Loads of everything that has a mass.
+
+    A beam's weight acts at its nodes, with the moments at its ends of a clamped beam
+    under uniform load: the tip of a cantilever is then exact for any number of nodes.
+    """
+    for frame in robot.frames:
+        if frame.mass:
+            centre = tree.bodies[frame.name].moved(shifted(frame.centre_of_mass))
+            model.add_load(centre, np.concatenate([np.zeros(3), frame.mass * gravity]))
+        link = frame.link
+        if not isinstance(link, BeamLink) or link.density is None:
+            continue
+        length, x = _span(frame, link)
+        line = x / np.linalg.norm(x) * length
+        part = tree.links[frame.name]
+        nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
+        step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
+        weight = link.density * _section(link).area * length * gravity
+        weight = weight / (len(nodes) - 1)
+        moment = np.cross(step, weight) / 12
+        for k, node in enumerate(nodes):
+            first, last = k == 0, k == len(nodes) - 1
+            force = weight * (0.5 if first or last else 1.0)
+            couple = moment * (float(first) - float(last))
+            model.add_load(node, np.concatenate([couple, force]))
 
 
 def _section_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
@@ -395,9 +356,7 @@ def _section(link: BeamLink) -> Section:
     return Section(**given)
 
 
-def _read(
-    model: "_Model", robot: Robot, tree: _Tree, started: float
-) -> MultibodyAssembly:
+def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyAssembly:
     """Everything asked of the equilibrium."""
     count = len(robot.frames)
     screws = {"links": np.zeros((count, 6)), "joints": np.zeros((count, 6))}
@@ -429,209 +388,6 @@ def _read(
         idle_energy=sum(model.energy(part) for part in tree.idle),
         seconds=time.perf_counter() - started,
     )
-
-
-class _Model:
-    """An Exudyn model: what it is built of, how it is solved, what can be read."""
-
-    def __init__(self, robot: str) -> None:
-        self.exu, self.item = _import_exudyn()
-        self.robot = robot
-        self.container = self.exu.SystemContainer()
-        self.mbs = self.container.AddSystem()
-        ground = self.mbs.AddObject(self.item.ObjectGround())
-        self.ground = _Place(int(ground), np.eye(4), np.eye(4))
-
-    def discard(self) -> None:
-        """Give the memory back; Exudyn keeps models and user functions otherwise."""
-        self.mbs.SetPreStepUserFunction(0)
-        self.mbs.Reset()
-        self.container.Reset()
-
-    def add_body(self, T: NDArray) -> _Place:
-        """A rigid body built at ``T``; statics never sees its mass."""
-        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
-        node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
-        body = self.item.ObjectRigidBody(
-            mass=1.0, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=self.mbs.AddNode(node)
-        )
-        return _Place(int(self.mbs.AddObject(body)), T, np.eye(4))
-
-    def add_marker(self, place: _Place) -> int:
-        """A marker at a place."""
-        marker = self.item.MarkerBodyRigid(
-            bodyNumber=place.body, localHT=self._transform(place.local)
-        )
-        return int(self.mbs.AddMarker(marker))
-
-    def add_spring(self, place: _Place, K: NDArray) -> _Elastic:
-        """A new body at the place, held there by a spring; ``inf`` locks an axis."""
-        far = self.add_body(place.built)
-        markers = [self.add_marker(place), self.add_marker(far)]
-        soft = np.isfinite(np.diag(K))
-        if not soft.all():
-            lock = [int(locked) for locked in ~soft[_SWAP]]
-            joint = self.item.GenericJoint(markerNumbers=markers, constrainedAxes=lock)
-            self.mbs.AddObject(joint)
-        spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
-        return _Elastic(place, far, (spring,))
-
-    def add_beam(
-        self, base: _Place, length: float, K: NDArray, elements: int
-    ) -> tuple[tuple[int, ...], _Place]:
-        """Elements along the base's x, clamped there, and the place at their end."""
-        section = self.exu.BeamSection()
-        section.stiffnessMatrix = K
-        step = length / elements
-        bodies = [self.add_spring(base, np.diag([np.inf] * 6)).far]
-        parts = []
-        for k in range(1, elements + 1):
-            bodies.append(self.add_body(base.built @ shifted([k * step, 0.0, 0.0])))
-            beam = self.item.ObjectBeamGeometricallyExact(
-                nodeNumbers=[self._node(body) for body in bodies[-2:]],
-                length=step,
-                sectionData=section,
-            )
-            parts.append(int(self.mbs.AddObject(beam)))
-        return tuple(parts), bodies[-1]
-
-    def add_closure(self, first: _Place, second: _Place, shut: NDArray) -> _Closure:
-        """A connector that is stress-free while the closure is open."""
-        gap = inverse(first.built) @ second.built
-        marker = self.add_marker(first.moved(gap))
-        connector = self._connect([marker, self.add_marker(second)], _CLOSING)
-        return _Closure(first, second, marker, connector, shut)
-
-    def add_load(self, place: _Place, wrench: NDArray) -> None:
-        """A wrench at a place, base axes, whose direction stays."""
-        marker = self.add_marker(place)
-        torque, force = self.item.LoadTorqueVector, self.item.LoadForceVector
-        for kind, vector in ((torque, wrench[:3]), (force, wrench[3:])):
-            self.mbs.AddLoad(kind(markerNumber=marker, loadVector=vector.tolist()))
-
-    def solve(self, closures: list[_Closure]) -> None:
-        """Pull the closures shut in steps, then shift their targets until they are."""
-        opened = [logarithm(inverse(c.shut) @ self._gap(c)) for c in closures]
-        extra = [np.zeros(6) for _ in closures]
-
-        def pull(mbs: Any, t: float) -> bool:
-            for closure, screw, more in zip(closures, opened, extra, strict=True):
-                still = exponential(max(0.0, 1.0 - t) * screw) @ exponential(more)
-                local = closure.first.local @ closure.shut @ still
-                mbs.SetMarkerParameter(
-                    closure.marker, "localHT", self._transform(local)
-                )
-            return True
-
-        self.mbs.SetPreStepUserFunction(pull)
-        self.mbs.Assemble()
-        self._equilibrate(0.0, _LOAD_STEPS)
-        for _ in range(_CLOSING_STEPS):
-            if self.largest_gap(closures) <= _SHUT:
-                return
-            for closure, more in zip(closures, extra, strict=True):
-                more -= self._left_open(closure)
-            self._equilibrate(1.0, 1)
-        raise SimulationFailed(
-            self.robot,
-            f"a closure stays open by {self.largest_gap(closures):.2g} rad or m: rigid "
-            "parts do not fit",
-        )
-
-    def _equilibrate(self, start: float, steps: int) -> None:
-        """Exudyn's static solver, from the last state, over one unit of its time."""
-        settings = self.exu.SimulationSettings()
-        settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
-        settings.solution.file.write = False
-        static = settings.staticSolver
-        static.verboseMode = 0
-        static.numberOfLoadSteps = steps
-        static.loadStepStart = start
-        static.useLoadFactor = start == 0.0  # loads grow as the closures shut
-        static.minimumStepSize = 1e-3
-        newton = static.newton
-        newton.residualMode = 1  # of increments: residuals hide behind weak springs
-        newton.absoluteTolerance = newton.relativeTolerance = _NEWTON_TOLERANCE
-        newton.maxIterations = 25
-        try:
-            self.mbs.SolveStatic(settings, updateInitialValues=True)
-        except self.exu.SolverError as error:
-            raise SimulationFailed(self.robot, f"Exudyn: {error}") from None
-
-    def largest_gap(self, closures: list[_Closure]) -> float:
-        """[rad, m] largest component left open."""
-        gaps = [np.abs(self._left_open(closure)).max() for closure in closures]
-        return float(max(gaps, default=0.0))
-
-    def _left_open(self, closure: _Closure) -> NDArray:
-        """(6,) [rad, m] screw from the closed position to the present one."""
-        first = self.pose(closure.first) @ closure.shut
-        return logarithm(inverse(first) @ self.pose(closure.second))
-
-    def pose(self, place: _Place) -> NDArray:
-        """(4, 4) where a place is now, seen from the base."""
-        read, kind = self.mbs.GetObjectOutputBody, self.exu.OutputVariableType
-        R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
-        return matrix(R, read(place.body, kind.Position)) @ place.local
-
-    def energy(self, part: _Elastic) -> float:
-        """[J] stored in an elastic part."""
-        kind = self.exu.OutputVariableType.PotentialEnergy
-        mbs = self.mbs
-        read = mbs.GetObjectOutputBody if part.beam else mbs.GetObjectOutput
-        return float(sum(read(number, kind) for number in part.parts))
-
-    def wrench(self, part: _Elastic) -> NDArray:
-        """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
-        if not part.beam:
-            return self._connector_wrench(part.parts[0])
-        last = self.exu.ObjectIndex(part.parts[-1])
-        force = self.mbs.ComputeItem(last, self.exu.ComputeItemType.ODE2LHS)[7:]
-        total = self.exu.OutputVariableType.CoordinatesTotal
-        a, b, c, d = self.mbs.GetNodeOutput(self._node(part.far), total)[3:7]
-        # the forces of Euler parameters are G^T times the moment, and G G^T = 4
-        G = 2 * np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
-        R = self.pose(part.far)[:3, :3]
-        return np.concatenate([R.T @ G @ force[3:] / 4, R.T @ force[:3]])
-
-    def closure_wrench(self, closure: _Closure, point: NDArray) -> NDArray:
-        """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
-        T = self.pose(closure.second)
-        moment, force = (T[:3, :3] @ w for w in self._closing(closure))
-        return np.concatenate([moment + np.cross(T[:3, 3] - point, force), force])
-
-    def _closing(self, closure: _Closure) -> NDArray:
-        """(2, 3) [N m], [N] of a closure's connector, in its axes."""
-        return self._connector_wrench(closure.connector).reshape(2, 3)
-
-    def _connector_wrench(self, number: int) -> NDArray:
-        """(6,) [N m, N] K times the screw of its outer end."""
-        kind, read = self.exu.OutputVariableType, self.mbs.GetObjectOutput
-        return np.concatenate([
-            read(number, kind.TorqueLocal),
-            read(number, kind.ForceLocal),
-        ])
-
-    def _connect(self, markers: list[int], K: NDArray) -> int:
-        """A 6 by 6 spring between two markers."""
-        spring = self.item.RigidBodySpringDamper(
-            markerNumbers=markers,
-            stiffness=K[np.ix_(_SWAP, _SWAP)],
-            useIntrinsicFormulation=True,
-        )
-        return int(self.mbs.AddObject(spring))
-
-    def _gap(self, closure: _Closure) -> NDArray:
-        """(4, 4) the second place seen from the first, as built."""
-        return inverse(closure.first.built) @ closure.second.built
-
-    def _node(self, place: _Place) -> Any:
-        """Exudyn's node of a place's body."""
-        return self.mbs.GetObjectParameter(place.body, "nodeNumber")
-
-    def _transform(self, T: NDArray) -> Any:
-        """Exudyn's own kind of transform."""
-        return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
 
 
 def _import_exudyn() -> tuple[Any, Any]:

@@ -1,0 +1,301 @@
+"""An Exudyn model: what it is built of, how it is solved, what is read from it.
+
+Bodies are massless to the static solver; places are points and axes fixed to bodies;
+elastic parts and locked joints stand between two places.  Exudyn orders screws and
+wrenches [T R]; everything in and out of here is [R T] like in the whole library.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from validation.motion import exponential, inverse, logarithm, matrix, shifted
+
+_SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
+_CLOSING = np.diag([1e10] * 6)  # [N m/rad, N/m] of the connectors that shut closures
+_SHUT = 1e-12  # [rad, m] largest component a closure may keep open
+_LOAD_STEPS = 4
+_CLOSING_STEPS = 30
+_NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
+
+
+class SimulationFailed(RuntimeError):
+    """No equilibrium was found.
+
+    Attributes:
+        robot: name of the robot.
+        status: what happened, in a few words.
+    """
+
+    def __init__(self, robot: str, status: str) -> None:
+        super().__init__(f"{robot}: the multibody simulation failed: {status}")
+        self.robot = robot
+        self.status = status
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point and axes fixed to a body of the model.
+
+    Attributes:
+        body: Exudyn's number of the body.
+        start: (4, 4) where the body is built, seen from the base.
+        local: (4, 4) the place seen from the body.
+    """
+
+    body: int
+    start: NDArray
+    local: NDArray
+
+    @property
+    def built(self) -> NDArray:
+        """(4, 4) where the place is built, seen from the base."""
+        return self.start @ self.local
+
+    def moved(self, T: NDArray) -> "Place":
+        """Another place on the same body; ``T`` is how this one sees it."""
+        return replace(self, local=self.local @ T)
+
+
+@dataclass(frozen=True, eq=False)
+class Elastic:
+    """An elastic part between two places that coincide when it is stress-free.
+
+    Attributes:
+        near: place on the inner body.
+        far: place on the outer body.
+        parts: Exudyn's numbers, of one connector or of the elements of a beam.
+        beam: which of the two.
+        nodes: places along a beam, from base to tip, at equal distances.
+    """
+
+    near: Place
+    far: Place
+    parts: tuple[int, ...]
+    beam: bool = False
+    nodes: tuple[Place, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """Two places that a connector pulls together.
+
+    Attributes:
+        first: place on the first chain.
+        second: place on the second chain.
+        marker: Exudyn's number of the connector's end on the first chain; it is moved.
+        connector: Exudyn's number of the connector.
+        shut: (4, 4) the second place seen from the first when closed, nominally.
+    """
+
+    first: Place
+    second: Place
+    marker: int
+    connector: int
+    shut: NDArray
+
+
+class Model:
+    """An Exudyn model: what it is built of, how it is solved, what can be read."""
+
+    def __init__(self, exudyn: Any, items: Any, robot: str) -> None:
+        self.exu, self.item = exudyn, items
+        self.robot = robot
+        self.container = self.exu.SystemContainer()
+        self.mbs = self.container.AddSystem()
+        ground = self.mbs.AddObject(self.item.ObjectGround())
+        self.ground = Place(int(ground), np.eye(4), np.eye(4))
+
+    def discard(self) -> None:
+        """Give the memory back; Exudyn keeps models and user functions otherwise."""
+        self.mbs.SetPreStepUserFunction(0)
+        self.mbs.Reset()
+        self.container.Reset()
+
+    def add_body(self, T: NDArray) -> Place:
+        """A rigid body built at ``T``; statics never sees its mass."""
+        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+        node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
+        body = self.item.ObjectRigidBody(
+            mass=1.0, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=self.mbs.AddNode(node)
+        )
+        return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
+
+    def add_marker(self, place: Place) -> int:
+        """A marker at a place."""
+        marker = self.item.MarkerBodyRigid(
+            bodyNumber=place.body, localHT=self._transform(place.local)
+        )
+        return int(self.mbs.AddMarker(marker))
+
+    def add_spring(self, place: Place, K: NDArray) -> Elastic:
+        """A new body at the place, held there by a spring; ``inf`` locks an axis."""
+        far = self.add_body(place.built)
+        markers = [self.add_marker(place), self.add_marker(far)]
+        soft = np.isfinite(np.diag(K))
+        if not soft.all():
+            lock = [int(locked) for locked in ~soft[_SWAP]]
+            joint = self.item.GenericJoint(markerNumbers=markers, constrainedAxes=lock)
+            self.mbs.AddObject(joint)
+        spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
+        return Elastic(place, far, (spring,))
+
+    def add_beam(
+        self, base: Place, length: float, K: NDArray, elements: int
+    ) -> tuple[tuple[int, ...], tuple[Place, ...]]:
+        """Elements along the base's x, clamped there, and their ends."""
+        section = self.exu.BeamSection()
+        section.stiffnessMatrix = K
+        step = length / elements
+        bodies = [self.add_spring(base, np.diag([np.inf] * 6)).far]
+        parts = []
+        for k in range(1, elements + 1):
+            bodies.append(self.add_body(base.built @ shifted([k * step, 0.0, 0.0])))
+            beam = self.item.ObjectBeamGeometricallyExact(
+                nodeNumbers=[self._node(body) for body in bodies[-2:]],
+                length=step,
+                sectionData=section,
+            )
+            parts.append(int(self.mbs.AddObject(beam)))
+        return tuple(parts), tuple(bodies)
+
+    def add_closure(self, first: Place, second: Place, shut: NDArray) -> Closure:
+        """A connector that is stress-free while the closure is open."""
+        gap = inverse(first.built) @ second.built
+        marker = self.add_marker(first.moved(gap))
+        connector = self._connect([marker, self.add_marker(second)], _CLOSING)
+        return Closure(first, second, marker, connector, shut)
+
+    def add_load(self, place: Place, wrench: NDArray) -> None:
+        """A wrench at a place, base axes, whose direction stays."""
+        marker = self.add_marker(place)
+        torque, force = self.item.LoadTorqueVector, self.item.LoadForceVector
+        for kind, vector in ((torque, wrench[:3]), (force, wrench[3:])):
+            self.mbs.AddLoad(kind(markerNumber=marker, loadVector=vector.tolist()))
+
+    def solve(self, closures: list[Closure]) -> None:
+        """Pull the closures shut in steps, then shift their targets until they are."""
+        opened = [logarithm(inverse(c.shut) @ self._gap(c)) for c in closures]
+        extra = [np.zeros(6) for _ in closures]
+
+        def pull(mbs: Any, t: float) -> bool:
+            for closure, screw, more in zip(closures, opened, extra, strict=True):
+                still = exponential(max(0.0, 1.0 - t) * screw) @ exponential(more)
+                local = closure.first.local @ closure.shut @ still
+                mbs.SetMarkerParameter(
+                    closure.marker, "localHT", self._transform(local)
+                )
+            return True
+
+        self.mbs.SetPreStepUserFunction(pull)
+        self.mbs.Assemble()
+        self._equilibrate(0.0, _LOAD_STEPS)
+        for _ in range(_CLOSING_STEPS):
+            if self.largest_gap(closures) <= _SHUT:
+                return
+            for closure, more in zip(closures, extra, strict=True):
+                more -= self._left_open(closure)
+            self._equilibrate(1.0, 1)
+        raise SimulationFailed(
+            self.robot,
+            f"a closure stays open by {self.largest_gap(closures):.2g} rad or m: rigid "
+            "parts do not fit",
+        )
+
+    def _equilibrate(self, start: float, steps: int) -> None:
+        """Exudyn's static solver, from the last state, over one unit of its time."""
+        settings = self.exu.SimulationSettings()
+        settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
+        settings.solution.file.write = False
+        static = settings.staticSolver
+        static.verboseMode = 0
+        static.numberOfLoadSteps = steps
+        static.loadStepStart = start
+        static.useLoadFactor = start == 0.0  # loads grow as the closures shut
+        static.minimumStepSize = 1e-3
+        newton = static.newton
+        newton.residualMode = 1  # of increments: residuals hide behind weak springs
+        newton.absoluteTolerance = newton.relativeTolerance = _NEWTON_TOLERANCE
+        newton.maxIterations = 25
+        try:
+            self.mbs.SolveStatic(settings, updateInitialValues=True)
+        except self.exu.SolverError as error:
+            raise SimulationFailed(self.robot, f"Exudyn: {error}") from None
+
+    def largest_gap(self, closures: list[Closure]) -> float:
+        """[rad, m] largest component left open."""
+        gaps = [np.abs(self._left_open(closure)).max() for closure in closures]
+        return float(max(gaps, default=0.0))
+
+    def _left_open(self, closure: Closure) -> NDArray:
+        """(6,) [rad, m] screw from the closed position to the present one."""
+        first = self.pose(closure.first) @ closure.shut
+        return logarithm(inverse(first) @ self.pose(closure.second))
+
+    def pose(self, place: Place) -> NDArray:
+        """(4, 4) where a place is now, seen from the base."""
+        read, kind = self.mbs.GetObjectOutputBody, self.exu.OutputVariableType
+        R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
+        return matrix(R, read(place.body, kind.Position)) @ place.local
+
+    def energy(self, part: Elastic) -> float:
+        """[J] stored in an elastic part."""
+        kind = self.exu.OutputVariableType.PotentialEnergy
+        mbs = self.mbs
+        read = mbs.GetObjectOutputBody if part.beam else mbs.GetObjectOutput
+        return float(sum(read(number, kind) for number in part.parts))
+
+    def wrench(self, part: Elastic) -> NDArray:
+        """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
+        if not part.beam:
+            return self._connector_wrench(part.parts[0])
+        last = self.exu.ObjectIndex(part.parts[-1])
+        force = self.mbs.ComputeItem(last, self.exu.ComputeItemType.ODE2LHS)[7:]
+        total = self.exu.OutputVariableType.CoordinatesTotal
+        a, b, c, d = self.mbs.GetNodeOutput(self._node(part.far), total)[3:7]
+        # the forces of Euler parameters are G^T times the moment, and G G^T = 4
+        G = 2 * np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
+        R = self.pose(part.far)[:3, :3]
+        return np.concatenate([R.T @ G @ force[3:] / 4, R.T @ force[:3]])
+
+    def closure_wrench(self, closure: Closure, point: NDArray) -> NDArray:
+        """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
+        T = self.pose(closure.second)
+        moment, force = (T[:3, :3] @ w for w in self._closing(closure))
+        return np.concatenate([moment + np.cross(T[:3, 3] - point, force), force])
+
+    def _closing(self, closure: Closure) -> NDArray:
+        """(2, 3) [N m], [N] of a closure's connector, in its axes."""
+        return self._connector_wrench(closure.connector).reshape(2, 3)
+
+    def _connector_wrench(self, number: int) -> NDArray:
+        """(6,) [N m, N] K times the screw of its outer end."""
+        kind, read = self.exu.OutputVariableType, self.mbs.GetObjectOutput
+        return np.concatenate([
+            read(number, kind.TorqueLocal),
+            read(number, kind.ForceLocal),
+        ])
+
+    def _connect(self, markers: list[int], K: NDArray) -> int:
+        """A 6 by 6 spring between two markers."""
+        spring = self.item.RigidBodySpringDamper(
+            markerNumbers=markers,
+            stiffness=K[np.ix_(_SWAP, _SWAP)],
+            useIntrinsicFormulation=True,
+        )
+        return int(self.mbs.AddObject(spring))
+
+    def _gap(self, closure: Closure) -> NDArray:
+        """(4, 4) the second place seen from the first, as built."""
+        return inverse(closure.first.built) @ closure.second.built
+
+    def _node(self, place: Place) -> Any:
+        """Exudyn's node of a place's body."""
+        return self.mbs.GetObjectParameter(place.body, "nodeNumber")
+
+    def _transform(self, T: NDArray) -> Any:
+        """Exudyn's own kind of transform."""
+        return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
