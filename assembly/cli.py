@@ -10,7 +10,7 @@ import typer
 from assembly.posture import parse_assignments
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import WRENCH
-from stiffness.writing import write_json
+from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -134,6 +134,8 @@ def sweep(
     from assembly.sweep import parse_grid, save_dataset, sweep_poses
 
     machine, axes = load_robot(robot), parse_grid(grid)
+    for path in filter(None, (output, figure)):
+        check_writable(path)
     with progress_bars() as update:
         data = sweep_poses(machine, axes, lambda d, n: update("postures", d, n))
     save_dataset(data, output)
@@ -158,6 +160,7 @@ def show(
     from assembly.energy import solve_assembly
     from assembly.plot import robot_plotter
 
+    check_writable(output)
     answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
     plotter = robot_plotter(answer, exaggeration)
     plotter.screenshot(str(output))

@@ -110,7 +110,7 @@ def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
         line = pyvista.Spline(_shape(bodies, i, factor), 40).tube(radius=0.008 * size)
         plotter.add_mesh(line, color="crimson" if frame.link else "steelblue")
     said = f"displacements x {factor:g}; red: elastic links; grey: nominal"
-    plotter.add_text(said, font_size=9)
+    plotter.add_text(said, font_size=9, name="caption")
     plotter.add_axes()
     plotter.view_vector((0.55, -1.0, 0.35))
     return plotter

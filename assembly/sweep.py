@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -192,7 +193,8 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
         data.to_netcdf(part, engine="h5netcdf")
         part.replace(path)
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+        reason = os.strerror(error.errno) if error.errno else error
+        raise BadInput(f"{path}: cannot be written: {reason}") from None
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:

@@ -2,10 +2,29 @@
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
 from stiffness.reading import BadInput
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a file that could not be written, before the work that leads to it.
+
+    Args:
+        path: of a file to be written later.
+
+    Raises:
+        BadInput: its folder is absent or closed to us, or it is itself a folder.
+    """
+    folder = path.parent
+    if not folder.is_dir():
+        raise BadInput(f"{path}: no folder {folder}; expected one that exists")
+    if path.is_dir():
+        raise BadInput(f"{path}: found a folder, expected a file or nothing")
+    if not os.access(folder, os.W_OK):
+        raise BadInput(f"{path}: the folder {folder} cannot be written to")
 
 
 def write_json(results: dict, target: str | None) -> None:
