@@ -1,0 +1,236 @@
+"""Smooth shapes a surface's patches are recognised as, so that curves stay curved.
+
+A faceted surface is thinner than the part it stands for.  Its vertices lie on the true
+surface, so a patch whose vertices all lie on a plane, a cone (cylinders included), a
+sphere or a torus is taken for one, and the mesh's nodes are moved onto it.
+
+Every shape has ``signed(points)``: distances (n,) [m] and their gradients (n, 3).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+S = TypeVar("S", bound="Shape")
+_TINY = 1e-300  # keeps a division at a shape's own axis finite
+
+
+class Shape(Protocol):
+    """Something that points can be moved onto."""
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Points x with normal . (x - point) = 0."""
+
+    point: NDArray
+    normal: NDArray
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        distances = (points - self.point) @ self.normal
+        return distances, np.broadcast_to(self.normal, points.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Cone:
+    """Radius + slope * t about an axis, t along it; with slope 0 a cylinder."""
+
+    point: NDArray
+    axis: NDArray
+    radius: float
+    slope: float = 0.0
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        offset = points - self.point
+        along = offset @ self.axis
+        across = offset - along[:, None] * self.axis
+        radius = np.linalg.norm(across, axis=1)
+        cosine = 1 / np.sqrt(1 + self.slope**2)
+        outward = across / np.maximum(radius, _TINY)[:, None]
+        gradients = (outward - self.slope * self.axis) * cosine
+        return (radius - self.radius - self.slope * along) * cosine, gradients
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """Points at one distance from a centre."""
+
+    point: NDArray
+    radius: float
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        offset = points - self.point
+        radius = np.linalg.norm(offset, axis=1)
+        return radius - self.radius, offset / np.maximum(radius, _TINY)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Torus:
+    """Points at one distance (``tube``) from a circle about an axis."""
+
+    point: NDArray
+    axis: NDArray
+    radius: float
+    tube: float
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        offset = points - self.point
+        along = offset @ self.axis
+        across = offset - along[:, None] * self.axis
+        outward = across / np.maximum(np.linalg.norm(across, axis=1), _TINY)[:, None]
+        spoke = offset - self.radius * outward
+        length = np.linalg.norm(spoke, axis=1)
+        return length - self.tube, spoke / np.maximum(length, _TINY)[:, None]
+
+
+def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
+    """Points moved onto one shape, or onto the curve or corner several share.
+
+    Args:
+        points: (n, 3) [m] near the shapes.
+        shapes: one to three, or more if they share a point.
+
+    Returns:
+        (n, 3) [m]; Newton's method, each step the shortest that closes all distances
+        to first order.
+    """
+    points = points.copy()
+    for _ in range(12):
+        pairs = [shape.signed(points) for shape in shapes]
+        distances = np.stack([d for d, _ in pairs], axis=1)
+        gradients = np.stack([g for _, g in pairs], axis=1)
+        # tangent shapes: the cutoff drops what they cannot both ask for
+        inverse = np.linalg.pinv(gradients, rcond=0.05)
+        step = np.einsum("nij,nj->ni", inverse, distances)
+        points -= step
+        if np.abs(step).max(initial=0.0) < 1e-14 * (1 + np.abs(points).max(initial=0)):
+            break
+    return points
+
+
+def fit_plane(points: NDArray, normals: NDArray) -> Plane:
+    """The plane nearest to points.
+
+    Args:
+        points: (n, 3) [m].
+        normals: (k, 3) facet normals; they orient the plane.
+
+    Returns:
+        The plane.
+    """
+    center = points.mean(axis=0)
+    normal = np.linalg.svd(points - center, full_matrices=False)[2][2]
+    return Plane(center, normal * np.sign(normal @ normals.sum(axis=0) or 1.0))
+
+
+def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
+    """The sphere nearest to points.
+
+    Args:
+        points: (n, 3) [m].
+        normals: not used.
+
+    Returns:
+        The sphere.
+    """
+    origin = points.mean(axis=0)
+    system = np.column_stack([2 * (points - origin), np.ones(len(points))])
+    rhs = np.sum((points - origin) ** 2, axis=1)
+    solution = np.linalg.lstsq(system, rhs, rcond=None)[0]
+    center = solution[:3]
+    return Sphere(
+        origin + center, float(np.sqrt(max(solution[3] + center @ center, 0)))
+    )
+
+
+def fit_cone(points: NDArray, normals: NDArray) -> Cone:
+    """The cone or cylinder nearest to points.
+
+    Args:
+        points: (n, 3) [m].
+        normals: (k, 3) facet normals, the first guess of the axis.
+
+    Returns:
+        The cone.
+    """
+    axis = np.linalg.svd(normals - normals.mean(axis=0), full_matrices=False)[2][2]
+    center = points.mean(axis=0)
+    size = float(np.ptp(points, axis=0).max())
+    frame = np.linalg.svd(axis[None])[2]
+    across = frame[1:] @ ((points - center) / size).T
+    system = np.column_stack([2 * across.T, np.ones(len(points))])
+    circle = np.linalg.lstsq(system, np.sum(across**2, axis=0), rcond=None)[0]
+    radius = np.sqrt(max(circle[2] + circle[:2] @ circle[:2], 0.0))
+
+    def shape(p: NDArray) -> Cone:
+        direction = frame[0] + p[2] * frame[1] + p[3] * frame[2]
+        point = center + size * (p[0] * frame[1] + p[1] * frame[2])
+        return Cone(point, direction / np.linalg.norm(direction), size * p[4], p[5])
+
+    return _polish(shape, np.r_[circle[:2], 0.0, 0.0, radius, 0.0], points, size)
+
+
+def fit_torus(points: NDArray, normals: NDArray) -> Torus:
+    """The torus nearest to points, if they cover part of one.
+
+    Args:
+        points: (n, 3) [m].
+        normals: (k, 3) facet normals; not used beyond orientation.
+
+    Returns:
+        The torus with the smallest residual among three first guesses of its axis.
+    """
+    center = points.mean(axis=0)
+    size = float(np.ptp(points, axis=0).max())
+    directions = np.linalg.svd(points - center, full_matrices=False)[2]
+    candidates = []
+    for axis in directions:
+        frame = np.linalg.svd(axis[None])[2]
+        across = frame[1:] @ ((points - center) / size).T
+        system = np.column_stack([2 * across.T, np.ones(len(points))])
+        circle = np.linalg.lstsq(system, np.sum(across**2, axis=0), rcond=None)[0]
+        radius = np.sqrt(max(circle[2] + circle[:2] @ circle[:2], 1e-6))
+        tube = float(np.std(np.linalg.norm(across.T - circle[:2], axis=1)) + 0.05)
+
+        def shape(p: NDArray, frame: NDArray = frame) -> Torus:
+            direction = frame[0] + p[3] * frame[1] + p[4] * frame[2]
+            point = center + size * (
+                p[0] * frame[1] + p[1] * frame[2] + p[2] * frame[0]
+            )
+            unit = direction / np.linalg.norm(direction)
+            return Torus(point, unit, size * p[5], size * p[6])
+
+        start = np.r_[circle[:2], 0.0, 0.0, 0.0, radius, tube]
+        candidates.append(_polish(shape, start, points, size))
+    return min(candidates, key=lambda t: float(np.abs(t.signed(points)[0]).max()))
+
+
+def _polish(
+    shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
+) -> S:
+    """Nonlinear least squares over a shape's parameters."""
+    from scipy.optimize import least_squares
+
+    if len(points) < len(start):
+        return shape(start)
+    result = least_squares(
+        lambda p: shape(p).signed(points)[0] / size,
+        start,
+        method="lm",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+        max_nfev=400,
+    )
+    return shape(result.x)
