@@ -757,3 +757,13 @@ def robots(draw):
 def test_any_robot_reads_back_as_it_was_written(robot, tmp_path):
     write_robot(robot, tmp_path / "robot.toml")
     assert_same_robot(read_robot(tmp_path / "robot.toml"), robot)
+
+
+def test_the_documentations_example_loads_and_closes(write_file):
+    text = (Path(__file__).parents[1] / "docs" / "robot_files.md").read_text("utf-8")
+    robot = read_robot(write_file(text.split("```toml\n")[1].split("```")[0]))
+    posture = home_posture(robot)
+    assert posture.mismatch < 1e-9
+    # both legs are mirror images, so they meet on the y axis
+    assert posture.platform[0, 3] == pytest.approx(0.0, abs=1e-9)
+    assert {f.joint for f in robot.frames} == {"fixed", "revolute"}
