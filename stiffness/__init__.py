@@ -4,6 +4,7 @@ The public names; what needs a mesh is imported when it is first asked for.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from stiffness.beam import (
     Section,
@@ -14,6 +15,9 @@ from stiffness.beam import (
 from stiffness.interface import Interface, parse_interface
 from stiffness.link import LinkStiffness, turn_link
 from stiffness.reading import BadInput
+
+if TYPE_CHECKING:
+    from stiffness.fea import mesh_link
 
 __all__ = [
     "BadInput",

@@ -226,9 +226,11 @@ def solve_link(
         # a first mesh has nothing to check its estimate against
         if (worst <= accuracy and len(history) > 1) or len(history) == budget.levels:
             break
-        solid = _finer(level, worst / accuracy)
-        if not _affordable(solid, budget, start):
+        wanted = float(np.clip((1.3 * worst / accuracy) ** 0.6, 1.15, 1.6))
+        finer = _affordable_mesh(level, wanted, budget, start)
+        if finer is None:
             break
+        solid = finer
         level = _solve_level(solid, materials, centers, interface)
         history.append((level.solution.stiffness, level.errors.sum(axis=0)))
     report = _report(level, surface, len(history), start) | {
@@ -357,10 +359,34 @@ def estimated_error(
     return -factor * recovered, factor
 
 
-def _finer(level: Level, excess: float) -> Solid:
-    """Halve elements until the error, spread evenly, should be what is asked."""
-    # N unknowns leave an error of N^-4/3 at best; closing the mesh adds its own
-    growth = float(np.clip((1.3 * excess) ** 0.6, 1.3, 1.8))
+def _affordable_mesh(
+    level: Level, growth: float, budget: Budget, start: float
+) -> Solid | None:
+    """A finer mesh that the budget allows, as fine as wanted if it can be."""
+    for share in (1.0, 0.4, 0.1):
+        solid = _finer(level, 1 + share * (growth - 1))
+        unknowns = int(4.4 * len(solid.cells))  # measured: 1.45 nodes an element
+        memory, seconds = expected_cost(unknowns)
+        spent = time.monotonic() - start
+        _LOG.info(
+            "next: about %d unknowns, %.1f GB, %.0f s", unknowns, memory / 1e9, seconds
+        )
+        if unknowns <= budget.unknowns and spent + seconds <= budget.seconds:
+            return solid
+    return None
+
+
+def _finer(level: Level, growth: float) -> Solid:
+    """Halve the elements with the largest shares of the error.
+
+    Args:
+        level: the mesh to refine.
+        growth: of the count of elements, before neighbours are halved too (with them
+            it is about its square).
+
+    Returns:
+        The finer mesh.
+    """
     shares = np.einsum("tii,i->t", level.errors, 1 / np.diag(level.solution.stiffness))
     shares = np.maximum(shares, 1e-12 * shares.max())
 
@@ -374,17 +400,6 @@ def _finer(level: Level, excess: float) -> Solid:
         grown = (2.0 ** halvings(middle)).sum()
         low, high = (middle, high) if grown > growth * len(shares) else (low, middle)
     return refine(level.solid, halvings(high)).solid
-
-
-def _affordable(solid: Solid, budget: Budget, start: float) -> bool:
-    """Whether a mesh may be solved within the budget."""
-    unknowns = int(4.4 * len(solid.cells))  # measured: 1.45 nodes an element
-    memory, seconds = expected_cost(unknowns)
-    spent = time.monotonic() - start
-    _LOG.info(
-        "next: about %d unknowns, %.1f GB, %.0f s", unknowns, memory / 1e9, seconds
-    )
-    return unknowns <= budget.unknowns and spent + seconds <= budget.seconds
 
 
 def _report(
