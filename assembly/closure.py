@@ -44,6 +44,7 @@ class VirtualJoints:
         frame_of: (nu,) row of the frame the cone belongs to.
         scaled: (nu,) bool, whether the margin's factor scales the cone.
         free: (6n, nq) unit columns of unbounded motions.
+        bounded_motion: whether bounds of passive joints' own motion are kept.
     """
 
     robot: Robot
@@ -54,11 +55,7 @@ class VirtualJoints:
     frame_of: NDArray
     scaled: NDArray
     free: NDArray
-
-    @property
-    def groups(self) -> int:
-        """Number of cones."""
-        return int(self.group.max(initial=-1)) + 1
+    bounded_motion: bool
 
 
 def virtual_joints(
@@ -68,33 +65,42 @@ def virtual_joints(
 
     Args:
         robot: of n frames.
-        compliant: ``"elastic"``, or for problem (21), which has no springs,
-            ``"rigid"`` or ``"free"``: what passive joints with stiffness do.
+        compliant: what passive joints with stiffness do: ``"elastic"``, all springs
+            act; ``"hinged"``, they do but for the one about (or along) the joint's own
+            z, which is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and
+            the own z is locked or free: the two readings of problem (21).
         bounded_motion: keep the bounds of passive joints' own motion.  They are large
             and almost never reached, so they are left out first and checked after.
 
     Returns:
-        The columns; none elastic unless ``compliant == "elastic"``.
+        The columns.
     """
-    mode = "free" if compliant == "free" else "elastic"
-    bounds = clearance_bounds(robot, mode)
+    turns = compliant in {"free", "hinged"}
+    bounds = clearance_bounds(robot, "free" if turns else "elastic")
     play = scales_with_margin(robot)
     if not bounded_motion:
         bounds = np.where(~play & (bounds > 0), np.inf, bounds)
-    with_springs = compliant == "elastic"
+    links = hinges = np.zeros((0, 6, 6))
+    if compliant in {"elastic", "hinged"}:
+        links, hinges = link_compliances(robot), joint_compliances(robot)
+    if compliant == "hinged":
+        for C, frame in zip(hinges, robot.frames, strict=True):
+            if frame.compliant:
+                C[frame.own_axis] = C[:, frame.own_axis] = 0.0
+    elastic = _elastic(links, hinges, len(robot.frames))
     return VirtualJoints(
-        robot, *_elastic(robot, with_springs), *_cones(bounds, play), _free(bounds)
-    )
+        robot, *elastic, *_cones(bounds, play),
+        _free(bounds), bounded_motion,
+    )  # fmt: skip
 
 
-def _elastic(robot: Robot, wanted: bool) -> tuple[NDArray, NDArray]:
+def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
     """Columns of links and springs, and which of them are links'."""
-    columns, is_link = [np.zeros((6 * len(robot.frames), 0))], []
-    kinds = [(link_compliances, True), (joint_compliances, False)] if wanted else []
-    for compliances, link in kinds:
-        for i, C in enumerate(compliances(robot)):
+    columns, is_link = [np.zeros((6 * count, 0))], []
+    for compliances, link in ((links, True), (joints, False)):
+        for i, C in enumerate(compliances):
             L = compliance_factor(C)
-            block = np.zeros((6 * len(robot.frames), L.shape[1]))
+            block = np.zeros((6 * count, L.shape[1]))
             block[6 * i : 6 * i + 6] = L
             columns.append(block)
             is_link += [link] * L.shape[1]

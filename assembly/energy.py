@@ -180,7 +180,7 @@ def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     wrench = None if load is None else np.asarray(load, dtype=float)
     robot = posture.robot
     try:
-        answer = _solve(lin, virtual_joints(robot), wrench)
+        answer = solve_with(lin, virtual_joints(robot), wrench)
     except FreeMotion:
         if not has_bounded_motion(robot):
             raise
@@ -188,11 +188,27 @@ def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
         if answer.clearance_excess() <= 1e-9:
             return answer
     # the bound of a passive joint's own motion was left out, but it matters
-    return _solve(lin, virtual_joints(robot, bounded_motion=True), wrench)
+    return solve_with(lin, virtual_joints(robot, bounded_motion=True), wrench)
 
 
-def _solve(lin: Linearisation, joints: VirtualJoints, load: NDArray | None) -> Assembly:
-    """Reduce, minimise, and go back to all screws."""
+def solve_with(
+    lin: Linearisation, joints: VirtualJoints, load: NDArray | None = None
+) -> Assembly:
+    """Close a manipulator at least energy with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The assembled manipulator.
+
+    Raises:
+        CannotAssemble: a closure is open that nothing can close.
+        FreeMotion: the load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
     small = reduce_problem(lin, joints, load)
     least = _minimise(small)
     u = least.clearances

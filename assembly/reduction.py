@@ -128,7 +128,7 @@ def reduce_problem(
     load = np.zeros(6) if load is None else np.asarray(load, dtype=float)
     A, P = linearisation.rows, linearisation.platform
     tolerance = _RANK + 30.0 * linearisation.posture.mismatch
-    Z = _complement(A @ joints.free, tolerance)
+    Z = complement(A @ joints.free, tolerance)
     preload = _preload(A @ joints.free, P @ joints.free, load)
     A_u, A_y = Z.T @ A @ joints.cones, Z.T @ A @ joints.elastic
     pull = A.T @ preload + P.T @ load  # how the load acts on every small screw
@@ -152,8 +152,16 @@ def reduce_problem(
     )  # fmt: skip
 
 
-def _complement(A: NDArray, tolerance: float) -> NDArray:
-    """Orthonormal basis of what is orthogonal to the columns of A."""
+def complement(A: NDArray, tolerance: float) -> NDArray:
+    """Orthonormal basis of what is orthogonal to the columns of A.
+
+    Args:
+        A: (m, n).
+        tolerance: relative size below which a column adds nothing new.
+
+    Returns:
+        (m, m - rank).
+    """
     Q, R, _ = qr(A, pivoting=True)
     size = np.abs(np.diag(R))
     rank = int(np.sum(size > tolerance * size.max(initial=0.0)))

@@ -1,0 +1,323 @@
+"""How far off the platform can be: problem (27) with certified bounds.
+
+Printed as it is, (27) is degenerate: with the deformations frozen at the solution of
+(22), complementary slackness holds every loaded clearance where it is.  So there are
+three readings of what may still move:
+
+======== =================================================================
+frozen   all deformations stay; only unloaded clearances move (the paper)
+free     compliant joints also turn about their own axis: play inside zones
+budget   everything that closes with at most (1 + eta) times the least energy
+======== =================================================================
+
+The set of platform screws is convex, so the farthest one is bracketed by outer
+approximation of its three-dimensional projection, rotation or translation: a support
+function (a cone programme, its dual value certified) gives a cut and a point; the
+farthest vertex of the cuts is the next direction to look in.
+
+Sources:
+    Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
+    maximisation).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import svd
+
+from assembly.clearance import has_bounded_motion
+from assembly.closure import VirtualJoints, virtual_joints
+from assembly.conic import cone_sizes, minimise_energy
+from assembly.energy import Assembly, solve_with
+from assembly.polytope import Polytope
+from assembly.reduction import complement
+from stiffness.screws import skew
+
+READINGS = ("frozen", "free", "budget")
+_RANK = 1e-10
+_MOST_CUTS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Platform screws that remain possible: centre + map @ (v - start).
+
+    v runs over unit cones with rows @ (v - start) = 0: the homogeneous form, in which
+    an error of the solution of (22) opens no false play.
+
+    Attributes:
+        centre: (6,) [rad, m] the screw at ``start``.
+        map: (6, nv) [rad, m] how the screw follows v.
+        rows: (p, nv) orthonormal rows of the closures.
+        start: (nv,) v at the solution of (22), within its cones.
+        group: (nv,) cone of each column.
+        unbounded: whether the platform can move without bound.
+    """
+
+    centre: NDArray
+    map: NDArray
+    rows: NDArray
+    start: NDArray
+    group: NDArray
+    unbounded: bool = False
+
+    def at_point(self, offset: ArrayLike) -> "Reach":
+        """The same set for another point of the platform.
+
+        Args:
+            offset: (3,) [m] from the platform's origin to the point, base axes.
+
+        Returns:
+            Screws read at the point.
+        """
+        move = np.eye(6)
+        move[3:, :3] = -skew(offset)
+        return replace(self, centre=move @ self.centre, map=move @ self.map)
+
+    def support(self, direction: ArrayLike) -> tuple[float, NDArray]:
+        """Largest component of the platform screw along a direction.
+
+        Args:
+            direction: (6,) weights of the screw's components.
+
+        Returns:
+            A certified upper bound of direction . screw over the set, and a screw of
+            the set that (nearly) attains it.
+
+        Raises:
+            SolverFailed: the cone solver gave up.
+        """
+        direction = np.asarray(direction, dtype=float)
+        pull = self.map.T @ direction
+        at_centre = float(direction @ self.centre)
+        if not np.any(pull) or self.map.shape[1] == 0:
+            return at_centre, self.centre
+        none = np.zeros((0, len(pull)))
+        size = float(np.linalg.norm(pull))
+        least = minimise_energy(
+            none,
+            np.zeros(0),
+            pull / size,
+            self.rows,
+            self.rows @ self.start,
+            self.group,
+        )
+        highest = -least.bound * size - float(pull @ self.start)
+        v = self._feasible(least.clearances)
+        screw = self.centre + self.map @ (v - self.start)
+        return max(at_centre + highest, float(direction @ screw)), screw
+
+    def _feasible(self, v: NDArray) -> NDArray:
+        """A nearby v that satisfies rows and cones to rounding."""
+        step = v - self.start
+        step = step - self.rows.T @ (self.rows @ step)
+        sizes = cone_sizes(self.start + step, self.group)
+        if sizes.max(initial=0.0) > 1.0:
+            # shrink towards the start, itself inside, by what the worst cone asks
+            step = step / sizes.max()
+        return self.start + step
+
+
+@dataclass(frozen=True, eq=False)
+class PoseError:
+    """Certified bounds of the largest pose error, and screws that attain the lower.
+
+    Attributes:
+        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
+        rotation_error: [rad] (lower, upper) bounds.
+        translation_error: [m] (lower, upper) bounds.
+        rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
+        translation_screw: (6,) [rad, m] attains that of the translation.
+        cuts: support functions computed.
+    """
+
+    reading: str
+    rotation_error: tuple[float, float]
+    translation_error: tuple[float, float]
+    rotation_screw: NDArray
+    translation_screw: NDArray
+    cuts: int
+
+
+def bound_pose_error(
+    answer: Assembly,
+    reading: str = "frozen",
+    energy_budget: float = 0.05,
+    tolerance_rotation: float = 1e-6,
+    tolerance_translation: float = 1e-6,
+    offset: ArrayLike = (0.0, 0.0, 0.0),
+) -> PoseError:
+    """Bracket the largest rotation and translation error of the platform.
+
+    Args:
+        answer: the assembly at least energy, without a load in reading ``budget``.
+        reading: see the head of this module.
+        energy_budget: eta of reading ``budget``.
+        tolerance_rotation: [rad] asked of upper minus lower bound.
+        tolerance_translation: [m] likewise.
+        offset: (3,) [m] from the platform's origin to the point asked about.
+
+    Returns:
+        Bounds; wider than asked only if 400 cuts did not suffice, infinite if the
+        platform can move without bound.
+
+    Raises:
+        ValueError: the reading is unknown, or ``budget`` is asked under a load.
+        SolverFailed: the cone solver gave up.
+    """
+    reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
+    rotation = _farthest(reach, slice(0, 3), tolerance_rotation)
+    translation = _farthest(reach, slice(3, 6), tolerance_translation)
+    return PoseError(
+        reading,
+        rotation[0], translation[0], rotation[1], translation[1],
+        rotation[2] + translation[2],
+    )  # fmt: skip
+
+
+def reachable_screws(
+    answer: Assembly, reading: str, energy_budget: float = 0.05
+) -> Reach:
+    """The set of platform screws that a reading of (27) leaves possible.
+
+    Args:
+        answer: the assembly at least energy.
+        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
+        energy_budget: eta of reading ``"budget"``, >= 0.
+
+    Returns:
+        The set; bounds of passive joints' own motion are left out unless the platform
+        would move without bound.
+
+    Raises:
+        ValueError: the reading is unknown, or ``budget`` is asked under a load.
+    """
+    if reading not in READINGS:
+        raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
+    if reading == "budget" and (np.any(answer.load) or energy_budget < 0):
+        raise ValueError("the budget reading needs no load and a budget >= 0")
+    robot = answer.posture.robot
+    bounded = answer.joints.bounded_motion
+    for limit in (bounded, True):
+        mode = "free" if reading == "free" else "elastic"
+        joints = virtual_joints(robot, mode, bounded_motion=limit)
+        reach = _Moving(answer, joints, reading, energy_budget).reach
+        if not reach.unbounded or not has_bounded_motion(robot):
+            break
+    return reach
+
+
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """What may move in a reading: columns of screws, and where (22) left them."""
+
+    answer: Assembly
+    joints: VirtualJoints
+    reading: str
+    energy_budget: float
+
+    @cached_property
+    def pinned(self) -> NDArray:
+        """(nu,) bool: clearances that carry load, held by complementary slackness."""
+        if self.reading == "budget":
+            return np.zeros(self.joints.cones.shape[1], dtype=bool)
+        holder = self.answer
+        if self.reading == "free":
+            # turning about the own axis costs nothing here: only what stays loaded
+            # without those soft springs is held
+            holder = _without_own_springs(self.answer)
+        return loaded_cones(holder, self.joints)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """The set of platform screws."""
+        lin, held = self.answer.linearisation, self.pinned
+        columns = self.joints.cones[:, ~held]
+        start = self._start()[~held]
+        group = self.joints.group[~held]
+        if self.reading == "budget":
+            radius = np.sqrt(2 * (1 + self.energy_budget) * self.answer.energy)
+            columns = np.hstack([columns, self.joints.elastic * radius])
+            spring = self.answer.elastic / max(radius, 1e-300)
+            start = np.concatenate([start, spring])
+            last = group.max(initial=-1) + 1
+            group = np.concatenate([group, np.full(len(spring), last)])
+        group = np.unique(group, return_inverse=True)[1]
+        A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
+        A_v, P_v = lin.rows @ columns, lin.platform @ columns
+        Z = complement(A_q, _RANK + 30 * self.answer.posture.mismatch)
+        follow = np.linalg.lstsq(A_q.T, P_q.T, rcond=_RANK)[0]
+        left = np.abs(A_q.T @ follow - P_q.T).max(initial=0.0)
+        return Reach(
+            self.answer.platform_screw, P_v - follow.T @ A_v, _rows(Z.T @ A_v),
+            start, group, unbounded=bool(left > 1e-8),
+        )  # fmt: skip
+
+    def _start(self) -> NDArray:
+        """(nu,) the solution's clearances in these cones."""
+        screws = self.answer.clearance_screws.ravel()
+        size = (self.joints.cones**2).sum(axis=0)
+        u = self.joints.cones.T @ screws / size
+        return u / np.maximum(1.0, cone_sizes(u, self.joints.group))[self.joints.group]
+
+
+def _rows(A: NDArray) -> NDArray:
+    """Orthonormal rows spanning those of A."""
+    _, S, Vt = svd(A, full_matrices=False)
+    return Vt[: int(np.sum(S > 1e-9 * S.max(initial=0.0)))]
+
+
+def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:
+    """Which clearances press on their bound, by strict complementarity.
+
+    Args:
+        answer: the assembly at least energy.
+        joints: whose columns are asked about.
+
+    Returns:
+        (nu,) bool, the same for all columns of a cone.
+    """
+    wrenches = answer.wrenches.ravel()
+    push = cone_sizes(joints.cones.T @ wrenches, joints.group)
+    screws = answer.clearance_screws.ravel()
+    u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
+    slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
+    # push times slack is about the solver's gap: one of the two is nearly zero
+    scale = max(answer.energy, 1e-9 * answer.energy_without_play, 1e-300)
+    return ((push > scale * slack) & (push > 1e-9 * scale))[joints.group]
+
+
+def _without_own_springs(answer: Assembly) -> Assembly:
+    """The least energy when compliant joints turn freely about their own axis."""
+    joints = virtual_joints(answer.posture.robot, "hinged")
+    return solve_with(answer.linearisation, joints, answer.load)
+
+
+def _farthest(
+    reach: Reach, part: slice, tolerance: float
+) -> tuple[tuple[float, float], NDArray, int]:
+    """Bounds of the largest size of half a screw, a screw, and the cuts it took."""
+    if reach.unbounded:
+        return (np.inf, np.inf), reach.centre, 0
+    weights = np.eye(6)[part]
+    best = reach.centre
+    heights = []
+    for direction in (*np.eye(3), *-np.eye(3)):
+        height, screw = reach.support(direction @ weights)
+        heights.append(height)
+        best = max(best, screw, key=lambda s: float(np.linalg.norm(s[part])))
+    outer = Polytope(-np.array(heights[3:]), np.array(heights[:3]))
+    while len(heights) < _MOST_CUTS:
+        vertex = outer.farthest()
+        lower = float(np.linalg.norm(best[part]))
+        upper = max(lower, float(np.linalg.norm(vertex)))
+        if upper - lower <= tolerance:
+            break
+        direction = vertex / np.linalg.norm(vertex)
+        height, screw = reach.support(direction @ weights)
+        heights.append(height)
+        outer.cut(direction, height)
+        best = max(best, screw, key=lambda s: float(np.linalg.norm(s[part])))
+    return (lower, upper), best, len(heights)
