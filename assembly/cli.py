@@ -118,6 +118,52 @@ def solve(
 
 
 @app.command()
+def error(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    reading: Annotated[
+        list[str] | None, typer.Option(help="frozen | free | budget; default all.")
+    ] = None,
+    energy_budget: Annotated[
+        float, typer.Option(help="eta of the budget reading: E <= (1 + eta) E*.")
+    ] = 0.05,
+    tolerance_rotation: Annotated[
+        float, typer.Option(help="[rad] upper minus lower bound.")
+    ] = 1e-6,
+    tolerance_translation: Annotated[
+        float, typer.Option(help="[m] upper minus lower bound.")
+    ] = 1e-6,
+    json: JsonOption = None,
+) -> None:
+    """Certified bounds of the platform's largest pose error, problem (27)."""
+    from assembly.pose_error import READINGS
+    from assembly.results import pose_error_of, pose_error_text
+
+    for name in reading or ():
+        if name not in READINGS:
+            hint = nearest(name, READINGS)
+            raise BadInput(f'--reading: found "{name[:60]}"{hint}')
+    options = {
+        "energy_budget": energy_budget,
+        "tolerance_rotation": tolerance_rotation,
+        "tolerance_translation": tolerance_translation,
+    }
+    for key, value in options.items():
+        if not 0 < value < float("inf"):
+            option = "--" + key.replace("_", "-")
+            raise BadInput(f"{option}: found {value}, expected a finite number > 0")
+    results = pose_error_of(
+        posture_of(robot, pose, joint), reading or READINGS, **options
+    )
+    write_json(results, json)
+    if json != "-":
+        print(pose_error_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
 def sweep(
     robot: RobotArgument,
     grid: Annotated[

@@ -13,6 +13,7 @@ class Polytope:
 
     Attributes:
         corners: (k, 3) all corners; some may be there more than once.
+        cuts: planes so far, the box's six among them.
     """
 
     def __init__(self, low: NDArray, high: NDArray) -> None:
@@ -24,7 +25,7 @@ class Polytope:
             sum(1 << (2 * axis + sign) for axis, sign in enumerate(row))
             for row in signs.tolist()
         ]
-        self._count = 6
+        self.cuts = 6
 
     def cut(self, normal: NDArray, height: float) -> None:
         """Keep the points x with normal . x <= height.
@@ -35,10 +36,10 @@ class Polytope:
         """
         above = self.corners @ normal - height
         out = above > 1e-14 * np.abs(self.corners).max()
+        bit = 1 << self.cuts
+        self.cuts += 1
         if not out.any():
             return
-        bit = 1 << self._count
-        self._count += 1
         inside = np.flatnonzero(~out)
         points, planes = list(self.corners[inside]), [self._planes[i] for i in inside]
         for i in np.flatnonzero(out):

@@ -13,7 +13,8 @@ budget   everything that closes with at most (1 + eta) times the least energy
 The set of platform screws is convex, so the farthest one is bracketed by outer
 approximation of its three-dimensional projection, rotation or translation: a support
 function (a cone programme, its dual value certified) gives a cut and a point; the
-farthest vertex of the cuts is the next direction to look in.
+farthest vertex of the cuts is the next direction to look in.  Round bodies, which take
+many cuts, have a second bound (:mod:`assembly.majorant`).
 
 Sources:
     Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
@@ -31,6 +32,7 @@ from assembly.clearance import has_bounded_motion
 from assembly.closure import VirtualJoints, virtual_joints
 from assembly.conic import cone_sizes, minimise_energy
 from assembly.energy import Assembly, solve_with
+from assembly.majorant import majorant_bound
 from assembly.polytope import Polytope
 from assembly.reduction import complement
 from stiffness.screws import skew
@@ -38,6 +40,21 @@ from stiffness.screws import skew
 READINGS = ("frozen", "free", "budget")
 _RANK = 1e-10
 _MOST_CUTS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """How far a set of screws extends along a direction.
+
+    Attributes:
+        height: certified upper bound of direction . screw over the set.
+        screw: (6,) [rad, m] of the set, (nearly) attains it.
+        pulls: (nv,) what pulls each cone towards the direction, closures included.
+    """
+
+    height: float
+    screw: NDArray
+    pulls: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +93,14 @@ class Reach:
         move[3:, :3] = -skew(offset)
         return replace(self, centre=move @ self.centre, map=move @ self.map)
 
-    def support(self, direction: ArrayLike) -> tuple[float, NDArray]:
+    def support(self, direction: ArrayLike) -> "Support":
         """Largest component of the platform screw along a direction.
 
         Args:
             direction: (6,) weights of the screw's components.
 
         Returns:
-            A certified upper bound of direction . screw over the set, and a screw of
-            the set that (nearly) attains it.
+            The height with the point that attains it.
 
         Raises:
             SolverFailed: the cone solver gave up.
@@ -92,22 +108,24 @@ class Reach:
         direction = np.asarray(direction, dtype=float)
         pull = self.map.T @ direction
         at_centre = float(direction @ self.centre)
-        if not np.any(pull) or self.map.shape[1] == 0:
-            return at_centre, self.centre
-        none = np.zeros((0, len(pull)))
         size = float(np.linalg.norm(pull))
+        if size == 0.0:
+            return Support(at_centre, self.centre, pull)
+        none, right = np.zeros((0, len(pull))), self.rows @ self.start
         least = minimise_energy(
-            none,
-            np.zeros(0),
-            pull / size,
-            self.rows,
-            self.rows @ self.start,
-            self.group,
+            none, np.zeros(0), pull / size, self.rows, right, self.group
         )
-        highest = -least.bound * size - float(pull @ self.start)
+        height = at_centre - least.bound * size - float(pull @ self.start)
         v = self._feasible(least.clearances)
         screw = self.centre + self.map @ (v - self.start)
-        return max(at_centre + highest, float(direction @ screw)), screw
+        pulls = pull + self.rows.T @ least.rigid_multipliers * size
+        return Support(max(height, float(direction @ screw)), screw, pulls)
+
+    def upper_bound(self, part: slice, pulls: NDArray) -> float:
+        """Upper bound of the size of half a screw, from a support's pulls."""
+        return majorant_bound(
+            self.centre[part], self.map[part], self.rows, self.start, self.group, pulls
+        )
 
     def _feasible(self, v: NDArray) -> NDArray:
         """A nearby v that satisfies rows and cones to rounding."""
@@ -301,23 +319,27 @@ def _farthest(
     """Bounds of the largest size of half a screw, a screw, and the cuts it took."""
     if reach.unbounded:
         return (np.inf, np.inf), reach.centre, 0
+    if reach.map.shape[1] == 0:
+        size = float(np.linalg.norm(reach.centre[part]))
+        return (size, size), reach.centre, 0
     weights = np.eye(6)[part]
-    best = reach.centre
-    heights = []
-    for direction in (*np.eye(3), *-np.eye(3)):
-        height, screw = reach.support(direction @ weights)
-        heights.append(height)
-        best = max(best, screw, key=lambda s: float(np.linalg.norm(s[part])))
-    outer = Polytope(-np.array(heights[3:]), np.array(heights[:3]))
-    while len(heights) < _MOST_CUTS:
-        vertex = outer.farthest()
+    found = [reach.support(d @ weights) for d in (*np.eye(3), *-np.eye(3))]
+    heights = np.array([s.height for s in found])
+    outer = Polytope(-heights[3:], heights[:3])
+    best, upper, improved = reach.centre, np.inf, False
+    while True:
+        for one in found:
+            if np.linalg.norm(one.screw[part]) > np.linalg.norm(best[part]):
+                best, improved = one.screw, True
+            upper = min(upper, reach.upper_bound(part, one.pulls))
         lower = float(np.linalg.norm(best[part]))
-        upper = max(lower, float(np.linalg.norm(vertex)))
-        if upper - lower <= tolerance:
-            break
-        direction = vertex / np.linalg.norm(vertex)
-        height, screw = reach.support(direction @ weights)
-        heights.append(height)
-        outer.cut(direction, height)
-        best = max(best, screw, key=lambda s: float(np.linalg.norm(s[part])))
-    return (lower, upper), best, len(heights)
+        vertex = outer.farthest()
+        upper = max(lower, min(upper, float(np.linalg.norm(vertex))))
+        if upper - lower <= tolerance or outer.cuts > _MOST_CUTS:
+            return (lower, upper), best, outer.cuts
+        # where the last step gained, its point's own direction gains more, and is
+        # where the second bound is sharpest; else wherever the cuts leave most room
+        towards, improved = (best[part] if improved else vertex), False
+        direction = towards / np.linalg.norm(towards)
+        found = [reach.support(direction @ weights)]
+        outer.cut(direction, found[0].height)

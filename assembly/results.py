@@ -1,5 +1,6 @@
 """What an assembly tells machines (the keys of the public format) and people."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import ArrayLike
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.mobility import mobility
+from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from assembly.zone import zone_margin
@@ -87,6 +89,62 @@ def _answer(answer: Assembly) -> dict[str, Any]:
         "certificate": certificate,
         "ranks": answer.ranks,
     }
+
+
+def pose_error_of(
+    posture: Posture, readings: Sequence[str], **options: Any
+) -> dict[str, Any]:
+    """Everything ``assembly error`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        readings: of problem (27).
+        options: of :func:`assembly.pose_error.bound_pose_error`.
+
+    Returns:
+        The keys of the public format; ``status`` as in :func:`solution_of`.
+    """
+    results: dict[str, Any] = {
+        "robot": posture.robot.name,
+        "status": "ok",
+        "pose": posture.pose(),
+        "error": None,
+    }
+    try:
+        answer = solve_assembly(posture)
+        found = [bound_pose_error(answer, name, **options) for name in readings]
+    except CannotAssemble as error:
+        return results | {"status": "cannot assemble", "reason": str(error)}
+    except SolverFailed as error:
+        return results | {"status": "solver failed", "reason": str(error)}
+    table = {}
+    for one in found:
+        bounds = {"rotation": one.rotation_error, "translation": one.translation_error}
+        table[one.reading] = {
+            key: {"lower": low, "upper": high} for key, (low, high) in bounds.items()
+        }
+        table[one.reading]["rotation"]["platform_screw"] = one.rotation_screw
+        table[one.reading]["translation"]["platform_screw"] = one.translation_screw
+        table[one.reading]["cuts"] = one.cuts
+    certificate = {"relative_gap": answer.relative_gap()}
+    return results | {
+        "energy": answer.energy, "error": table, "certificate": certificate
+    }  # fmt: skip
+
+
+def pose_error_text(results: dict[str, Any]) -> str:
+    """Bounds for people: a line for each reading."""
+    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    if results["status"] != "ok":
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    for reading, found in results["error"].items():
+        rotation, translation = found["rotation"], found["translation"]
+        lines.append(
+            f"{reading:7s} rotation {1e3 * rotation['lower']:.6g} to "
+            f"{1e3 * rotation['upper']:.6g} mrad, translation "
+            f"{1e3 * translation['lower']:.6g} to {1e3 * translation['upper']:.6g} mm"
+        )
+    return "\n".join(lines)
 
 
 def solution_text(results: dict[str, Any]) -> str:

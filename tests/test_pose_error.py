@@ -1,0 +1,218 @@
+"""Bounds of (27): closed forms, the reference's brackets, and a second road."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import HalfspaceIntersection
+
+from assembly.energy import solve_assembly
+from assembly.polytope import Polytope
+from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.posture import home_posture, place_robot
+from assembly.robot import Clearance, Frame, Robot
+from assembly.robots.irsbot2 import irsbot2
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+CASES = [
+    pytest.param(case, point, id=f"{case['name']}-{point['x']}-{point['z']}")
+    for case in NUMBERS["cases"]
+    for point in case["points"]
+]
+
+
+def serial(*clearances, arm=0.3):
+    """Fixed joints with play, ``arm`` apart along x."""
+    frames, above = [], "base"
+    for i, play in enumerate(clearances):
+        shift = [arm * bool(i), 0, 0]
+        frames.append(Frame(f"j{i}", above, shift, clearance=play))
+        above = f"j{i}"
+    frames.append(Frame("tip", above, [arm, 0, 0]))
+    return Robot("serial", "tip", tuple(frames))
+
+
+def bounds(robot, reading="frozen", **options):
+    answer = solve_assembly(home_posture(robot))
+    tight = {"tolerance_rotation": 1e-9, "tolerance_translation": 1e-9}
+    return bound_pose_error(answer, reading, **tight | options)
+
+
+def contains(bracket, value, tolerance):
+    """The bracket is as narrow as asked and holds the value."""
+    low, high = bracket
+    assert high - low <= tolerance
+    slip = 1e-9 * value
+    assert low <= value + slip
+    assert high >= value - slip
+
+
+def test_one_joint_gives_its_own_cones():
+    """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
+    the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
+    """
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
+    found = bounds(serial(play))
+    contains(found.rotation_error, 5e-4, 1e-9)
+    # x: r cos a; y: r sin a + 0.3 spin; z: axial + 0.3 tilt
+    a = np.linspace(0, 2 * np.pi, 2_000_001)
+    sizes = np.hypot(2e-5 * np.cos(a), 2e-5 * np.sin(a) + 0.3 * 3e-4)
+    expected = np.hypot(sizes.max(), 1e-5 + 0.3 * 4e-4)
+    contains(found.translation_error, expected, 1e-9)
+
+
+def test_play_of_parallel_joints_adds_up_along_a_serial_chain():
+    found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
+    contains(found.translation_error, 3e-5, 1e-9)
+    contains(found.rotation_error, 0.0, 1e-9)
+
+
+def test_any_point_of_the_platform_can_be_asked_about():
+    found = bounds(serial(Clearance(tilt=1e-3)), offset=[0.2, 0, 0])
+    contains(found.translation_error, 0.5e-3, 1e-9)
+
+
+def test_a_platform_that_moves_freely_has_no_bound():
+    robot = Robot(
+        "door", "tip", (Frame("hinge", joint="revolute"), Frame("tip", "hinge"))
+    )
+    found = bounds(robot)
+    assert found.rotation_error == (np.inf, np.inf)
+    limited = Robot("door", "tip", (
+        Frame("hinge", joint="revolute", clearance=Clearance(spin=0.01)),
+        Frame("tip", "hinge", [0.5, 0, 0]),
+    ))  # fmt: skip
+    found = bounds(limited)
+    contains(found.rotation_error, 0.01, 1e-9)
+    contains(found.translation_error, 0.005, 1e-9)
+
+
+def test_planar_loop_by_vertex_enumeration():
+    """Two play joints along x and y meet a third: a polygon's farthest vertex.
+
+    Chain A can be at |x| <= 3, |y| <= 4 (units of 1e-5 m); chain B within |x| <= 5,
+    |y| <= 1: the platform's box is 3 x 1, its farthest corner sqrt(10).
+    """
+
+    def slider(name, above, turn, bound):
+        return Frame(name, above, rotation=turn, clearance=Clearance(axial=bound))
+
+    to_x, to_y = [0, np.pi / 2, 0], [-np.pi / 2, 0, 0]
+    frames = []
+    for leg, (x, y) in (("a", (3e-5, 4e-5)), ("b", (5e-5, 1e-5))):
+        frames += [
+            slider(f"{leg}x", "base", to_x, x),
+            Frame(f"{leg}m", f"{leg}x", rotation=[0, -np.pi / 2, 0]),
+            slider(f"{leg}y", f"{leg}m", to_y, y),
+            Frame(f"{leg}e", f"{leg}y", rotation=[np.pi / 2, 0, 0]),
+        ]
+    robot = Robot("table", "ae", tuple(frames), (("ae", "be"),))
+    found = bounds(robot)
+    contains(found.translation_error, np.sqrt(10) * 1e-5, 1e-9)
+    assert np.abs(np.abs(found.translation_screw[3:5]) - [3e-5, 1e-5]).max() < 1e-9
+
+
+@pytest.mark.parametrize("eta", [0.05, 0.5])
+def test_budget_around_two_springs_is_a_ball_known_in_closed_form(eta):
+    """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
+    k1, k2, gap = 1e6, 3e6, 2e-4
+    robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
+    least = k1 * k2 / (k1 + k2) * gap**2 / 2
+    radius = np.sqrt(2 * eta * least / (k1 + k2))
+    found = bounds(robot, "budget", energy_budget=eta)
+    contains(found.translation_error, gap * k2 / (k1 + k2) + radius, 1e-9)
+    contains(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
+
+
+def test_frozen_deformations_leave_a_loaded_joint_no_play():
+    robot = coaxial_beams(
+        np.array([0, 0, 0, 3e-4, 0, 0]), clearance=Clearance(radial=1e-4, axial=2e-5)
+    )
+    answer = solve_assembly(home_posture(robot))
+    found = bounds(robot)
+    # the loaded disc is held; the unloaded interval along z plays, but the springs
+    # that would have to follow it are frozen
+    size = float(np.linalg.norm(answer.platform_screw[3:]))
+    contains(found.translation_error, size, 1e-9)
+
+
+def test_reading_must_be_known_and_budget_needs_no_load():
+    answer = solve_assembly(
+        home_posture(coaxial_beams(np.zeros(6))), [1, 0, 0, 0, 0, 0]
+    )
+    with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
+        bound_pose_error(answer, "loose")
+    with pytest.raises(ValueError, match="budget reading needs no load"):
+        bound_pose_error(answer, "budget")
+
+
+@pytest.mark.parametrize(("case", "point"), CASES)
+@pytest.mark.parametrize(("key", "reading"), [("rigid", "frozen"), ("free", "free")])
+def test_brackets_meet_the_reference_brackets(case, point, key, reading):
+    """Both hold the truth, so they overlap; 1e-7 is what the reference's own
+    deformations leave uncertain where the energy is nearly zero.
+    """
+    pose = {"tx": point["x"], "tz": point["z"]}
+    for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):
+        answer = solve_assembly(place_robot(robot, pose=pose))
+        found = bound_pose_error(answer, reading)
+        for letter, bracket in (
+            ("R", found.rotation_error),
+            ("T", found.translation_error),
+        ):
+            low, high = point[f"{name}_{key}_{letter}"]
+            assert bracket[1] - bracket[0] <= 1e-6
+            assert bracket[0] <= high + 1e-7
+            assert bracket[1] >= low - 1e-7
+
+
+def test_clearances_alone_give_a_map_symmetric_in_x():
+    both = []
+    for x in (-0.25, 0.25):
+        answer = solve_assembly(place_robot(irsbot2(), pose={"tx": x, "tz": -0.4}))
+        both.append(bound_pose_error(answer, "frozen"))
+    for name in ("rotation_error", "translation_error"):
+        left, right = (getattr(b, name) for b in both)
+        assert left[0] <= right[1]
+        assert right[0] <= left[1]
+
+
+def test_attaining_screws_are_in_the_set_and_no_random_screw_beats_the_bound():
+    """A second road from inside: random support directions stay below the upper."""
+    answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
+    found = bound_pose_error(answer, "frozen")
+    reach = reachable_screws(answer, "frozen")
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        direction = np.concatenate([rng.normal(size=3), np.zeros(3)])
+        found_there = reach.support(direction)
+        assert direction @ found_there.screw <= found_there.height + 1e-15
+        assert np.linalg.norm(found_there.screw[:3]) <= found.rotation_error[1]
+    assert np.linalg.norm(found.rotation_screw[:3]) == pytest.approx(
+        found.rotation_error[0], rel=1e-12
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), cuts=st.integers(1, 30), thin=st.booleans())
+def test_polytope_corners_equal_qhulls(seed, cuts, thin):
+    rng = np.random.default_rng(seed)
+    size = np.array([1.0, 1.0, 1e-3 if thin else 1.0])
+    low, high = -size * rng.uniform(0.5, 1.5, 3), size * rng.uniform(0.5, 1.5, 3)
+    body = Polytope(low, high)
+    planes = [np.append(e, -h) for e, h in zip(np.eye(3), high, strict=True)]
+    planes += [np.append(-e, h) for e, h in zip(np.eye(3), low, strict=True)]
+    for _ in range(cuts):
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        height = rng.uniform(0.3, 1.2) * np.linalg.norm(size * normal)
+        body.cut(normal, height)
+        planes.append(np.append(normal, -height))
+    expected = HalfspaceIntersection(np.array(planes), np.zeros(3)).intersections
+    farthest = np.linalg.norm(expected, axis=1).max()
+    assert np.linalg.norm(body.farthest()) == pytest.approx(farthest, rel=1e-9)
+    for normal in itertools.chain(np.eye(3), rng.normal(size=(10, 3))):
+        heights = [float((p @ normal).max()) for p in (body.corners, expected)]
+        assert heights[0] == pytest.approx(heights[1], abs=1e-9)
