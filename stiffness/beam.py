@@ -46,6 +46,11 @@ class Section:
         for item in fields(self):
             _check_positive("section", item.name, getattr(self, item.name))
 
+    @property
+    def size(self) -> float:
+        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
+        return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
+
 
 def _check_positive(who: str, name: str, value: float) -> None:
     """Refuse anything but a finite positive number."""

@@ -262,7 +262,8 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
         return np.array(interface.point)
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
-    return np.average(corners.mean(axis=1), axis=0, weights=areas)
+    center = np.average(corners.mean(axis=1), axis=0, weights=areas)
+    return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
 
 
 def first_mesh(

@@ -147,8 +147,13 @@ def _tetrahedralize(
         )
         command = [sys.executable, "-m", "stiffness.mesh", str(given), str(made)]
         try:
+            # the mesher leaves a file in the folder it runs in
             run = subprocess.run(
-                command, timeout=time_limit, capture_output=True, check=False
+                command,
+                timeout=time_limit,
+                capture_output=True,
+                check=False,
+                cwd=folder,
             )
         except subprocess.TimeoutExpired:
             raise MeshFailed(

@@ -1,0 +1,72 @@
+"""A beam beside finite elements: where they differ, and which part is physics.
+
+A beam's section warps and shrinks freely; a rigid face holds it.  The ends of a solid
+link are therefore stiffer than the beam, by about what a beam shorter by a fixed share
+of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section and on
+Poisson's ratio only.  It fades as the link grows slender; a difference that does not
+fade is an error of one of the two models.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.link import LinkStiffness, scaled
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One link by a beam formula and by finite elements.
+
+    Attributes:
+        beam: the formula's answer.
+        fea: the finite elements' answer, same tip and axes.
+        difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
+        length: [m] base to tip.
+        size: [m] of the section: radius of gyration times 2, the radius of a round bar.
+    """
+
+    beam: LinkStiffness
+    fea: LinkStiffness
+    difference: NDArray
+    length: float
+    size: float
+
+    @property
+    def slenderness(self) -> float:
+        """Length over the section's size, L / r."""
+        return self.length / self.size
+
+    @property
+    def end_effect(self) -> NDArray:
+        """(6,) [1] c of ``K_ii / K_ii of the beam = 1 + c r / L``."""
+        return np.diag(self.difference) * self.slenderness
+
+    @property
+    def explanation(self) -> str:
+        """The difference in words."""
+        c = self.end_effect
+        noise = self.fea.relative_error_estimate * self.slenderness
+        turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
+        return (
+            f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
+            f"K / K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
+            f"(translations); the mesh's error is worth {noise:.2f}."
+        )
+
+
+def compare_link(beam: LinkStiffness, fea: LinkStiffness, size: float) -> Comparison:
+    """Put two answers for one link side by side.
+
+    Args:
+        beam: by formula.
+        fea: by finite elements, read at the same tip in the same axes.
+        size: [m] of the section, the radius of a round bar.
+
+    Returns:
+        The comparison.
+    """
+    difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
+    length = float(np.linalg.norm(fea.tip - fea.base))
+    return Comparison(beam, fea, difference, length, size)
