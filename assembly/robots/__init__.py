@@ -5,10 +5,26 @@ from pathlib import Path
 
 from assembly.robot import Robot
 from assembly.robot_file import read_robot
+from assembly.robots.arm6 import arm6
+from assembly.robots.delta import delta
+from assembly.robots.five_bar import five_bar
+from assembly.robots.four_bar import four_bar
+from assembly.robots.hexapod import hexapod
 from assembly.robots.irsbot2 import irsbot2
+from assembly.robots.orthoglide import orthoglide
+from assembly.robots.three_rrr import three_rrr
 from stiffness.reading import BadInput, nearest
 
-BUILT_IN: dict[str, Callable[[], Robot]] = {"irsbot2": irsbot2}
+BUILT_IN: dict[str, Callable[[], Robot]] = {
+    "irsbot2": irsbot2,
+    "four_bar": four_bar,
+    "five_bar": five_bar,
+    "3rrr": three_rrr,
+    "hexapod": hexapod,
+    "delta": delta,
+    "orthoglide": orthoglide,
+    "arm6": arm6,
+}
 
 
 def load_robot(name: str | Path) -> Robot:

@@ -1,0 +1,154 @@
+"""Clavel's Delta, R-(SS)2: each driven arm carries two parallel rods, the platform.
+
+The rods between ball joints spin about themselves as they please, and each spin is
+counted as a freedom: 9 in all, 3 of the platform and 6 of the rods.  As the six rods
+are just enough to hold the platform, geometric errors move it and cost no energy.
+
+Sources:
+    Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):
+    the dimensions of ABB's FlexPicker IRB 360-1/1600 and worked examples.  Sections,
+    play and drives are round numbers, typical of carbon fibre rods on ball sockets.
+    Clavel (1990), US patent 4976582, for the architecture.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import (
+    Placed,
+    at,
+    ball_joint,
+    drive_stiffness,
+    place_frames,
+)
+from stiffness.reading import BadInput
+
+AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] of the legs
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the robot [m, N m/rad]; carbon fibre tubes."""
+
+    base_side: float = 0.567  # of the triangle whose sides the drives halve
+    platform_side: float = 0.076  # of the triangle whose corners carry the rods
+    arm: float = 0.524
+    rod: float = 1.244
+    rod_distance: float = 0.131  # of the two rods of a leg
+    home: float = -0.9  # height of the platform
+    drive: float = 2e4
+    arm_link: BeamLink = BeamLink(
+        {"radius": 0.030, "inner_radius": 0.027}, 90e9, 0.3, density=1600.0
+    )
+    rod_link: BeamLink = BeamLink(
+        {"radius": 0.007, "inner_radius": 0.005}, 120e9, 0.3, density=1600.0
+    )
+    ball: Clearance = Clearance(radial=20e-6, axial=20e-6)
+
+    @property
+    def base_radius(self) -> float:
+        """[m] from the centre to the drives."""
+        return self.base_side * math.sqrt(3) / 6
+
+    @property
+    def platform_radius(self) -> float:
+        """[m] from the platform's centre to the middle of a pair of rods."""
+        return self.platform_side * math.sqrt(3) / 3
+
+
+def delta(parameters: Parameters | None = None) -> Robot:
+    """The robot at its home pose, on its axis.
+
+    Args:
+        parameters: of the robot, those above if absent.
+
+    Returns:
+        48 frames, 5 closures; platform ``leg1.a_tip``.  A drive's coordinate is its
+        arm's angle below the base's plane.
+
+    Raises:
+        BadInput: the home pose is out of reach.
+    """
+    P = parameters or Parameters()
+    angle = drive_angle(P, AZIMUTHS[0], np.array([0.0, 0.0, P.home]))
+    placed: list[Placed] = []
+    for number, azimuth in enumerate(AZIMUTHS, 1):
+        placed += _leg(f"leg{number}", azimuth, angle, P)
+    tips = [f"leg{number}.{rod}_tip" for number in (1, 2, 3) for rod in "ab"]
+    closures = tuple((tips[0], tip) for tip in tips[1:])
+    description = "Delta of the size of the FlexPicker IRB 360-1/1600"
+    return Robot("delta", tips[0], place_frames(placed), closures, description)
+
+
+def drive_angle(parameters: Parameters, azimuth: float, position: NDArray) -> float:
+    """Angle of one arm below the base's plane, elbow outward.
+
+    Args:
+        parameters: of the robot.
+        azimuth: [rad] of the leg.
+        position: (3,) [m] of the platform.
+
+    Returns:
+        [rad] the drive's coordinate.
+
+    Raises:
+        BadInput: out of reach.
+    """
+    P = parameters
+    out, across = _radial(azimuth)
+    # in the leg's plane, from the drive to where its rods meet the platform
+    x = position @ out + P.platform_radius - P.base_radius
+    z = -position[2]
+    reach = math.hypot(x, z)
+    rod = math.sqrt(max(0.0, P.rod**2 - float(position @ across) ** 2))
+    if not abs(P.arm - rod) <= reach <= P.arm + rod:
+        raise BadInput(
+            f"delta: a leg needs a reach of {reach:.6g} m, its arm and rods give "
+            f"{abs(P.arm - rod):.6g} to {P.arm + rod:.6g} m"
+        )
+    cosine = (reach**2 + P.arm**2 - rod**2) / (2 * reach * P.arm)
+    return math.atan2(z, x) - math.acos(cosine)
+
+
+def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
+    """Unit vectors outward and across, in the base's plane."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
+
+
+def _leg(name: str, azimuth: float, angle: float, P: Parameters) -> list[Placed]:
+    """A driven arm and its two rods."""
+    out, across = _radial(azimuth)
+    foot = P.base_radius * out
+    arm = math.cos(angle) * out - math.sin(angle) * np.array([0.0, 0.0, 1.0])
+    elbow = foot + P.arm * arm
+    platform = np.array([0.0, 0.0, P.home])
+    drive = Frame(f"{name}.drive", joint="revolute", actuated=True, position=angle,
+                  joint_stiffness=drive_stiffness(P.drive))  # fmt: skip
+    placed: list[Placed] = [
+        (drive, at(foot, across, out)),
+        (Frame(f"{name}.elbow", drive.name, link=P.arm_link), at(elbow, across, arm)),
+    ]
+    for rod, sign in (("a", 1.0), ("b", -1.0)):
+        aside = sign * P.rod_distance / 2 * across
+        far = platform + P.platform_radius * out + aside
+        placed += _rod(f"{name}.{rod}", f"{name}.elbow", elbow + aside, far, across, P)
+        tip = Frame(f"{name}.{rod}_tip", f"{name}.{rod}_low_3")
+        placed.append((tip, at(platform)))
+    return placed
+
+
+def _rod(
+    name: str, parent: str, near: NDArray, far: NDArray, across: NDArray, P: Parameters
+) -> list[Placed]:
+    """A rod between ball joints; the axes next to it are its own, so it spins."""
+    along = (far - near) / np.linalg.norm(far - near)
+    third = np.cross(along, across)
+    high = ball_joint(f"{name}_high", parent, near, across, third, P.ball)
+    above = f"{name}_high_3"
+    return high + ball_joint(f"{name}_low", above, far, along, across, P.ball,
+                             P.rod_link)  # fmt: skip

@@ -1,0 +1,61 @@
+"""A planar five-bar robot, 5R: two driven arms, two more that meet in a pin.
+
+Sources:
+    Round numbers, of the size of DexTAR, whose four arms are equal too: Campos,
+    Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot with
+    large workspace, ASME IDETC.  Sections and play are typical.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import Placed, pin, place_frames
+from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the robot [m]; aluminium arms, small ball bearings."""
+
+    base: float = 0.120  # between the drives, on the x axis
+    home: tuple[float, float] = (0.0, 0.110)
+    leg: PlanarLeg = PlanarLeg(
+        near=0.090,
+        far=0.090,
+        link=BeamLink({"width": 0.010, "height": 0.016}, 70e9, 0.33, density=2700.0),
+        drive=1e3,
+        clearance=Clearance(radial=5e-6, axial=10e-6, tilt=3e-4),
+    )
+
+
+def five_bar(parameters: Parameters | None = None) -> Robot:
+    """The robot at its home pose, both elbows outward.
+
+    Args:
+        parameters: of the robot, those above if absent.
+
+    Returns:
+        9 frames, 1 closure; the platform ``left.tip`` sits on the right leg's second
+        arm, past the pin.  A drive's coordinate is its arm's angle to the x axis.
+
+    Raises:
+        BadInput: the home pose is out of reach.
+    """
+    P = parameters or Parameters()
+    tip = np.array(P.home)
+    placed: list[Placed] = []
+    for name, side in (("left", 1), ("right", -1)):
+        foot = np.array([-side * P.base / 2, 0.0])
+        leg = P.leg
+        angle = arm_angle("five_bar", foot, tip, leg.near, leg.far, side)
+        placed += two_arms(name, foot, angle, tip, leg)
+    placed += [
+        (pin("left.pin", "left.arm", P.leg.clearance), in_plane(tip)),
+        (Frame("left.tip", "left.pin"), in_plane(tip)),
+        (Frame("right.tip", "right.arm"), in_plane(tip)),
+    ]
+    description = "Planar five-bar robot with equal arms"
+    closures = (("left.tip", "right.tip"),)
+    return Robot("five_bar", "left.tip", place_frames(placed), closures, description)

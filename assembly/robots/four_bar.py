@@ -1,0 +1,87 @@
+"""A planar four-bar linkage that draws a straight line: Hoeken's.
+
+In units of the crank: ground 2, coupler 2.5, rocker 2.5, and the tracing point as far
+beyond the coupler's pin as the coupler is long.  Crank pin, rocker's foot and tracing
+point then lie on a circle about the coupler's middle pin (Thales), so the foot sees the
+other two at a right angle, and in closed form
+
+    P = [2, 0] + 2 sqrt((5 + cos t) / (5 - 4 cos t)) [sin t, 2 - cos t],
+
+t being the crank's angle to the ground link.  It passes through height 4 exactly at
+t = 90, 180 and 270 degrees.
+
+Sources:
+    Norton, Design of Machinery, chapter 3, Hoeken's linkage: the proportions.  Size,
+    sections and play are round numbers, of the size of a bench-top machine.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BASE, BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import Placed, drive_stiffness, pin, place_frames
+from assembly.robots.planar import direction, in_plane
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the linkage [m, rad, N m/rad]; aluminium bars, plain bearings."""
+
+    crank: float = 0.1
+    home: float = math.pi
+    drive: float = 5e3
+    link: BeamLink = BeamLink(
+        {"width": 0.010, "height": 0.025}, 70e9, 0.33, density=2700.0
+    )
+    clearance: Clearance = Clearance(radial=20e-6, axial=50e-6, tilt=5e-4)
+
+
+def four_bar(parameters: Parameters | None = None) -> Robot:
+    """The linkage at its home angle.
+
+    Args:
+        parameters: of the linkage, those above if absent.
+
+    Returns:
+        8 frames, 1 closure; the platform ``point`` is the tracing point, ``crank`` is
+        driven and its coordinate is the angle to the ground link.
+    """
+    P = parameters or Parameters()
+    foot, tip, middle, point = (P.crank * p for p in corners(P.home))
+    coupler = math.atan2(*(middle - tip)[::-1])
+    rocker = math.atan2(*(middle - foot)[::-1])
+    crank = Frame("crank", joint="revolute", actuated=True, position=P.home,
+                  joint_stiffness=drive_stiffness(P.drive))  # fmt: skip
+    placed: list[Placed] = [
+        (crank, in_plane([0, 0])),
+        (pin("crank_pin", "crank", P.clearance, P.link), in_plane(tip, P.home)),
+        (Frame("middle", "crank_pin", link=P.link), in_plane(middle, coupler)),
+        (Frame("point", "middle", link=P.link), in_plane(point)),
+        (pin("rocker_pin", "middle", P.clearance), in_plane(middle, coupler)),
+        (Frame("end_coupler", "rocker_pin"), in_plane(middle, rocker)),
+        (pin("rocker", BASE, P.clearance), in_plane(foot, rocker)),
+        (Frame("end_rocker", "rocker", link=P.link), in_plane(middle, rocker)),
+    ]
+    description = "Hoeken's straight-line four-bar linkage"
+    closures = (("end_coupler", "end_rocker"),)
+    return Robot("four_bar", "point", place_frames(placed), closures, description)
+
+
+def corners(angle: float) -> tuple[NDArray, ...]:
+    """Where the linkage stands at a crank angle, in units of the crank.
+
+    Args:
+        angle: [rad] of the crank to the ground link.
+
+    Returns:
+        Rocker's foot, crank pin, middle pin, tracing point, (2,) each.
+    """
+    foot, tip = np.array([2.0, 0.0]), direction(angle)
+    to_pin = tip - foot
+    # Thales: at a right angle to it, and 5 apart from the crank pin
+    across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
+    point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
+    return foot, tip, (tip + point) / 2, point

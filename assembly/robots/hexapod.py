@@ -1,0 +1,104 @@
+"""A Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
+
+A strut between a cardan and a ball joint carries a force along itself and nothing else,
+whatever its section: the platform's stiffness is the sum over struts of k w w^T, with w
+the unit wrench of the strut's line.  Six struts are just enough, so geometric errors
+move the platform and cost no energy.
+
+Sources:
+    Merlet, Parallel Robots (2nd edition, 2006), the prototype called left hand: the
+    centres of the joints, in two planes.  Working height, sections, play and drives are
+    round numbers, typical of struts of this size.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import (
+    Placed,
+    at,
+    ball_joint,
+    cardan_joint,
+    drive_stiffness,
+    place_frames,
+)
+
+BASE_POINTS = (
+    (-0.0970, 0.0910), (0.0970, 0.0910), (0.1276, 0.0390),
+    (0.0300, -0.1300), (-0.0300, -0.1300), (-0.1276, 0.0390),
+)  # fmt: skip
+PLATFORM_POINTS = (
+    (-0.03000, 0.07300), (0.03000, 0.07300), (0.07822, -0.01052),
+    (0.04822, -0.06248), (-0.04822, -0.06248), (-0.07822, -0.01052),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the robot [m, N/m, Pa]; steel tubes, screws with preloaded nuts."""
+
+    height: float = 0.530
+    drive: float = 1.5e7
+    radius: float = 0.010
+    inner_radius: float = 0.007
+    young: float = 210e9
+    poisson: float = 0.3
+    density: float = 7850.0
+    cardan: Clearance = Clearance(radial=5e-6, axial=5e-6)
+    ball: Clearance = Clearance(radial=8e-6, axial=8e-6)
+
+
+def hexapod(parameters: Parameters | None = None) -> Robot:
+    """The robot at its home pose, the platform parallel to the base.
+
+    Args:
+        parameters: of the robot, those above if absent.
+
+    Returns:
+        42 frames, 5 closures; platform ``leg1.tip``.  The coordinate of ``legK.strut``
+        is the distance of its joints' centres.
+    """
+    P = parameters or Parameters()
+    placed: list[Placed] = []
+    for number, (a, b) in enumerate(zip(*points(), strict=True), 1):
+        placed += _leg(f"leg{number}", a, b + [0.0, 0.0, P.height], P)
+    closures = tuple(("leg1.tip", f"leg{number}.tip") for number in range(2, 7))
+    description = "Gough-Stewart platform, 6-UPS, of the size of INRIA's left hand"
+    return Robot("hexapod", "leg1.tip", place_frames(placed), closures, description)
+
+
+def points() -> tuple[NDArray, NDArray]:
+    """(6, 3) [m] centres of the joints in base axes and in platform axes."""
+    flat = np.zeros((6, 1))
+    return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
+
+
+def _leg(name: str, a: NDArray, b: NDArray, P: Parameters) -> list[Placed]:
+    """A strut from a to b, where its ball joint holds the platform."""
+    length = float(np.linalg.norm(b - a))
+    along = (b - a) / length
+    first = np.cross([0.0, 0.0, 1.0], along)
+    second = np.cross(along, first)
+    strut = Frame(
+        f"{name}.strut", f"{name}.cardan_2", joint="prismatic", actuated=True,
+        position=length, joint_stiffness=drive_stiffness(P.drive, "prismatic"),
+    )  # fmt: skip
+    tube = BeamLink(
+        {"radius": P.radius, "inner_radius": P.inner_radius}, P.young, P.poisson,
+        P.density, length=length, axis=_in_axes(at(b, first, second), along),
+    )  # fmt: skip
+    return [
+        *cardan_joint(f"{name}.cardan", "base", a, first, second, P.cardan),
+        (strut, at(a, along, first)),
+        *ball_joint(f"{name}.ball", strut.name, b, first, second, P.ball, tube),
+        (Frame(f"{name}.tip", f"{name}.ball_3"), at([0.0, 0.0, P.height])),
+    ]
+
+
+def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
+    """A direction in base axes, in a frame's axes."""
+    x, y, z = (T[:3, :3].T @ vector).tolist()
+    return x, y, z

@@ -1,0 +1,90 @@
+"""The Orthoglide: three linear drives at right angles, parallelograms, 3 translations.
+
+Each leg is a slide, a hinge, a parallelogram and a second hinge parallel to the first:
+PRPaR.  It keeps the platform from turning about two axes; three legs do so six times
+where three would do, and each parallelogram is planar, three times more than needed:
+overconstrained twelve times, it must be forced together.
+
+With the coordinates r of the slides and the position p of the platform, each leg of
+length L keeps (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, p = 0 and
+r = -L, the platform moves as its slides do: the Jacobian is the identity.
+
+Sources:
+    Chablat, Wenger (2003), Architecture optimization of a 3-DOF translational parallel
+    mechanism for machining applications, the Orthoglide, IEEE Trans. Robotics and
+    Automation 19: the architecture and its isotropic point.  Pashkevich, Chablat,
+    Wenger (2009), Stiffness analysis of overconstrained parallel manipulators,
+    Mechanism and Machine Theory 44: which parts bend.  Dimensions are round numbers, of
+    the size of their prototype; sections, play and drives are typical.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import Placed, at, drive_stiffness, pin, place_frames
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the robot [m, N/m]; aluminium bars, preloaded ball bearings."""
+
+    leg: float = 0.310
+    width: float = 0.080  # of the parallelograms
+    platform: float = 0.030  # from the platform's centre to the legs' ends
+    drive: float = 5e7
+    link: BeamLink = BeamLink(
+        {"radius": 0.012, "inner_radius": 0.009}, 70e9, 0.33, density=2700.0
+    )
+    clearance: Clearance = Clearance(radial=5e-6, axial=10e-6, tilt=2e-4)
+
+
+def orthoglide(parameters: Parameters | None = None) -> Robot:
+    """The robot at its isotropic point.
+
+    Args:
+        parameters: of the robot, those above if absent.
+
+    Returns:
+        30 frames, 5 closures; platform ``x.tip``.  The coordinate of ``x.slide`` is r_x
+        above.
+    """
+    P = parameters or Parameters()
+    axes = np.eye(3)
+    placed: list[Placed] = []
+    for k, name in enumerate("xyz"):
+        placed += _leg(name, axes[k], axes[(k + 1) % 3], P)
+    closures = (
+        *((f"{name}.bar_a", f"{name}.bar_b") for name in "xyz"),
+        ("x.tip", "y.tip"), ("x.tip", "z.tip"),
+    )  # fmt: skip
+    description = "Orthoglide, PRPaR legs, at its isotropic point"
+    return Robot("orthoglide", "x.tip", place_frames(placed), closures, description)
+
+
+def _leg(name: str, along: NDArray, hinge: NDArray, P: Parameters) -> list[Placed]:
+    """A leg along an axis of the base, its hinges along another."""
+    near, far = -(P.leg + P.platform) * along, -P.platform * along
+    slide = Frame(
+        f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,
+        joint_stiffness=drive_stiffness(P.drive, "prismatic"),
+    )  # fmt: skip
+    placed: list[Placed] = [
+        (slide, at(far, along, hinge)),
+        (pin(f"{name}.hinge", slide.name, P.clearance), at(near, hinge, along)),
+    ]
+    normal = np.cross(along, hinge)
+    for side, sign in (("a", 1.0), ("b", -1.0)):
+        aside = sign * P.width / 2 * hinge
+        foot = pin(f"{name}.foot_{side}", f"{name}.hinge", P.clearance)
+        end = pin(f"{name}.end_{side}", foot.name, P.clearance, P.link)
+        placed += [
+            (foot, at(near + aside, normal, along)),
+            (end, at(far + aside, normal, along)),
+            (Frame(f"{name}.bar_{side}", end.name), at(far, hinge, along)),
+        ]
+    wrist = pin(f"{name}.wrist", f"{name}.bar_a", P.clearance)
+    tip = Frame(f"{name}.tip", wrist.name)
+    return [*placed, (wrist, at(far, hinge, along)), (tip, at(np.zeros(3)))]

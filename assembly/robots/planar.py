@@ -1,0 +1,104 @@
+"""Legs of planar robots: a driven arm, an elbow, and a second arm, all in z = 0."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.robot import BeamLink, Clearance, Frame
+from assembly.robots.placing import Placed, at, drive_stiffness, pin
+from stiffness.reading import BadInput
+
+
+@dataclass(frozen=True)
+class PlanarLeg:
+    """What the legs of a planar robot are made of.
+
+    Attributes:
+        near: [m] length of the driven arm.
+        far: [m] length of the second arm.
+        link: the section and material of both.
+        drive: [N m/rad] stiffness of the drive.
+        clearance: play of every pin.
+    """
+
+    near: float
+    far: float
+    link: BeamLink
+    drive: float
+    clearance: Clearance
+
+
+def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
+    """(4, 4) frame at a point (x, y) [m], its x axis turned by an angle [rad]."""
+    x, y = np.asarray(point, dtype=float)
+    return at([x, y, 0.0], x=[math.cos(angle), math.sin(angle), 0.0])
+
+
+def direction(angle: float) -> NDArray:
+    """(2,) unit vector at an angle [rad] to the x axis."""
+    return np.array([math.cos(angle), math.sin(angle)])
+
+
+def arm_angle(
+    robot: str, foot: ArrayLike, tip: ArrayLike, near: float, far: float, side: int
+) -> float:
+    """Angle of the first of two arms that reach from one point to another.
+
+    Args:
+        robot: whose, for the message.
+        foot: (2,) [m] where the first arm turns.
+        tip: (2,) [m] where the second one ends.
+        near: [m] length of the first.
+        far: [m] length of the second.
+        side: 1 puts the elbow left of the line from foot to tip, -1 right.
+
+    Returns:
+        [rad] to the x axis.
+
+    Raises:
+        BadInput: out of reach.
+    """
+    along = np.asarray(tip, dtype=float) - foot
+    reach = math.hypot(*along)
+    if not abs(near - far) <= reach <= near + far or reach == 0.0:
+        raise BadInput(
+            f"{robot}: the home pose needs a reach of {reach:.6g} m, the arms give "
+            f"{abs(near - far):.6g} to {near + far:.6g} m"
+        )
+    cosine = (reach**2 + near**2 - far**2) / (2 * reach * near)
+    return math.atan2(along[1], along[0]) + side * math.acos(cosine)
+
+
+def two_arms(
+    name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
+) -> list[Placed]:
+    """Drive, elbow and the frame at the second arm's end, where a pin may sit.
+
+    The drive's coordinate is the arm's angle to the x axis.
+
+    Args:
+        name: of the leg.
+        foot: (2,) [m] of the drive.
+        angle: [rad] of the driven arm at home.
+        tip: (2,) [m] end of the second arm at home.
+        leg: what it is made of.
+
+    Returns:
+        Frames ``drive``, ``elbow`` (a pin) and ``arm`` (fixed).
+    """
+    elbow = foot + leg.near * direction(angle)
+    along = tip - elbow
+    second = math.atan2(along[1], along[0])
+    drive = Frame(
+        f"{name}.drive", joint="revolute", actuated=True, position=angle,
+        joint_stiffness=drive_stiffness(leg.drive),
+    )  # fmt: skip
+    joint = pin(f"{name}.elbow", drive.name, leg.clearance, leg.link)
+    arm = Frame(f"{name}.arm", joint.name, link=leg.link)
+    return [
+        (drive, in_plane(foot)),
+        (joint, in_plane(elbow, angle)),
+        (arm, in_plane(tip, second)),
+    ]

@@ -1,0 +1,85 @@
+"""A planar 3-RRR robot: three legs of two arms carry a triangle.
+
+Sources:
+    Gosselin, Angeles (1988), The optimum kinematic design of a planar
+    three-degree-of-freedom parallel manipulator, J. Mechanisms, Transmissions and
+    Automation in Design 110: the architecture and its inverse kinematics, three
+    independent legs of two arms.  Dimensions are round numbers, of the size of
+    laboratory machines; sections and play are typical.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots.placing import Placed, pin, place_frames
+from assembly.robots.planar import (
+    PlanarLeg,
+    arm_angle,
+    direction,
+    in_plane,
+    two_arms,
+)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Numbers of the robot [m]; aluminium arms, small ball bearings."""
+
+    base_radius: float = 0.300
+    platform_radius: float = 0.080
+    home: tuple[float, float] = (0.0, 0.0)
+    leg: PlanarLeg = PlanarLeg(
+        near=0.160,
+        far=0.160,
+        link=BeamLink({"width": 0.012, "height": 0.025}, 70e9, 0.33, density=2700.0),
+        drive=4e3,
+        clearance=Clearance(radial=10e-6, axial=20e-6, tilt=3e-4),
+    )
+
+    def feet(self) -> NDArray:
+        """(3, 2) [m] the drives, on a circle."""
+        return self.base_radius * _triangle()
+
+    def corners(self) -> NDArray:
+        """(3, 2) [m] the platform's pins in its own axes, on a circle."""
+        return self.platform_radius * _triangle()
+
+
+def three_rrr(parameters: Parameters | None = None) -> Robot:
+    """The robot at its home pose, the platform parallel to the base.
+
+    Args:
+        parameters: of the robot, those above if absent.
+
+    Returns:
+        15 frames, 2 closures; platform ``leg1.tip``, the triangle's centre.  A
+        drive's coordinate is its arm's angle to the x axis.
+
+    Raises:
+        BadInput: the home pose is out of reach.
+    """
+    P = parameters or Parameters()
+    leg = P.leg
+    placed: list[Placed] = []
+    pairs = zip(P.feet(), P.corners(), strict=True)
+    for number, (foot, corner) in enumerate(pairs, 1):
+        name, end = f"leg{number}", corner + P.home
+        angle = arm_angle("3rrr", foot, end, leg.near, leg.far, side=1)
+        placed += two_arms(name, foot, angle, end, leg)
+        joint = pin(f"{name}.pin", f"{name}.arm", leg.clearance)
+        placed += [
+            (joint, in_plane(end)),
+            (Frame(f"{name}.tip", joint.name), in_plane(P.home)),
+        ]
+    description = "Planar 3-RRR robot"
+    closures = (("leg1.tip", "leg2.tip"), ("leg1.tip", "leg3.tip"))
+    return Robot("3rrr", "leg1.tip", place_frames(placed), closures, description)
+
+
+def _triangle() -> NDArray:
+    """(3, 2) corners of an equilateral triangle in the unit circle, tip up."""
+    return np.array([direction(math.pi * (1 / 2 + 2 * k / 3)) for k in range(3)])
