@@ -76,8 +76,9 @@ def main() -> None:
 
 
 def _complain(message: str, status: int) -> int:
-    """A message on stderr."""
-    print(f"forcefit: {message}", file=sys.stderr)
+    """A message on stderr, if there is one: help without a command has none."""
+    if message:
+        print(f"forcefit: {message}", file=sys.stderr)
     return status
 
 

@@ -24,20 +24,11 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
             interfaces is not that of the two origins.
         ValueError: the frame has no mesh link.
     """
-    from stiffness.fea import mesh_link
-    from stiffness.interface import parse_interface
-
     link = frame.link
     if not isinstance(link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     place = f'frame "{frame.name}".link.mesh'
-    solved = mesh_link(
-        link.surface,
-        parse_interface(link.base, f"{place}.base"),
-        parse_interface(link.tip, f"{place}.tip"),
-        link.young, link.poisson,
-        unit=link.unit, accuracy=accuracy, interface=link.interface,
-    )  # fmt: skip
+    solved = _solved(link, accuracy, place)
     # from the parent's origin to this frame's, in this frame's axes
     span = rotation_matrix(frame.rotation).T @ frame.translation
     turn = mesh_rotation(solved.tip - solved.base, span, link.up, link.frame_up)
@@ -48,6 +39,33 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
 def mesh_compliance(frame: Frame) -> NDArray:
     """(6, 6) compliance of a frame's mesh link; see :func:`mesh_link_stiffness`."""
     return mesh_link_stiffness(frame).compliance
+
+
+_KNOWN: dict[tuple, LinkStiffness] = {}  # solved before by this process
+
+
+def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
+    """Stiffness in the mesh's axes; links of one shape and material are solved once."""
+    from stiffness.fea import mesh_link
+    from stiffness.interface import parse_interface
+
+    try:
+        stamp = link.surface.stat().st_mtime_ns
+    except OSError as error:
+        raise BadInput(
+            f"{place}: surface {link.surface} cannot be read: {error.strerror}"
+        ) from None
+    shape = (link.surface, stamp, link.unit, repr(link.base), repr(link.tip))
+    key = (*shape, link.young, link.poisson, link.interface, accuracy)
+    if key not in _KNOWN:
+        _KNOWN[key] = mesh_link(
+            link.surface,
+            parse_interface(link.base, f"{place}.base"),
+            parse_interface(link.tip, f"{place}.tip"),
+            link.young, link.poisson,
+            unit=link.unit, accuracy=accuracy, interface=link.interface,
+        )  # fmt: skip
+    return _KNOWN[key]
 
 
 def mesh_rotation(
