@@ -57,7 +57,7 @@ def study(
 def main() -> None:
     """Run the command; bad input is one line on stderr and exit status 2."""
     try:
-        status = app(standalone_mode=False)
+        status = app(prog_name="forcefit", standalone_mode=False)
     except BadInput as error:
         sys.exit(_complain(str(error), 2))
     except (KeyboardInterrupt, typer.Abort):

@@ -142,15 +142,13 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     if table.has("explicit"):
         rows = table.table("explicit")
         errors = np.zeros((len(robot.frames), 6))
-        for frame in rows.content:
-            errors[robot.index(frame)] = rows.array(frame, (6,), "rad, m")
+        for name in rows.content:
+            for frame in _known(rows, name, robot, [name]):
+                errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
         table.finish()
         return robot.with_errors(errors), "geometric errors given in the study file"
-    names = table.get("frames", [])
-    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
-        raise table.bad("frames", "expected a list of frame names")
     draw = ErrorDraw(
-        frames_named(robot, names or [f.name for f in robot.frames]),
+        _frames(table, robot, [f.name for f in robot.frames]),
         tuple(table.array("least", (6,), "rad, m")),
         tuple(table.array("most", (6,), "rad, m")),
         table.integer("seed"),
@@ -162,6 +160,22 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     said = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {said}"
     return robot.with_errors(draw_errors(robot, draw)), sentence
+
+
+def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
+    """Frames named by the key ``frames``."""
+    names = table.get("frames", default)
+    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        raise table.bad("frames", "expected a list of frame names")
+    return _known(table, "frames", robot, names)
+
+
+def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
+    """Full names of frames; an unknown one is named with its place in the file."""
+    try:
+        return frames_named(robot, names)
+    except BadInput as error:
+        raise table.bad(key, str(error)) from None
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
@@ -176,9 +190,8 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
         surface = Path(root.file).parent / table.text("surface")
         if not surface.is_file():
             raise table.bad("surface", f"no such file: {surface}")
-        names = table.get("frames", [])
         beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
-        wanted = frames_named(robot, names or [f.name for f in beams])
+        wanted = _frames(table, robot, [f.name for f in beams])
         given = {k: table.text(k) for k in ("base", "tip")}
         unit = table.choice("unit", ("m", "mm"), "m")
         for frame in beams:

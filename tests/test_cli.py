@@ -1,0 +1,185 @@
+"""The command: what it writes, and how it refuses."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray
+
+import forcefit
+from assembly.robot_file import write_robot
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Run the command in this process: exit status, standard output, error output."""
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
+        with pytest.raises(SystemExit) as done:
+            forcefit.main()
+        out, err = capsys.readouterr()
+        return done.value.code, out, err
+
+    return call
+
+
+@pytest.fixture
+def robot_file(tmp_path):
+    path = tmp_path / "robot.toml"
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), path)
+    return path
+
+
+def test_solve_writes_the_public_keys_to_standard_output_and_nothing_else(
+    run, robot_file
+):
+    status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", "-")  # fmt: skip
+    found = json.loads(out)
+    assert status == 0
+    point = NUMBERS["cases"][0]["points"][0]
+    assert found["energy"] == pytest.approx(point["energy"], rel=1e-10)
+    assert set(found["zone"]) >= {"assemblable", "margin", "margin_free"}
+    assert found["zone"]["assemblable"] is False
+    assert set(found["certificate"]) >= {
+        "closure_residual", "clearance_excess", "duality_gap", "relative_gap",
+    }  # fmt: skip
+    frame = found["frames"]["leg1.link_a"]
+    assert {k: len(v) for k, v in frame.items()} == dict.fromkeys(
+        ("clearance", "link", "joint", "wrench"), 6
+    )
+    assert found["closures"][-1]["frames"] == ["leg1.tip", "leg2.tip"]
+    assert len(found["closures"][-1]["wrench"]) == 6
+
+
+def test_pose_and_joints_name_the_same_configuration(run, robot_file):
+    _, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.1",
+                    "--pose", "tz=-0.45", "--json", "-")  # fmt: skip
+    by_pose = json.loads(out)
+    drives = [f"{n}={by_pose['joints'][n]!r}" for n in ("leg1.drive", "leg2.drive")]
+    _, out, _ = run("assembly", "solve", robot_file, "--joint", ",".join(drives),
+                    "--json", "-")  # fmt: skip
+    by_joints = json.loads(out)
+    assert by_joints["energy"] == pytest.approx(by_pose["energy"], rel=1e-9)
+    assert by_joints["pose"]["tx"] == pytest.approx(0.1, abs=1e-10)
+
+
+def test_load_does_work(run, tmp_path):
+    path = tmp_path / "beams.toml"
+    write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), path)
+    status, out, _ = run("assembly", "solve", path, "--load", "fx=400", "--json", "-")
+    found = json.loads(out)
+    assert status == 0
+    assert found["platform_screw"][3] == pytest.approx(1e-4)  # 400 / (1e6 + 3e6)
+    assert found["potential"] == pytest.approx(-400 * 1e-4 / 2)
+
+
+def test_cannot_assemble_is_an_answer_with_exit_status_1(run, tmp_path):
+    path = tmp_path / "stuck.toml"
+    path.write_text(
+        'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'
+        'name = "b"\nparent = "base"\ngeometric_error = [0, 0, 0, 1e-3, 0, 0]\n'
+        '[[closure]]\nframes = ["a", "b"]\n'
+    )
+    status, out, _ = run("assembly", "solve", path, "--json", "-")
+    found = json.loads(out)
+    assert status == 1
+    assert found["status"] == "cannot assemble"
+    assert found["energy"] is None
+    assert found["zone"]["margin"] is None
+    assert found["zone"]["assemblable"] is False
+
+
+def test_error_writes_the_public_keys(run, robot_file, tmp_path):
+    status, out, _ = run("assembly", "error", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", tmp_path / "e.json")  # fmt: skip
+    found = json.loads((tmp_path / "e.json").read_text())["error"]
+    assert status == 0
+    assert "frozen" in out
+    assert set(found) == {"frozen", "free", "budget"}
+    point = NUMBERS["cases"][0]["points"][0]
+    for name, key in (("rotation", "full_rigid_R"), ("translation", "full_rigid_T")):
+        bracket = found["frozen"][name]
+        assert bracket["lower"] <= point[key][1] + 1e-9
+        assert bracket["upper"] >= point[key][0] - 1e-9
+        assert len(bracket["platform_screw"]) == 6
+    assert found["budget"]["rotation"]["lower"] >= found["frozen"]["rotation"]["lower"]
+
+
+def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
+    out_file, figure = tmp_path / "out.nc", tmp_path / "map.png"
+    status, out, _ = run("assembly", "sweep", robot_file, "--grid",
+                         "tx=0:0.1:0.1,tz=-0.5:-0.4:0.1", "-o", out_file,
+                         "--figure", figure)  # fmt: skip
+    assert (status, out.strip()) == (0, "ok: 4")
+    with xarray.open_dataset(out_file) as data:
+        assert dict(data.sizes) == {"tx": 2, "tz": 2, "screw": 6}
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_show_draws_a_picture(run, robot_file, tmp_path):
+    status, _, _ = run("assembly", "show", robot_file, "-o", tmp_path / "robot.png")
+    assert status == 0
+    assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["assembly", "solve", "irsbot3"], '"irsbot3": neither a built-in robot nor a'),
+        (["assembly", "solve", "no.toml"], "no.toml: cannot be read: No such file"),
+        (["assembly", "solve", "irsbot2", "--pose", "tx"], '--pose: found "tx"'),
+        (["assembly", "solve", "irsbot2", "--pose", "q=1"], 'unknown component "q"'),
+        (["assembly", "solve", "irsbot2", "--pose", "tx=nan"], "--pose tx: found nan"),
+        (["assembly", "solve", "irsbot2", "--pose", "tz=-9"], "cannot be reached"),
+        (["assembly", "solve", "irsbot2", "--pose", "tx=0", "--joint", "leg1.drive=0"],
+         "found both a pose and joints"),
+        (["assembly", "solve", "irsbot2", "--joint", "leg1.elbow=1"],
+         'no actuated joint "leg1.elbow"'),
+        (["assembly", "solve", "irsbot2", "--load", "f=1"], '--load: unknown'),
+        (["assembly", "solve", "irsbot2", "--json", "/nowhere/x.json"],
+         "/nowhere/x.json: "),
+        (["assembly", "error", "irsbot2", "--reading", "fre"], '--reading: found'),
+        (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
+         "--tolerance-rotation: found -1.0, expected a finite number > 0"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
+         "grid tx: step 0"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
+         "/nowhere/x.nc: no folder /nowhere"),
+        (["assembly", "solve", "irsbot2", "--poze", "tx=0"], "--poze"),
+        (["assembly", "solve"], "ROBOT"),
+        (["study", "no.toml"], "no.toml: cannot be read: No such file or directory"),
+        (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_message_and_exit_status_2(run, tmp_path, monkeypatch, words,
+                                                    message):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(*words)
+    assert status == 2
+    assert out == ""
+    assert message in err
+    assert err.startswith("forcefit: ")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_command_explains_itself(run):
+    for words in ([], ["study"], ["assembly"], ["assembly", "solve"], ["stiffness"],
+                  ["stiffness", "fea"], ["validation", "crosscheck"]):  # fmt: skip
+        status, out, err = run(*words, "--help")
+        assert status == 0
+        assert "Usage: forcefit" in out
+        assert err == ""
+
+
+def test_the_installed_command_refuses_without_a_traceback():
+    done = subprocess.run([sys.executable, "-m", "forcefit", "assembly", "solve", "x"],
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith('forcefit: "x": neither a built-in robot nor a file')
+    assert done.stdout == ""
