@@ -113,6 +113,7 @@ def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
     plotter.add_text(said, font_size=9, name="caption")
     plotter.add_axes()
     plotter.view_vector((0.55, -1.0, 0.35))
+    plotter.camera.zoom(1.5)
     return plotter
 
 

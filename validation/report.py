@@ -68,6 +68,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "links": results.study.source,
         "passed": results.passed,
         "solution": results.solution,
+        "error": results.error,
         "reference": results.reference,
         "stiffness": results.stiffness,
     }
@@ -164,7 +165,7 @@ def verdict(results: StudyResults) -> str:
 def _solution(results: StudyResults) -> str:
     """The assembly at the study's pose, with its certificate."""
     solution = results.solution
-    pose = ", ".join(f"{k} = {v:.6g}" for k, v in solution["pose"].items())
+    pose = ", ".join(f"{k} = {round(v, 9):g}" for k, v in solution["pose"].items())
     parts = [f"<h2>Assembly at one pose</h2><p>Nominal pose: {pose} [m, rad].</p>"]
     rows = [[k, str(v)] for k, v in solution["mobility"].items()]
     zone = solution.get("zone", {})
@@ -179,7 +180,26 @@ def _solution(results: StudyResults) -> str:
     parts.append(_table(["quantity", "value"], rows))
     if solution["status"] == "ok":
         parts.append(_wrenches(results))
+    if results.error:
+        parts.append(_pose_error(results))
     return "".join(parts)
+
+
+def _pose_error(results: StudyResults) -> str:
+    """Bounds of (27) in each reading."""
+    rows = []
+    for reading, found in results.error.items():
+        row = [reading]
+        for key in ("rotation", "translation"):
+            row += [f"{1e3 * found[key][side]:.6g}" for side in ("lower", "upper")]
+        rows.append(row)
+    head = ["reading", "rotation >=", "<= [mrad]", "translation >=", "<= [mm]"]
+    return (
+        "<p>Largest error of the platform's pose, problem (27), between certified "
+        "bounds. Frozen: deformations stay as they are. Free: compliant joints also "
+        "turn about their own axis. Budget: all that closes with 5 % more energy.</p>"
+        + _table(head, rows)
+    )
 
 
 def _wrenches(results: StudyResults) -> str:
@@ -222,11 +242,11 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
     name, found = next(iter(stiffness.items()))
     alike = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
     rows = []
-    for i, j in zip(*np.nonzero(np.triu(np.abs(found["beam"]) > 0)), strict=True):
+    for i, j in zip(*np.nonzero(np.triu(_significant(found["beam"]))), strict=True):
         beam, fea = found["beam"][i, j], found["fea"][i, j]
         rows.append([f"{SCREW[i]}, {SCREW[j]}", f"{beam:.6g}", f"{fea:.6g}",
                      f"{100 * (fea / beam - 1):+.2f} %"])  # fmt: skip
-    count = found["mesh"].get("tetrahedra", "?")
+    count = found["mesh"].get("elements", "?")
     return (
         f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
         f"{html.escape(name)}{alike}, {count} quadratic tetrahedra, estimated error "
@@ -239,6 +259,12 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
         )
         + _figure(stiffness_figure(found["beam"], found["fea"]), "K_E entry by entry.")
     )
+
+
+def _significant(K: NDArray) -> NDArray:
+    """(6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
+    size = np.sqrt(np.diag(K))
+    return np.abs(K) > 1e-3 * np.outer(size, size)
 
 
 def _maps(results: StudyResults) -> str:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.energy import Assembly, solve_assembly
+from assembly.pose_error import READINGS
 from assembly.posture import POSE, Posture, place_robot
-from assembly.results import solution_of
+from assembly.results import pose_error_of, solution_of
 from assembly.robot import BeamLink, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweep import parse_grid, sweep_poses
@@ -66,6 +67,7 @@ class StudyResults:
         robot: with the links used.
         solution: keys of ``assembly solve`` at the study's pose.
         answer: the assembly behind it, None if it cannot be assembled.
+        error: bounds of (27) by reading, as ``assembly error`` gives them.
         reference: energy, pose error and margins by the transcription in cvxpy, and
             the largest relative differences.
         stiffness: by frame: K_E of the beam and of the finite elements.
@@ -78,6 +80,7 @@ class StudyResults:
     robot: Robot
     solution: dict[str, Any]
     answer: Assembly | None
+    error: dict[str, Any]
     reference: dict[str, Any] | None
     stiffness: dict[str, dict[str, Any]] | None
     maps: Any
@@ -262,6 +265,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     solution = solution_of(posture)
     solved = solution["status"] == "ok"
     answer = solve_assembly(posture) if solved else None
+    error = pose_error_of(posture, READINGS)["error"] if solved else None
     progress("assembly", 1, 1)
     reference = None
     if "reference" in wanted and answer is not None:
@@ -275,7 +279,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         check, failure = try_crosscheck(posture, study.scales)
         progress("cross-check", 1, 1)
     return StudyResults(
-        study, robot, solution, answer, reference, stiffness, maps, check,
+        study, robot, solution, answer, error or {}, reference, stiffness, maps, check,
         failure.get("reason", ""),
     )  # fmt: skip
 
