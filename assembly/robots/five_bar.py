@@ -20,7 +20,7 @@ class Parameters:
     """Numbers of the robot [m]; aluminium arms, small ball bearings."""
 
     base: float = 0.120  # between the drives, on the x axis
-    home: tuple[float, float] = (0.0, 0.110)
+    home: tuple[float, float] = (0.0, 0.140)
     leg: PlanarLeg = PlanarLeg(
         near=0.090,
         far=0.090,
