@@ -396,6 +396,18 @@ REFUSED = {
         BEAM,
         mesh(tip="{ plane = { point = [0, 0, 0], normal = [0, 0, 1] }, raduis = 1 }"),
         'frame "coupler".link.mesh.tip: unknown key "raduis"; did you mean "radius"?'),
+    "a bore with an unknown key": (
+        BEAM,
+        mesh(tip="{ bore = { point = [0,0,0], axis = [0,1,0], radius = 1, h = 2 } }"),
+        'frame "coupler".link.mesh.tip.bore: unknown key "h"; valid: axis, point, '
+        "radius"),
+    "a mesh with an unknown key": (
+        BEAM, mesh(more=", units = 1"),
+        'frame "coupler".link.mesh: unknown key "units"; did you mean "unit"?'),
+    "a stiffness beyond any machine": (
+        LINK, f"link = {{ stiffness = {rows({(2, 2): 1e50})} }}",
+        'frame "coupler".link.stiffness: found 1e+50 as term [2, 2], expected between '
+        "1e-40 and 1e+40"),
     "a unit that is none": (
         BEAM, mesh(more=', unit = "mmm"'),
         "frame \"coupler\".link.mesh.unit: found 'mmm', expected \"m\" | "),
@@ -635,6 +647,17 @@ def test_a_robot_written_elsewhere_finds_its_mesh_again(write_file, tmp_path):
     assert again.resolve() == (tmp_path / "x.stl").resolve()
 
 
+def test_a_relative_path_is_written_as_it_leads_from_the_new_file(
+    write_file, tmp_path, monkeypatch
+):
+    """Read from where the file lies, written one folder further down."""
+    write_file(FOUR_BAR.replace(BEAM, mesh()))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    write_robot(read_robot("robot.toml"), "out/b.toml")
+    assert 'surface = "../x.stl"' in (tmp_path / "out/b.toml").read_text()
+
+
 @pytest.mark.parametrize("text", [FOUR_BAR, SLIDER], ids=["four_bar", "slider"])
 def test_what_is_written_reads_as_the_same_robot(text, write_file, tmp_path):
     robot = read_robot(write_file(text))
@@ -701,7 +724,7 @@ links = st.one_of(
         up=st.none() | st.just((0.0, 1.0, 2.0)),
     ),
     diagonals.map(lambda d: MatrixLink(np.diag(d))),
-    st.builds(LibraryLink, st.just(Path("/a b/c.nc")), names),
+    st.builds(LibraryLink, st.just(Path("/a #b/c.nc")), st.sampled_from(["k", "ü"])),
     st.builds(
         MeshLink, st.just(Path("/meshes/ü.stl")), interfaces, interfaces, **material,
         unit=st.sampled_from(["m", "mm"]), up=st.just((1.0, 0.0, 0.0)),
