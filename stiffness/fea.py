@@ -263,6 +263,9 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
+    # single precision of STL: exactly onto the plane that was asked for
+    height = (center - interface.point) @ interface.direction
+    center = center - height * interface.direction
     return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
 
 

@@ -8,10 +8,13 @@ pytetwild is slow, and never makes the same mesh twice.
 """
 
 import hashlib
+import io
 import os
 import subprocess
 import sys
 import tempfile
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,9 +117,9 @@ def cache_folder() -> Path:
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
     """Points and cells of a cached mesh; None if absent or damaged."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
     proper = points.ndim == 2 and cells.ndim == 2 and np.isfinite(points).all()
     return (points, cells) if proper and cells.max() < len(points) else None

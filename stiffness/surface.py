@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from stiffness.reading import BadInput, describe, nearest
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
+UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
 _LARGEST_LINK = 20.0  # [m] diagonal; beyond it the unit is taken to be wrong
 _SMALLEST_LINK = 1e-3  # [m]

@@ -1,0 +1,86 @@
+"""Surfaces and tetrahedra made by formula, so that no test hangs on one mesh."""
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from stiffness.mesh import Solid, boundary_faces
+from stiffness.shapes import Cone, Plane
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
+    """Closed faceted cylinder or cone along z: points and triangles."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    tip_radius = radius if tip_radius is None else tip_radius
+    top = tip_radius * ring + [0, 0, length]
+    points = np.concatenate([radius * ring, top, [[0, 0, 0], [0, 0, length]]])
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    low, high = np.full(facets, 2 * facets), np.full(facets, 2 * facets + 1)
+    triangles = np.concatenate([
+        np.column_stack([i, j, j + facets]),
+        np.column_stack([i, j + facets, i + facets]),
+        np.column_stack([low, j, i]),
+        np.column_stack([high, i + facets, j + facets]),
+    ])
+    return points, triangles
+
+
+def box_cells(counts):
+    """Six tetrahedra in each of nx by ny by nz boxes (Kuhn): grid points and cells."""
+    sizes = np.array(counts) + 1
+    grid = np.stack(np.meshgrid(*map(np.arange, sizes), indexing="ij"), axis=-1)
+    corner = np.arange(np.prod(sizes)).reshape(sizes)[:-1, :-1, :-1].ravel()
+    step = np.array([sizes[1] * sizes[2], sizes[2], 1])
+    cells = []
+    for order in ([0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]):
+        path = np.cumsum(step[order])
+        cells.append(np.column_stack([corner, *(corner + p for p in path)]))
+    return grid.reshape(-1, 3) / np.array(counts), np.concatenate(cells)
+
+
+def outward(points, cells):
+    """Cells turned so that every volume is positive."""
+    a, b, c, d = np.moveaxis(points[cells], 1, 0)
+    turned = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) < 0
+    cells = cells.copy()
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    return cells
+
+
+def box_solid(counts, size):
+    """A box of some size from the origin; its sides are patch 2, of no known shape."""
+    unit, cells = box_cells(counts)
+    return _solid(unit * size, cells, size[2], None)
+
+
+def bar_solid(rings, layers, radius, length):
+    """A round bar: discs of rings of 6, 12, 18 ... nodes, extruded; side known."""
+    steps = [np.arange(6 * k) / (6 * k) for k in range(1, rings + 1)]
+    spokes = [np.exp(2j * np.pi * t) * k / rings for k, t in enumerate(steps, 1)]
+    disc = radius * np.concatenate([[0], *spokes])
+    flat = np.column_stack([disc.real, disc.imag])
+    triangles = np.sort(Delaunay(flat).simplices, axis=1)
+    count = len(flat)
+    points = np.concatenate([
+        np.insert(flat, 2, z, axis=1) for z in np.linspace(0, length, layers + 1)
+    ])
+    a, b, c = triangles.T
+    up = np.array([a, b, c]) + count
+    # a prism cut along the diagonals that start at its smallest node numbers
+    prism = [np.column_stack(t) for t in ((a, b, c, up[2]), (a, b, up[1], up[2]),
+                                          (a, up[0], up[1], up[2]))]  # fmt: skip
+    cells = np.concatenate([t + k * count for k in range(layers) for t in prism])
+    return _solid(points, cells, length, Cone(np.zeros(3), Z, radius))
+
+
+def _solid(points, cells, length, side):
+    """Base at z = 0, tip at z = length, everything else the side."""
+    cells = outward(points, cells)
+    faces = boundary_faces(cells)
+    height = points[faces][..., 2] / length
+    on = [(np.abs(height - v) < 1e-12).all(axis=1) for v in (0, 1)]
+    patch = np.where(on[0], 0, np.where(on[1], 1, 2))
+    planes = Plane(np.zeros(3), Z), Plane(length * Z, Z)
+    return Solid(points, cells, faces, patch, (*planes, side))
