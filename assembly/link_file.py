@@ -15,13 +15,13 @@ from assembly.robot import (
     MeshLink,
 )
 from stiffness.reading import Table, describe, quoted
+from stiffness.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] below any machine
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
 )
-UNITS = ("m", "dm", "cm", "mm", "um", "in", "ft")
 _KINDS = ("beam", "stiffness", "mesh", "library")
 _MATERIAL = ("young", "poisson", "density")
 _SECTIONS: dict[str, dict[str, str]] = {  # what each kind is given by, and its unit

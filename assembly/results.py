@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
@@ -117,19 +117,23 @@ def pose_error_of(
         return results | {"status": "cannot assemble", "reason": str(error)}
     except SolverFailed as error:
         return results | {"status": "solver failed", "reason": str(error)}
-    table = {}
-    for one in found:
-        bounds = {"rotation": one.rotation_error, "translation": one.translation_error}
-        table[one.reading] = {
-            key: {"lower": low, "upper": high} for key, (low, high) in bounds.items()
+    table = {
+        one.reading: {
+            "rotation": _bracket(one.rotation_error, one.rotation_screw),
+            "translation": _bracket(one.translation_error, one.translation_screw),
+            "cuts": one.cuts,
         }
-        table[one.reading]["rotation"]["platform_screw"] = one.rotation_screw
-        table[one.reading]["translation"]["platform_screw"] = one.translation_screw
-        table[one.reading]["cuts"] = one.cuts
+        for one in found
+    }
     certificate = {"relative_gap": answer.relative_gap()}
     return results | {
         "energy": answer.energy, "error": table, "certificate": certificate
     }  # fmt: skip
+
+
+def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
+    """Two bounds, and the platform screw that attains the lower."""
+    return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
 def pose_error_text(results: dict[str, Any]) -> str:

@@ -165,7 +165,9 @@ def verdict(results: StudyResults) -> str:
 def _solution(results: StudyResults) -> str:
     """The assembly at the study's pose, with its certificate."""
     solution = results.solution
-    pose = ", ".join(f"{k} = {round(v, 9):g}" for k, v in solution["pose"].items())
+    pose = ", ".join(
+        f"{k} = {round(v, 9) + 0.0:g}" for k, v in solution["pose"].items()
+    )
     parts = [f"<h2>Assembly at one pose</h2><p>Nominal pose: {pose} [m, rad].</p>"]
     rows = [[k, str(v)] for k, v in solution["mobility"].items()]
     zone = solution.get("zone", {})
@@ -241,24 +243,30 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
 
     name, found = next(iter(stiffness.items()))
     alike = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
-    rows = []
-    for i, j in zip(*np.nonzero(np.triu(_significant(found["beam"]))), strict=True):
-        beam, fea = found["beam"][i, j], found["fea"][i, j]
-        rows.append([f"{SCREW[i]}, {SCREW[j]}", f"{beam:.6g}", f"{fea:.6g}",
-                     f"{100 * (fea / beam - 1):+.2f} %"])  # fmt: skip
+    fea, euler, timoshenko = (found[k] for k in ("fea", "euler", "timoshenko"))
+    rows = [
+        [f"{SCREW[i]}, {SCREW[j]}", f"{euler[i, j]:.6g}", f"{timoshenko[i, j]:.6g}",
+         f"{fea[i, j]:.6g}", f"{100 * (fea[i, j] / timoshenko[i, j] - 1):+.2f} %"]
+        for i, j in zip(*np.nonzero(np.triu(_significant(euler))), strict=True)
+    ]  # fmt: skip
     count = found["mesh"].get("elements", "?")
     return (
         f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
         f"{html.escape(name)}{alike}, {count} quadratic tetrahedra, estimated error "
         f"{100 * found['relative_error_estimate']:.2g} %. A solid held at a "
         "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
-        "shear (Euler-Bernoulli) is stiffer still: a few per cent between the two "
-        "columns are physics, not an error.</p>"
+        "shear (Euler-Bernoulli) is stiffer than one with it: a few per cent between "
+        "the columns are physics, not an error.</p>"
         + _table(
-            ["entry [N m/rad .. N/m]", "beam", "finite elements", "difference"], rows
+            ["entry [N m/rad .. N/m]", "Euler-Bernoulli", "Timoshenko",
+             "finite elements", "to Timoshenko"],
+            rows,
         )
-        + _figure(stiffness_figure(found["beam"], found["fea"]), "K_E entry by entry.")
-    )
+        + _figure(
+            stiffness_figure(timoshenko, fea),
+            "Finite elements minus Timoshenko beam, entry by entry.",
+        )
+    )  # fmt: skip
 
 
 def _significant(K: NDArray) -> NDArray:

@@ -14,16 +14,20 @@ from numpy.typing import NDArray
 
 from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.energy import Assembly, solve_assembly
+from assembly.links import link_compliance
+from assembly.mesh_link import mesh_link_stiffness
 from assembly.pose_error import READINGS
 from assembly.posture import POSE, Posture, place_robot
 from assembly.results import pose_error_of, solution_of
-from assembly.robot import BeamLink, MatrixLink, MeshLink, Robot
+from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweep import parse_grid, sweep_poses
 from stiffness.reading import BadInput, Table, read_toml
+from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
 
 Progress = Callable[[str, int, int], None]
+THEORIES = ("euler", "timoshenko")
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
 
 
@@ -195,14 +199,14 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
             raise table.bad("surface", f"no such file: {surface}")
         beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
         wanted = _frames(table, robot, [f.name for f in beams])
-        given = {k: table.text(k) for k in ("base", "tip")}
-        unit = table.choice("unit", ("m", "mm"), "m")
+        base, tip = table.text("base"), table.text("tip")
+        unit = table.choice("unit", UNITS, "m")
         for frame in beams:
             link = frame.link
             if frame.name in wanted and isinstance(link, BeamLink):
-                material = (link.young, link.poisson, link.density)
-                meshes[frame.name] = MeshLink(surface, **given, young=material[0],
-                    poisson=material[1], density=material[2], unit=unit)  # fmt: skip
+                meshes[frame.name] = MeshLink(
+                    surface, base, tip, link.young, link.poisson, link.density, unit
+                )
     elif source == "fea":
         raise table.bad("surface", 'missing; expected the surface file of source "fea"')
     table.finish()
@@ -288,21 +292,15 @@ def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
     """Beam and finite elements side by side; links replaced where asked."""
-    from assembly.links import link_compliance
-    from assembly.mesh_link import mesh_link_stiffness
-
     compared: dict[str, dict[str, Any]] = {}
     found: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):
         progress("finite elements", done, len(study.meshes))
         frame = study.robot.frame(name)
-        beam = np.linalg.inv(link_compliance(frame))
         solved = mesh_link_stiffness(replace(frame, link=mesh), study.accuracy)
-        size = np.sqrt(np.diag(beam))
         compared[name] = {
-            "beam": beam,
+            **_beams(frame),
             "fea": solved.stiffness,
-            "relative_difference": (solved.stiffness - beam) / np.outer(size, size),
             "relative_error_estimate": solved.relative_error_estimate,
             "mesh": dict(solved.mesh),
         }
@@ -312,6 +310,16 @@ def _compare_links(
         study.robot.with_links(dict(found)) if study.source == "fea" else study.robot
     )
     return compared, robot
+
+
+def _beams(frame: Frame) -> dict[str, NDArray]:
+    """K_E of a frame's beam by both theories."""
+    assert isinstance(frame.link, BeamLink)
+    links = {name: replace(frame.link, theory=name) for name in THEORIES}
+    return {
+        name: np.linalg.inv(link_compliance(replace(frame, link=link)))
+        for name, link in links.items()
+    }
 
 
 def _compare_reference(
