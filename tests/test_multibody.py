@@ -171,6 +171,16 @@ def test_an_infinite_stiffness_locks_its_axis():
     np.testing.assert_allclose(answer.joint_screws[0], 1e-6 * np.eye(6)[2], atol=1e-14)
 
 
+def test_a_passive_joint_with_an_infinite_spring_does_not_move():
+    K = np.diag([np.inf] * 6)
+    frames = (
+        Frame("pin", joint="revolute", joint_stiffness=K),
+        Frame("tip", "pin", translation=[0.3, 0, 0]),
+    )
+    answer = simulate_assembly(home_posture(Robot("pin", "tip", frames)), load=6 * [1])
+    assert not answer.platform_screw.any()
+
+
 def test_a_serial_chain_composes_its_errors_exactly():
     """Placement, error, own motion, frame by frame; errors of 0.3 rad, not small."""
     error = np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.03])

@@ -32,7 +32,7 @@ from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.links import link_compliance
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
-from assembly.robot import BeamLink, Frame, Robot
+from assembly.robot import BeamLink, Clearance, Frame, Robot
 from stiffness.reading import BadInput
 from validation.multibody import (
     MultibodyAssembly,
@@ -160,43 +160,15 @@ class Crosscheck:
         all frames that have such a spring; nothing is asked below :data:`FLOOR` and
         what it does to the stiffest spring.
         """
-        frames = self.posture.robot.frames
-        links = [frame.link is not None for frame in frames]
-        joints = [frame.joint_stiffness is not None for frame in frames]
-        stiff = _stiffest(self.posture)
-        screw = np.array([FLOOR["rotation"], FLOOR["translation"]])
+        ours = np.array([p.linear.platform_screw for p in self.pairs])
+        theirs = np.array([p.simulated.platform_screw for p in self.pairs])
         limits = {}
-        for name, simulated, linear, rows, floor in (
-            ("platform", "platform_screw", "platform_screw", None, screw),
-            ("link", "link_screws", "link_screws", links, screw),
-            ("joint", "joint_screws", "joint_screws", joints, screw),
-            ("link", "link_wrenches", "wrenches", links, stiff * screw),
-            ("joint", "joint_wrenches", "wrenches", joints, stiff * screw),
-        ):
-            ours = np.array([getattr(p.linear, linear) for p in self.pairs])
-            theirs = np.array([getattr(p.simulated, simulated) for p in self.pairs])
-            if rows is not None:
-                ours, theirs = ours[:, rows], theirs[:, rows]
-            halves = ("moment", "force") if linear == "wrenches" else tuple(_HALVES)
-            for label, half, least in zip(halves, _HALVES.values(), floor, strict=True):
-                value = self._limit(ours[..., half], theirs[..., half], 1, least)
-                if value is not None:
-                    limits[f"{name} {label}"] = value
-        ours = np.array([[p.linear.energy] for p in self.pairs])
-        theirs = np.array([[p.simulated.energy] for p in self.pairs])
-        value = self._limit(ours, theirs, 2, float((stiff * screw**2).max()))
-        return limits | {"energy": value or 0.0}
-
-    def _limit(
-        self, ours: NDArray, theirs: NDArray, power: int, floor: float
-    ) -> float | None:
-        """Relative difference at no error of (k, ...) values; None without any."""
-        if not ours.size:
-            return None
-        weight = self.scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -power
-        gap = np.abs(extrapolate(self.scales, (theirs - ours) * weight)).max()
-        size = max(np.abs(ours * weight).max(), floor / LIMIT_TOLERANCE)
-        return float(gap / size) if size > 0 else float(gap)
+        for name, half in _HALVES.items():
+            value = limit_difference(
+                self.scales, ours[:, half], theirs[:, half], 1, FLOOR[name]
+            )
+            limits[f"platform {name}"] = value
+        return limits | spring_limits(self.posture.robot, self.pairs)
 
     @cached_property
     def checks(self) -> dict[str, tuple[float, float]]:
@@ -286,39 +258,141 @@ def crosscheck(
         CannotAssemble: the virtual-joint model has none.
         FreeMotion: the load drives a motion that nothing resists.
     """
-    factors = sorted({float(s) for s in scales}, reverse=True)
-    if len(factors) < 2 or not all(0 < s < np.inf for s in factors):
-        raise BadInput(
-            f"scale: found {list(scales)}, expected at least two different factors > 0"
-        )
+    factors = check_scales(scales)
     tight = replace(posture, robot=without_clearance(posture.robot))
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    stiffness = _link_stiffnesses(tight, links)
+    stiffness = link_stiffnesses(tight.robot, links)
     pairs = []
     for s in factors:
-        robot = tight.robot.with_errors(s * tight.robot.errors)
-        linear = solve_assembly(replace(tight, robot=robot), s * wrench)
+        linear = solve_assembly(scaled(tight, s), s * wrench)
         simulated = simulate_assembly(tight, s, links, stiffness, s * wrench)
         pairs.append(Pair(s, linear, simulated))
     return Crosscheck(tight, wrench, links, tuple(pairs))
 
 
-def _link_stiffnesses(posture: Posture, links: str) -> Mapping[str, NDArray]:
-    """K_E of the links that the simulation will model as springs."""
+def scaled(posture: Posture, scale: float) -> Posture:
+    """The same posture with all imperfections times a factor.
+
+    Args:
+        posture: nominal.
+        scale: on geometric errors and clearances.
+
+    Returns:
+        A posture of another robot.
+    """
+
+    def smaller(frame: Frame) -> Frame:
+        given = frame.clearance
+        if given is not None:
+            bounds = {k: v if v is None else scale * v for k, v in vars(given).items()}
+            given = Clearance(**bounds)
+        error = scale * frame.geometric_error
+        return replace(frame, geometric_error=error, clearance=given)
+
+    frames = tuple(smaller(frame) for frame in posture.robot.frames)
+    return replace(posture, robot=replace(posture.robot, frames=frames))
+
+
+def spring_limits(robot: Robot, pairs: Sequence[Pair]) -> dict[str, float]:
+    """Differences of springs and energy, extrapolated to no error.
+
+    Args:
+        robot: whose links and joint springs are looked at.
+        pairs: both answers at several scales.
+
+    Returns:
+        By name, relative to the largest among all links or all joints; see
+        :func:`limit_difference`.
+    """
+    scales = np.array([pair.scale for pair in pairs])
+    stiff = _stiffest(robot)
+    screw = np.array(list(FLOOR.values()))
+    limits = {}
+    for kind, part in (("link", "link"), ("joint", "joint_stiffness")):
+        rows = [getattr(frame, part) is not None for frame in robot.frames]
+        if not any(rows):
+            continue
+        for what, linear, floor, labels in (
+            ("screws", f"{kind}_screws", screw, ("rotation", "translation")),
+            ("wrenches", "wrenches", stiff * screw, ("moment", "force")),
+        ):
+            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs])
+            name = f"{kind}_{what}"
+            theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
+            for label, half, least in zip(labels, _HALVES.values(), floor, strict=True):
+                limits[f"{kind} {label}"] = limit_difference(
+                    scales, ours[..., half], theirs[..., half], 1, least
+                )
+    ours = np.array([pair.linear.energy for pair in pairs])
+    theirs = np.array([pair.simulated.rigid_energy for pair in pairs])
+    least = float((stiff * screw**2).max())
+    return limits | {"energy": limit_difference(scales, ours, theirs, 2, least)}
+
+
+def limit_difference(
+    scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float
+) -> float:
+    """Largest difference as the scale goes to 0, relative to the largest value.
+
+    Args:
+        scales: (k,) all different.
+        ours: (k, ...) values that fall as a power of the scale.
+        theirs: (k, ...) values to compare.
+        power: of the scale.
+        floor: differences below it, in the values' unit, are noise.
+
+    Returns:
+        [-] at most :data:`LIMIT_TOLERANCE` if only noise is left.
+    """
+    weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
+    gap = np.abs(extrapolate(scales, (theirs - ours) * weight)).max()
+    size = max(np.abs(ours * weight).max(), floor / LIMIT_TOLERANCE)
+    return float(gap / size) if size > 0 else float(gap)
+
+
+def check_scales(scales: Sequence[float]) -> list[float]:
+    """Scales from which a slope can be read, largest first.
+
+    Args:
+        scales: factors on errors, clearances and load.
+
+    Returns:
+        Those that differ, sorted.
+
+    Raises:
+        BadInput: fewer than two, or one that is not finite and > 0.
+    """
+    factors = sorted({float(s) for s in scales}, reverse=True)
+    if len(factors) < 2 or not all(0 < s < np.inf for s in factors):
+        raise BadInput(
+            f"scale: found {list(scales)}, expected at least two different factors > 0"
+        )
+    return factors
+
+
+def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
+    """K_E of the links that a simulation will model as springs.
+
+    Args:
+        robot: any.
+        links: ``"beam"``, where beams need none, or ``"spring"``.
+
+    Returns:
+        By frame, (6, 6) [N m/rad .. N/m] in its axes.
+    """
     return {
         frame.name: _stiffness(frame)
-        for frame in posture.robot.frames
+        for frame in robot.frames
         if frame.link is not None
         and (links == "spring" or not isinstance(frame.link, BeamLink))
     }
 
 
-def _stiffest(posture: Posture) -> NDArray:
+def _stiffest(robot: Robot) -> NDArray:
     """(2,) [N m/rad, N/m] the largest stiffness of any spring to turns and shifts."""
-    frames = posture.robot.frames
     diagonals = [np.zeros(6)]
-    diagonals += [np.diag(_stiffness(f)) for f in frames if f.link is not None]
-    joints = [f.joint_stiffness for f in frames if f.joint_stiffness is not None]
+    diagonals += [np.diag(_stiffness(f)) for f in robot.frames if f.link is not None]
+    joints = [f.joint_stiffness for f in robot.frames if f.joint_stiffness is not None]
     diagonals += [np.diag(np.where(np.isfinite(K), K, 0.0)) for K in joints]
     return np.max(diagonals, axis=0).reshape(2, 3).max(axis=1)
 

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from validation.contact import NARROW, WIDE, Play, cone_energy, cone_push
 from validation.motion import exponential, inverse, logarithm, matrix, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
-_CLOSING = np.diag([1e10] * 6)  # [N m/rad, N/m] of the connectors that shut closures
+CLOSING = (1e10,)  # [N m/rad, N/m] of the connectors that shut closures, in turn
+CLOSING_CONTACTS = (1e12, 1e11)  # the same beside contacts: hardly softer than these
 _SHUT = 1e-12  # [rad, m] largest component a closure may keep open
 _LOAD_STEPS = 4
 _CLOSING_STEPS = 30
+_NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
+_CENTRING = 1e3  # [N/m] of bounded play; 1e-3 of it in N m/rad, 1e-6 about own axes
 _NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
 
 
@@ -98,16 +102,32 @@ class Closure:
     shut: NDArray
 
 
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A joint with play between two places.
+
+    Attributes:
+        near: place on the inner body.
+        far: place on the outer body.
+        play: how it may move.
+    """
+
+    near: Place
+    far: Place
+    play: Play
+
+
 class Model:
     """An Exudyn model: what it is built of, how it is solved, what can be read."""
 
-    def __init__(self, exudyn: Any, items: Any, robot: str) -> None:
+    def __init__(self, exudyn: Any, items: Any, robot: str, closing: float) -> None:
         self.exu, self.item = exudyn, items
-        self.robot = robot
+        self.robot, self.closing = robot, closing
         self.container = self.exu.SystemContainer()
         self.mbs = self.container.AddSystem()
         ground = self.mbs.AddObject(self.item.ObjectGround())
         self.ground = Place(int(ground), np.eye(4), np.eye(4))
+        self.width = WIDE  # [-] of the contacts' smoothing
 
     def discard(self) -> None:
         """Give the memory back; Exudyn keeps models and user functions otherwise."""
@@ -143,6 +163,29 @@ class Model:
         spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
         return Elastic(place, far, (spring,))
 
+    def add_contact(self, place: Place, play: Play) -> Contact:
+        """A new body at the place that may play; a weak spring centres it."""
+        rows = np.array(play.loose, dtype=int)
+        centring = np.full(6, np.inf)
+        centring[rows] = _CENTRING * np.where(rows < 3, 1e-3, 1.0)
+        centring[2] *= 1e-3
+        spring = self.add_spring(place, np.diag(centring))
+        weak = np.where(np.isfinite(centring), centring, 0.0).tolist()
+
+        def push(mbs: Any, t: float, item: int, shift: Any, turn: Any, *_: Any) -> Any:
+            screw = [*turn, *shift]
+            wrench = [k * s for k, s in zip(weak, screw, strict=True)]
+            for cone in play.cones:
+                offsets = [screw[row] for row in cone.rows]
+                pushes = cone_push(cone, offsets, self.width)
+                for row, value in zip(cone.rows, pushes, strict=True):
+                    wrench[row] += value
+            return wrench[3:] + wrench[:3]
+
+        name = "springForceTorqueUserFunction"
+        self.mbs.SetObjectParameter(spring.parts[0], name, push)
+        return Contact(place, spring.far, play)
+
     def add_beam(
         self, base: Place, length: float, K: NDArray, elements: int
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:
@@ -166,7 +209,8 @@ class Model:
         """A connector that is stress-free while the closure is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
-        connector = self._connect([marker, self.add_marker(second)], _CLOSING)
+        markers = [marker, self.add_marker(second)]
+        connector = self._connect(markers, np.eye(6) * self.closing)
         return Closure(first, second, marker, connector, shut)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
@@ -176,29 +220,40 @@ class Model:
         for kind, vector in ((torque, wrench[:3]), (force, wrench[3:])):
             self.mbs.AddLoad(kind(markerNumber=marker, loadVector=vector.tolist()))
 
-    def solve(self, closures: list[Closure]) -> None:
-        """Pull the closures shut in steps, then shift their targets until they are."""
+    def solve(self, closures: list[Closure], narrow: bool = False) -> None:
+        """Pull the closures shut in steps, then shift their targets until they are.
+
+        Args:
+            closures: to be shut.
+            narrow: whether there are contacts, whose smoothing is to shrink in between.
+
+        Raises:
+            SimulationFailed: no equilibrium was found.
+        """
         opened = [logarithm(inverse(c.shut) @ self._gap(c)) for c in closures]
-        extra = [np.zeros(6) for _ in closures]
+        shift = np.zeros((2, len(closures), 6))  # of the targets, at 2 times
 
         def pull(mbs: Any, t: float) -> bool:
-            for closure, screw, more in zip(closures, opened, extra, strict=True):
-                still = exponential(max(0.0, 1.0 - t) * screw) @ exponential(more)
-                local = closure.first.local @ closure.shut @ still
-                mbs.SetMarkerParameter(
-                    closure.marker, "localHT", self._transform(local)
-                )
+            self.width = WIDE * (NARROW / WIDE) ** min(max(t - 1.0, 0.0), 1.0)
+            way = min(max(t - 2.0, 0.0), 1.0)
+            shifts = (1.0 - way) * shift[0] + way * shift[1]
+            for closure, screw, more in zip(closures, opened, shifts, strict=True):
+                target = exponential(max(0.0, 1.0 - t) * screw) @ exponential(more)
+                local = self._transform(closure.first.local @ closure.shut @ target)
+                mbs.SetMarkerParameter(closure.marker, "localHT", local)
             return True
 
         self.mbs.SetPreStepUserFunction(pull)
         self.mbs.Assemble()
         self._equilibrate(0.0, _LOAD_STEPS)
+        if narrow:
+            self._equilibrate(1.0, _NARROWING_STEPS)
         for _ in range(_CLOSING_STEPS):
             if self.largest_gap(closures) <= _SHUT:
                 return
-            for closure, more in zip(closures, extra, strict=True):
-                more -= self._left_open(closure)
-            self._equilibrate(1.0, 1)
+            shift[0] = shift[1]
+            shift[1] -= [self._left_open(closure) for closure in closures]
+            self._equilibrate(2.0, 1)
         raise SimulationFailed(
             self.robot,
             f"a closure stays open by {self.largest_gap(closures):.2g} rad or m: rigid "
@@ -206,7 +261,16 @@ class Model:
         )
 
     def _equilibrate(self, start: float, steps: int) -> None:
-        """Exudyn's static solver, from the last state, over one unit of its time."""
+        """Exudyn's static solver, from the last state, over one unit of its time.
+
+        Args:
+            start: 0: closures are pulled shut and loads grow; 1: contacts harden; 2:
+                the closures' targets are shifted.
+            steps: to begin with; a step that fails is cut.
+
+        Raises:
+            SimulationFailed: the shortest step fails.
+        """
         settings = self.exu.SimulationSettings()
         settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
         settings.solution.file.write = False
@@ -214,12 +278,13 @@ class Model:
         static.verboseMode = 0
         static.numberOfLoadSteps = steps
         static.loadStepStart = start
-        static.useLoadFactor = start == 0.0  # loads grow as the closures shut
+        static.useLoadFactor = start == 0.0
         static.minimumStepSize = 1e-3
         newton = static.newton
         newton.residualMode = 1  # of increments: residuals hide behind weak springs
         newton.absoluteTolerance = newton.relativeTolerance = _NEWTON_TOLERANCE
         newton.maxIterations = 25
+        newton.numericalDifferentiation.relativeEpsilon = 1e-8  # of user functions
         try:
             self.mbs.SolveStatic(settings, updateInitialValues=True)
         except self.exu.SolverError as error:
@@ -247,6 +312,14 @@ class Model:
         mbs = self.mbs
         read = mbs.GetObjectOutputBody if part.beam else mbs.GetObjectOutput
         return float(sum(read(number, kind) for number in part.parts))
+
+    def contact_energy(self, contact: Contact) -> float:
+        """[J] by which the contact's bounds yield."""
+        screw = logarithm(inverse(self.pose(contact.near)) @ self.pose(contact.far))
+        return sum(
+            cone_energy(cone, [float(screw[row]) for row in cone.rows], self.width)
+            for cone in contact.play.cones
+        )
 
     def wrench(self, part: Elastic) -> NDArray:
         """(6,) [N m, N] on the outer side, at the outer place, in its axes."""

@@ -31,7 +31,16 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
 from stiffness.beam import Section, rectangular_section, round_section
 from stiffness.reading import BadInput
-from validation.exudyn_model import Closure, Elastic, Model, Place
+from validation.contact import joint_play
+from validation.exudyn_model import (
+    CLOSING,
+    CLOSING_CONTACTS,
+    Closure,
+    Contact,
+    Elastic,
+    Model,
+    Place,
+)
 from validation.exudyn_model import SimulationFailed as SimulationFailed
 from validation.motion import (
     inverse,
@@ -74,11 +83,13 @@ class MultibodyAssembly:
         link_wrenches: (n, 6) [N m, N] what acts on the link's tip from outside.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
         joint_wrenches: (n, 6) [N m, N] what acts on their outer side.
+        clearance_screws: (n, 6) [rad, m] play, and own motions of passive joints.
         closure_wrenches: (closures, 6) [N m, N] what each closure's second chain
             exerts on its first, at the platform's nominal origin, base axes.
         transforms: (n, 4, 4) frames seen from the base, before their own motion.
         gap: [rad, m] largest component left open in a closure.
         idle_energy: [J] in the springs that hold free motions; a check, nearly zero.
+        contact_energy: [J] by which contacts yield.
         seconds: [s] taken.
     """
 
@@ -88,11 +99,18 @@ class MultibodyAssembly:
     link_wrenches: NDArray
     joint_screws: NDArray
     joint_wrenches: NDArray
+    clearance_screws: NDArray
     closure_wrenches: NDArray
     transforms: NDArray
     gap: float
     idle_energy: float
+    contact_energy: float
     seconds: float
+
+    @property
+    def rigid_energy(self) -> float:
+        """[J] energy that rigid contacts would leave, to first order of their yield."""
+        return self.energy + 2 * self.contact_energy
 
 
 def simulate_assembly(
@@ -103,6 +121,7 @@ def simulate_assembly(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     elements: int = 4,
+    clearances: bool = False,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
 
@@ -118,6 +137,7 @@ def simulate_assembly(
         gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
             weigh; other links, whose mass is not known, do not.
         elements: beam elements per link.
+        clearances: whether joints play, scaled like the errors; tight otherwise.
 
     Returns:
         The assembled robot.
@@ -131,16 +151,44 @@ def simulate_assembly(
     started = time.perf_counter()
     given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
     springs = _link_springs(posture.robot, links, given)
-    model = Model(*_import_exudyn(), posture.robot.name)
+    case = _Case(posture, scale, springs, elements, clearances)
+    *first, last = CLOSING_CONTACTS if clearances else CLOSING
+    for closing in first:
+        with contextlib.suppress(SimulationFailed):
+            return _simulate(case, closing, load, gravity, started)
+    return _simulate(case, last, load, gravity, started)
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """What is to be built; see :func:`simulate_assembly`."""
+
+    posture: Placed
+    scale: float
+    springs: Mapping[str, NDArray]
+    elements: int
+    clearances: bool
+
+
+def _simulate(
+    case: _Case,
+    closing: float,
+    load: ArrayLike | None,
+    gravity: ArrayLike | None,
+    started: float,
+) -> MultibodyAssembly:
+    """Build, load, solve, read, and give the memory back."""
+    robot = case.posture.robot
+    model = Model(*_import_exudyn(), robot.name, closing)
     try:
-        tree = _build(model, posture, scale, springs, elements)
+        tree = _build(model, case)
         if load is not None:
             wrench = np.asarray(load, dtype=float)
-            model.add_load(tree.before[posture.robot.platform], wrench)
+            model.add_load(tree.before[robot.platform], wrench)
         if gravity is not None:
-            _weigh(model, posture.robot, tree, np.asarray(gravity, dtype=float))
-        model.solve(tree.closures)
-        return _read(model, posture.robot, tree, started)
+            _weigh(model, robot, tree, np.asarray(gravity, dtype=float))
+        model.solve(tree.closures, narrow=bool(tree.contacts))
+        return _read(model, robot, tree, started)
     finally:
         model.discard()
 
@@ -188,7 +236,8 @@ class _Tree:
         before: places of the frames before their own motion.
         links: elastic bodies by frame.
         joints: joint springs by frame.
-        idle: the springs of free motions.
+        idle: the springs of free motions by frame.
+        contacts: joints with play by frame.
         closures: in the robot's order.
         platform: (4, 4) nominal platform, seen from the base.
     """
@@ -197,45 +246,46 @@ class _Tree:
     before: dict[str, Place]
     links: dict[str, Elastic]
     joints: dict[str, Elastic]
-    idle: list[Elastic]
+    idle: dict[str, Elastic]
+    contacts: dict[str, Contact]
     closures: list[Closure]
     platform: NDArray
 
 
-def _build(
-    model: Model,
-    posture: Placed,
-    scale: float,
-    springs: Mapping[str, NDArray],
-    elements: int,
-) -> _Tree:
+def _build(model: Model, case: _Case) -> _Tree:
     """The open, stress-free robot with its errors, and its closures."""
-    robot = posture.robot
+    posture, robot = case.posture, case.posture.robot
     bodies: dict[str, Place] = {}
     before: dict[str, Place] = {}
     after = {BASE: model.ground}
     links: dict[str, Elastic] = {}
     joints: dict[str, Elastic] = {}
-    idle: list[Elastic] = []
+    idle: dict[str, Elastic] = {}
+    contacts: dict[str, Contact] = {}
     for frame, q in zip(robot.frames, posture.coordinates, strict=True):
-        error = scale * frame.geometric_error
+        error = case.scale * frame.geometric_error
         place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
         place = place.moved(placement(error[:3], error[3:]))
-        if frame.name in springs:
-            links[frame.name] = model.add_spring(place, springs[frame.name])
+        if frame.name in case.springs:
+            links[frame.name] = model.add_spring(place, case.springs[frame.name])
             place = links[frame.name].far
         elif isinstance(frame.link, BeamLink):
-            links[frame.name] = _add_beam(model, place, frame, frame.link, elements)
+            links[frame.name] = _add_beam(model, place, frame, case.elements)
             place = links[frame.name].far
         bodies[frame.name] = place
+        play = joint_play(frame, case.scale)
+        if case.clearances and play.cones:
+            contacts[frame.name] = model.add_contact(place, play)
+            place = contacts[frame.name].far
         K = frame.joint_stiffness
         if K is not None and np.isfinite(np.diag(K)).any():
             joints[frame.name] = model.add_spring(place, K)
             place = joints[frame.name].far
-        elif frame.passive:
+        elif frame.passive and not frame.compliant and frame.name not in contacts:
             axes = np.arange(6) == frame.own_axis
-            idle.append(model.add_spring(place, np.diag(np.where(axes, _IDLE, np.inf))))
-            place = idle[-1].far
+            K = np.diag(np.where(axes, _IDLE, np.inf))
+            idle[frame.name] = model.add_spring(place, K)
+            place = idle[frame.name].far
         before[frame.name] = place
         after[frame.name] = place.moved(_own_motion(frame, q))
     nominal = _nominal(posture)
@@ -243,7 +293,8 @@ def _build(
     for a, b in robot.closures:
         shut = inverse(nominal[a]) @ nominal[b]  # what rounded files leave is no error
         closures.append(model.add_closure(before[a], before[b], shut))
-    return _Tree(bodies, before, links, joints, idle, closures, nominal[robot.platform])
+    platform = nominal[robot.platform]
+    return _Tree(bodies, before, links, joints, idle, contacts, closures, platform)
 
 
 def _nominal(posture: Placed) -> dict[str, NDArray]:
@@ -264,10 +315,10 @@ def _own_motion(frame: Frame, q: float) -> NDArray:
     return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
 
 
-def _add_beam(
-    model: Model, place: Place, frame: Frame, link: BeamLink, elements: int
-) -> Elastic:
+def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
     """A straight beam, clamped to the place's body so that it ends at the place."""
+    link = frame.link
+    assert isinstance(link, BeamLink)
     length, x = _span(frame, link)
     axes = matrix(_section_axes(x, link.up), np.zeros(3))
     base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
@@ -359,14 +410,21 @@ def _section(link: BeamLink) -> Section:
 def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyAssembly:
     """Everything asked of the equilibrium."""
     count = len(robot.frames)
-    screws = {"links": np.zeros((count, 6)), "joints": np.zeros((count, 6))}
-    wrenches = {"links": np.zeros((count, 6)), "joints": np.zeros((count, 6))}
-    for kind, parts in (("links", tree.links), ("joints", tree.joints)):
+    screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "play")}
+    wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}
+    kinds: tuple[tuple[str, Mapping[str, Elastic | Contact]], ...] = (
+        ("link", tree.links),
+        ("joint", tree.joints),
+        ("play", tree.idle),
+        ("play", tree.contacts),
+    )
+    for kind, parts in kinds:
         for name, part in parts.items():
             row = robot.index(name)
             relative = inverse(model.pose(part.near)) @ model.pose(part.far)
             screws[kind][row] = logarithm(relative)
-            wrenches[kind][row] = model.wrench(part)
+            if kind in wrenches and isinstance(part, Elastic):
+                wrenches[kind][row] = model.wrench(part)
     transforms = np.array([model.pose(tree.before[f.name]) for f in robot.frames])
     T = transforms[robot.index(robot.platform)]
     turn = turn_of(T[:3, :3] @ tree.platform[:3, :3].T)
@@ -376,16 +434,18 @@ def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyA
         energy=sum(
             model.energy(p) for p in (*tree.links.values(), *tree.joints.values())
         ),
-        link_screws=screws["links"],
-        link_wrenches=wrenches["links"],
-        joint_screws=screws["joints"],
-        joint_wrenches=wrenches["joints"],
+        link_screws=screws["link"],
+        link_wrenches=wrenches["link"],
+        joint_screws=screws["joint"],
+        joint_wrenches=wrenches["joint"],
+        clearance_screws=screws["play"],
         closure_wrenches=np.reshape(
             [model.closure_wrench(c, origin) for c in tree.closures], (-1, 6)
         ),
         transforms=transforms,
         gap=model.largest_gap(tree.closures),
-        idle_energy=sum(model.energy(part) for part in tree.idle),
+        idle_energy=sum(model.energy(part) for part in tree.idle.values()),
+        contact_energy=sum(map(model.contact_energy, tree.contacts.values())),
         seconds=time.perf_counter() - started,
     )
 

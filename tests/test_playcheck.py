@@ -1,0 +1,130 @@
+"""Clearances as contact: closed forms, and the linear model's cones."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.posture import home_posture, place_robot
+from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots import load_robot
+from validation.contact import Cone, Play, cone_energy, cone_push, joint_play
+from validation.multibody import simulate_assembly
+from validation.playcheck import playcheck
+
+pytestmark = pytest.mark.exudyn
+
+E, NU = 60e9, 0.3
+ROUND = BeamLink({"radius": 0.04}, E, NU)
+AREA, SECOND = math.pi * 0.04**2, math.pi * 0.04**4 / 4
+DISC = Cone((3, 4), 3e-5, 1e12)
+
+
+def coaxial(error, clearance, length=0.4):
+    """Two beams that miss each other by an error, one of them with play at its end."""
+    frames = (
+        Frame("a", translation=[length, 0, 0], rotation=[0, math.pi / 2, 0],
+              link=ROUND, geometric_error=error, clearance=clearance),
+        Frame("a_tip", "a", rotation=[0, -math.pi / 2, 0]),
+        Frame("wall", translation=[2 * length, 0, 0]),
+        Frame("b", "wall", translation=[-length, 0, 0], link=ROUND),
+    )  # fmt: skip
+    return home_posture(Robot("coaxial", "a_tip", frames, (("a_tip", "b"),)))
+
+
+def test_the_push_is_the_gradient_of_the_energy():
+    """Central differences of half a nanometre; inside, at the bound, outside."""
+    for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
+        for width in (3.0, 1e-2):
+            offsets = [0.6 * r, 0.8 * r]
+            for k in range(2):
+                step = 5e-10 * np.eye(2)[k]
+                more = cone_energy(DISC, list(offsets + step), width)
+                less = cone_energy(DISC, list(offsets - step), width)
+                push = cone_push(DISC, offsets, width)[k]
+                scale = DISC.stiffness * DISC.size
+                assert push == pytest.approx((more - less) / 1e-9, abs=2e-5 * scale)
+
+
+def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
+    """k (r - c) at first order; c is 30 um, r - c a hundredth of it."""
+    assert cone_push(DISC, [1e-5, 0.0], 1e-4)[0] < 1e-6 * 1e12 * 3e-5
+    outside = cone_push(DISC, [0.0, 3.03e-5], 1e-4)
+    assert outside[0] == 0.0
+    assert outside[1] == pytest.approx(1e12 * 3e-7, rel=0.02)
+
+
+def test_a_joints_play_follows_the_format():
+    """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
+    play = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
+    fixed = joint_play(Frame("f", clearance=play), scale=0.5)
+    assert [(c.rows, c.size) for c in fixed.cones] == [
+        ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
+    ]  # fmt: skip
+    assert fixed.free == ()
+    pin = Frame("p", joint="revolute", clearance=replace(play, spin=None))
+    assert joint_play(pin).free == (2,)
+    assert sorted(joint_play(pin).loose) == [0, 1, 2, 3, 4]
+    slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
+    assert [c.rows for c in joint_play(slide).cones] == [(3, 4), (5,)]
+    assert joint_play(Frame("none")) == Play((), ())
+
+
+@pytest.mark.parametrize("misfit", [5e-5, 1e-4])
+def test_axial_play_is_taken_off_the_misfit(misfit):
+    """E = (g - c)^2 EA / 2(2L), c = 30 um; play is along the joint's z.
+
+    A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
+    correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
+    """
+    stiffness = E * AREA / 0.8
+    answer = simulate_assembly(
+        coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)), clearances=True
+    )
+    expected = (misfit - 3e-5) ** 2 * stiffness / 2
+    allowed = 2 * 9e-9 / (misfit - 3e-5)
+    assert answer.rigid_energy == pytest.approx(expected, rel=allowed)
+
+
+def test_play_swallows_a_smaller_misfit():
+    """A lateral misfit of 20 um inside a disc of 30 um: nothing presses."""
+    tight = coaxial([0, 0, 0, 2e-5, 0, 0], None)
+    loose = coaxial([0, 0, 0, 2e-5, 0, 0], Clearance(radial=3e-5))
+    free = simulate_assembly(loose, clearances=True)
+    assert free.rigid_energy < 1e-5 * simulate_assembly(tight).energy
+    assert np.linalg.norm(free.clearance_screws[0, 3:5]) < 3e-5
+
+
+@pytest.fixture(scope="module")
+def irsbot2():
+    """Errors of the paper's size, all positive."""
+    robot = load_robot("irsbot2")
+    rng = np.random.default_rng(3)
+    errors = np.zeros((len(robot.frames), 6))
+    erring = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
+    for i, frame in enumerate(robot.frames):
+        if frame.name.split(".")[-1] in erring:
+            errors[i] = rng.uniform(0, 1, 6) * ([2e-2] * 3 + [2e-4] * 3)
+    return robot.with_errors(errors)
+
+
+def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
+    """Within 2 per cent at no error; the optimality gap falls with the square."""
+    answer = playcheck(place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25))
+    assert answer.passed, answer.checks
+    # contacts of 1e9 N m/rad yield 4e-4 of what links of 1e6 N m/rad do
+    assert answer.limits["spring deformation"] < 5e-3
+    assert answer.gaps[0] > answer.gaps[1] > answer.gaps[2] > 0
+
+
+def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
+    """Clearances a fifth larger in the linear model move its least energy."""
+    import assembly.closure
+
+    right = assembly.closure.clearance_bounds
+    monkeypatch.setattr(
+        assembly.closure, "clearance_bounds", lambda *args: 1.2 * right(*args)
+    )
+    posture = place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
+    assert not playcheck(posture, (0.5, 0.25)).passed

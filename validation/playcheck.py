@@ -1,0 +1,166 @@
+"""The virtual-joint model against the simulation, with clearances.
+
+Play that no load takes up leaves the platform free within a flat valley, so poses are
+not compared.  What is unique is: the least energy, and the springs' deformations and
+wrenches.  Beside them the simulated play is put into the linear model: the energy it
+costs there, beyond the least, is the optimality gap.  Errors, clearances and load are
+scaled together by s; the linear energy is proportional to s^2 and the relative gap
+falls as s^2 too, down to what the contacts' softness leaves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.closure import linearise
+from assembly.conic import cone_sizes
+from assembly.energy import solve_assembly
+from assembly.links import link_compliance
+from assembly.posture import Posture
+from assembly.reduction import reduce_problem
+from validation.crosscheck import (
+    LIMIT_TOLERANCE,
+    SCALES,
+    Pair,
+    check_scales,
+    extrapolate,
+    limit_difference,
+    link_stiffnesses,
+    scaled,
+)
+from validation.multibody import simulate_assembly
+
+PLAY_TOLERANCE = 0.02  # relative, of limits: contacts yield and are smoothed
+FLOOR_ENERGY = 1e-4  # [J] at scale 1: what the springs that centre the play may store
+
+
+@dataclass(frozen=True, eq=False)
+class PlayCheck:
+    """A robot with clearances at one posture, solved twice at several scales.
+
+    Attributes:
+        posture: nominal.
+        load: (6,) [N m, N] on the platform at scale 1, base axes.
+        pairs: one for each scale, largest first.
+    """
+
+    posture: Posture
+    load: NDArray
+    pairs: tuple[Pair, ...]
+
+    @property
+    def scales(self) -> NDArray:
+        """(k,) factors, largest first."""
+        return np.array([pair.scale for pair in self.pairs])
+
+    @cached_property
+    def gaps(self) -> NDArray:
+        """(k,) optimality gap of the simulated play, relative to the reference energy.
+
+        The reference is the energy that closing would cost without any play.
+        """
+        return np.array([optimality_gap(pair) for pair in self.pairs])
+
+    @cached_property
+    def limits(self) -> dict[str, float]:
+        """Relative differences extrapolated to no imperfection."""
+        squares = self.scales**2
+        ours = np.array([pair.linear.energy for pair in self.pairs])
+        theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
+        floor = FLOOR_ENERGY * LIMIT_TOLERANCE  # of a size of at least FLOOR_ENERGY
+        return {
+            "energy": limit_difference(self.scales, ours, theirs, 2, floor),
+            "spring deformation": self._strain_limit(),
+            "optimality gap": float(abs(extrapolate(squares, self.gaps))),
+        }
+
+    def _strain_limit(self) -> float:
+        """All springs' difference in the norm of their energy: what bears load."""
+        frames = self.posture.robot.frames
+        K = {"link_screws": np.zeros((len(frames), 6, 6))}
+        K["joint_screws"] = np.zeros((len(frames), 6, 6))
+        for i, frame in enumerate(frames):
+            if frame.link is not None:
+                K["link_screws"][i] = np.linalg.inv(link_compliance(frame))
+            if frame.joint_stiffness is not None:
+                given = frame.joint_stiffness
+                K["joint_screws"][i] = np.where(np.isfinite(given), given, 0.0)
+        cost = 0.0
+        for kind, stiffness in K.items():
+            left = np.array([
+                (getattr(p.simulated, kind) - getattr(p.linear, kind)) / p.scale
+                for p in self.pairs
+            ])
+            screws = extrapolate(self.scales, left)
+            cost += np.einsum("ni,nij,nj", screws, stiffness, screws) / 2
+        first = self.pairs[0]
+        energy = max(first.linear.energy / first.scale**2, FLOOR_ENERGY)
+        return float(np.sqrt(cost / energy))
+
+    @property
+    def checks(self) -> dict[str, tuple[float, float]]:
+        """What must hold: by name a value and its bound."""
+        return {f"limit of {k}": (v, PLAY_TOLERANCE) for k, v in self.limits.items()}
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check holds."""
+        return all(value <= bound for value, bound in self.checks.values())
+
+
+def optimality_gap(pair: Pair) -> float:
+    """What the simulated play costs in the linear model, beyond the least.
+
+    Args:
+        pair: both answers, of a robot with clearances.
+
+    Returns:
+        [-] energy minus the load's work at the simulated play, brought back into its
+        cones, minus the least one; relative to the energy stored without any play.
+    """
+    best = pair.linear
+    small = reduce_problem(linearise(best.posture), best.joints, best.load)
+    cones = best.joints.cones
+    # a column of cones has one entry, its bound
+    u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
+    u = u / np.maximum(1.0, cone_sizes(u, best.joints.group))[best.joints.group]
+    strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h
+    cost = (strain @ strain - least @ least) / 2 - small.d @ (u - best.clearances)
+    return float(cost / max(small.energy_without_play, 1e-300))
+
+
+def playcheck(
+    posture: Posture,
+    scales: Sequence[float] = SCALES,
+    load: ArrayLike | None = None,
+    links: str = "beam",
+) -> PlayCheck:
+    """Solve a robot with clearances with both models at several scales.
+
+    Args:
+        posture: where the robot stands.
+        scales: at least two different factors on errors, clearances and load, > 0.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        links: ``"beam"`` or ``"spring"``, as in :func:`simulate_assembly`.
+
+    Returns:
+        Both answers at every scale, and the verdict.
+
+    Raises:
+        BadInput: too few scales, or one that is not positive.
+        SimulationFailed: the simulation found no equilibrium.
+        CannotAssemble: the virtual-joint model has none.
+    """
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    stiffness = link_stiffnesses(posture.robot, links)
+    pairs = []
+    for s in check_scales(scales):
+        linear = solve_assembly(scaled(posture, s), s * wrench)
+        simulated = simulate_assembly(
+            posture, s, links, stiffness, s * wrench, clearances=True
+        )
+        pairs.append(Pair(s, linear, simulated))
+    return PlayCheck(posture, wrench, tuple(pairs))
