@@ -1,0 +1,178 @@
+r"""Finite motions on SE(3): exponential, logarithm, and how they change.
+
+A constant screw that acts for unit time makes the finite motion ``exp(s)``; its axes
+are those of the frame it starts from.  All functions work on batches.
+
+======  ======================  ============  ======================================
+symbol  code                    shape         meaning
+======  ======================  ============  ======================================
+exp     ``exponential``         (..., 4, 4)   motion of a screw
+log     ``logarithm``           (..., 6)      screw of a motion by less than pi
+J(s)    ``left_jacobian``       (..., 6, 6)   exp(s + h) = exp(J h) exp(s) + O(h^2)
+ad      ``bracket``             (..., 6, 6)   ad(a) b = [a, b], the screws' bracket
+Omega   ``bracket_form``        (..., 6, 6)   a.Omega(w) b = w.[a, b]
+======  ======================  ============  ======================================
+
+Sources:
+    Barfoot (2017), State Estimation for Robotics, section 7.1 (J of SE(3)), with his
+    coefficients written as Stumpff functions: no cancellation at small angles.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffness.screws import rotation_vector, skew, transform
+
+_SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
+_ORDERS = 6  # of the brackets in the second derivative of the exponential
+
+
+def exponential(screw: ArrayLike) -> NDArray:
+    """Finite motion of a constant screw acting for unit time.
+
+    Args:
+        screw: (..., 6) ``[RX RY RZ TX TY TZ]`` [rad, m].
+
+    Returns:
+        (..., 4, 4).
+    """
+    s = np.asarray(screw, dtype=float)
+    W = skew(s[..., :3])
+    _, c1, c2, c3, *_ = stumpff(s[..., :3])
+    W2 = W @ W
+    mean_turn = np.eye(3) + c2 * W + c3 * W2
+    shift = (mean_turn @ s[..., 3:, None])[..., 0]
+    return transform(shift, np.eye(3) + c1 * W + c2 * W2)
+
+
+def logarithm(T: ArrayLike) -> NDArray:
+    """Constant screw that makes a finite motion in unit time.
+
+    Args:
+        T: (..., 4, 4) of rotations by less than pi.
+
+    Returns:
+        (..., 6) [rad, m], the inverse of :func:`exponential`.
+    """
+    T = np.asarray(T, dtype=float)
+    turn = rotation_vector(T[..., :3, :3])
+    mean_turn = turn_jacobian(turn)
+    shift = np.linalg.solve(mean_turn, T[..., :3, 3, None])[..., 0]
+    return np.concatenate([turn, shift], axis=-1)
+
+
+def inverse(T: NDArray) -> NDArray:
+    """(..., 4, 4) the motions back."""
+    back = np.swapaxes(T[..., :3, :3], -1, -2)
+    return transform(-(back @ T[..., :3, 3, None])[..., 0], back)
+
+
+def turn_jacobian(turn: ArrayLike) -> NDArray:
+    """(..., 3, 3) J of SO(3): small turn in fixed axes per change of the vector."""
+    W = skew(turn)
+    _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
+    return np.eye(3) + c2 * W + c3 * (W @ W)
+
+
+def left_jacobian(screw: ArrayLike) -> NDArray:
+    """Small motion, in the axes before, that a change of a screw makes.
+
+    Args:
+        screw: (..., 6) [rad, m].
+
+    Returns:
+        (..., 6, 6) J with ``exp(s + h) = exp(J h) exp(s)`` to first order in h.
+    """
+    s = np.asarray(screw, dtype=float)
+    W, V = skew(s[..., :3]), skew(s[..., 3:])
+    _, _, c2, c3, c4, c5 = stumpff(s[..., :3])
+    WW, WV, VW = W @ W, W @ V, V @ W
+    WVW = WV @ W
+    J = np.zeros((*s.shape[:-1], 6, 6))
+    J[..., :3, :3] = J[..., 3:, 3:] = np.eye(3) + c2 * W + c3 * WW
+    J[..., 3:, :3] = (
+        V / 2
+        + c3 * (WV + VW + WVW)
+        + c4 * (WW @ V + V @ WW - 3 * WVW)
+        + (c4 - 3 * c5) / 2 * (WVW @ W + W @ WVW)
+    )
+    return J
+
+
+def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
+    """Work of a wrench on the second-order part of a change of a screw.
+
+    To second order ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``; this is the matrix
+    of ``w.D(h, h)``, from the series of J in brackets.
+
+    Args:
+        screw: (..., 6) s [rad, m], of a turn of about 1 at most.
+        wrench: (..., 6) w [N m, N], in the axes before the motion.
+
+    Returns:
+        (..., 6, 6) symmetric; zero at s = 0.
+    """
+    ad = bracket(screw)
+    w = np.asarray(wrench, dtype=float)[..., None]
+    powers = [np.broadcast_to(np.eye(6), ad.shape)]
+    for _ in range(_ORDERS):
+        powers.append(powers[-1] @ ad)
+    Z = np.zeros(ad.shape)
+    for k in range(_ORDERS - 1):
+        # w.ad^k [h, ad^(n-1-k) h] / (n+1)! summed over n >= k + 2
+        rest = sum(
+            powers[n - 1 - k] / math.factorial(n + 1)
+            for n in range(k + 2, _ORDERS + 1)
+        )  # fmt: skip
+        pulled = (np.swapaxes(powers[k], -1, -2) @ w)[..., 0]
+        Z = Z + bracket_form(pulled) @ rest
+    return (Z + np.swapaxes(Z, -1, -2)) / 2
+
+
+def bracket(screw: ArrayLike) -> NDArray:
+    """(..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
+    s = np.asarray(screw, dtype=float)
+    A = np.zeros((*s.shape[:-1], 6, 6))
+    A[..., :3, :3] = A[..., 3:, 3:] = skew(s[..., :3])
+    A[..., 3:, :3] = skew(s[..., 3:])
+    return A
+
+
+def bracket_form(wrench: ArrayLike) -> NDArray:
+    """(..., 6, 6) antisymmetric Omega with ``a @ Omega @ b = wrench @ [a, b]``."""
+    w = np.asarray(wrench, dtype=float)
+    form = np.zeros((*w.shape[:-1], 6, 6))
+    form[..., :3, :3] = -skew(w[..., :3])
+    form[..., :3, 3:] = form[..., 3:, :3] = -skew(w[..., 3:])
+    return form
+
+
+def stumpff(turn: NDArray) -> list[NDArray]:
+    """Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
+
+    Args:
+        turn: (..., 3) [rad] rotation vectors.
+
+    Returns:
+        Six arrays (..., 1, 1), ready to multiply matrices.
+    """
+    squared = np.sum(turn * turn, axis=-1)[..., None, None]
+    large = squared > 1.0
+    small = np.where(large, 0.0, squared)
+    functions = []
+    for k in range(6):
+        value = np.zeros_like(small)
+        for j in reversed(range(_SERIES)):
+            value = 1 / math.factorial(2 * j + k) - value * small
+        functions.append(value)
+    if large.any():
+        a2 = np.where(large, squared, 1.0)
+        a = np.sqrt(a2)
+        closed = [np.cos(a), np.sin(a) / a]
+        for k in range(4):  # c_(k+2) = (1/k! - c_k) / a^2
+            closed.append((1 / math.factorial(k) - closed[k]) / a2)
+        pairs = zip(closed, functions, strict=True)
+        functions = [np.where(large, far, near) for far, near in pairs]
+    return functions
