@@ -47,7 +47,7 @@ def fork():
 
 
 def distal_forks():
-    """A realistic distal link: tube 80 x 6 mm, a fork with bearing bores at each end."""
+    """A realistic distal link: tube 80 x 6 mm, a fork with two bores at each end."""
     tube = bar(0.040, 0.060, LENGTH - 0.060, 96) - bar(0.034, 0.0, LENGTH, 96)
     tip = fork().mirror((0, 0, 1)).translate((0, 0, LENGTH))
     return fork() + tube + tip

@@ -55,6 +55,16 @@ def box_solid(counts, size):
     return _solid(unit * size, cells, size[2], None)
 
 
+def masked_solid(counts, size, keep):
+    """A box without the grid cells whose centres are not to be kept."""
+    unit, cells = box_cells(counts)
+    points = unit * size
+    box = np.floor(unit[cells].mean(axis=1) * counts + 1e-9)
+    cells = cells[keep((box + 0.5) / counts * size)]
+    used, cells = np.unique(cells, return_inverse=True)
+    return _solid(points[used], cells.reshape(-1, 4), size[2], None)
+
+
 def bar_solid(rings, layers, radius, length):
     """A round bar: discs of rings of 6, 12, 18 ... nodes, extruded; side known."""
     steps = [np.arange(6 * k) / (6 * k) for k in range(1, rings + 1)]
