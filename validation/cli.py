@@ -61,27 +61,35 @@ def crosscheck(
     links: Annotated[
         str, typer.Option(help="How the simulation models links: beam | spring.")
     ] = "beam",
+    clearances: Annotated[
+        bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")
+    ] = False,
     json: JsonOption = None,
     figure: Annotated[
         Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
     ] = None,
 ) -> None:
-    """Compare with a multibody simulation at several scales of the errors.
+    """Compare with a multibody simulation at several scales of the imperfections.
 
-    Joint clearances are left out on both sides.  Exit status 1 when a check fails.
+    Joint clearances are left out on both sides unless asked for; energies and springs
+    are then compared instead of poses.  Exit status 1 when a check fails.
     """
-    from validation.crosscheck import (
-        crosscheck_text,
-        try_crosscheck,
-    )
+    from validation.crosscheck import Crosscheck, attempt
+    from validation.crosscheck import crosscheck as compare_tight
+    from validation.playcheck import playcheck as compare_loose
 
-    scales = parse_scales(scale)
+    scales, wrench = parse_scales(scale), parse_load(load)
+    if clearances and figure is not None:
+        raise BadInput("--figure: with --clearances there is no slope to draw")
     posture = posture_of(robot, pose, joint)
-    answer, failure = try_crosscheck(posture, scales, parse_load(load), links)
+    compare = compare_loose if clearances else compare_tight
+    answer, failure = attempt(
+        posture.robot.name, lambda: compare(posture, scales, wrench, links)
+    )
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
-        print(failure["reason"] if answer is None else crosscheck_text(answer))
-    if answer is not None and figure is not None:
+        print(failure["reason"] if answer is None else answer.text())
+    if figure is not None and isinstance(answer, Crosscheck):
         from validation.plot import slope_figure
 
         slope_figure(answer).savefig(figure, dpi=150)
