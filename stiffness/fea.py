@@ -33,7 +33,7 @@ from stiffness.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
 _BLIND = 5.0  # estimate / recovery on a first mesh; measured 2 to 5 on later ones
-_SAFETY = 1.2
+_SAFETY = 1.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +226,7 @@ def solve_link(
         # a first mesh has nothing to check its estimate against
         if (worst <= accuracy and len(history) > 1) or len(history) == budget.levels:
             break
-        wanted = float(np.clip((1.3 * worst / accuracy) ** 0.6, 1.15, 1.6))
+        wanted = float(np.clip((1.3 * worst / accuracy) ** 0.6, 1.15, 1.45))
         finer = _affordable_mesh(level, wanted, budget, start)
         if finer is None:
             break

@@ -84,6 +84,34 @@ def direction(option: str, text: str) -> NDArray:
     return vector
 
 
+def assignments(option: str, texts: list[str]) -> dict[str, float]:
+    """Numbers by name, as ``a=1,b=2``, the option given once or more.
+
+    Args:
+        option: for the message.
+        texts: what was given.
+
+    Returns:
+        Values by name.
+
+    Raises:
+        BadInput: a part is not a name and a finite number, or a name comes twice.
+    """
+    found: dict[str, float] = {}
+    for part in ",".join(texts).split(","):
+        name, _, value = (piece.strip() for piece in part.partition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not name or not math.isfinite(number):
+            raise BadInput(f"{option}: found {describe(part)}, expected name=number")
+        if name in found:
+            raise BadInput(f"{option}: {name} is given twice")
+        found[name] = number
+    return found
+
+
 @dataclass(frozen=True)
 class BeamOptions:
     """What the command line says about a beam; absent values are None."""

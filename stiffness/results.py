@@ -111,6 +111,18 @@ def comparison_text(comparison: Comparison) -> str:
     return "\n".join(lines)
 
 
+def matrix_text(stiffness: NDArray) -> str:
+    """A stiffness with its rows and columns named.
+
+    Args:
+        stiffness: (6, 6).
+
+    Returns:
+        Lines of text.
+    """
+    return "\n".join(_matrix(stiffness, "{:14.6g}"))
+
+
 def _matrix(matrix: NDArray, form: str) -> list[str]:
     """Lines of a 6 by 6 matrix, rounding noise as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)

@@ -1,0 +1,294 @@
+"""Libraries of links: built, resumed, read, interpolated, exported."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from stiffness import library as library_module
+from stiffness.beam import beam_compliance, round_section
+from stiffness.cli import app
+from stiffness.export import stiffness_for, translations_first
+from stiffness.library import (
+    Spec,
+    build_library,
+    look_up,
+    read_compliance,
+    read_entry,
+    read_library,
+    read_spec,
+)
+from stiffness.link import inverted, scaled
+from stiffness.parametric import SHAPES, shape_surface
+from stiffness.reading import BadInput
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "link_library.toml"
+GRID = {"length": (0.2, 0.3, 0.45), "radius": (0.01, 0.02, 0.04)}
+MATERIAL = {"young": (6e10,), "poisson": (0.3,)}
+
+
+@pytest.fixture
+def spec(tmp_path):
+    return Spec(tmp_path / "links", "round", "beam", GRID | MATERIAL)
+
+
+def exact(length, radius, young=6e10, poisson=0.3):
+    section = round_section(radius, poisson)
+    return inverted(
+        beam_compliance(length, section, young, poisson, axis=[0, 0, 1], up=[0, 1, 0])
+    )
+
+
+def test_entries_hold_what_they_were_made_for(spec):
+    files = build_library(spec)
+    assert len(files) == 9
+    key = "round-beam-length0.3-radius0.02-young6e+10-poisson0.3"
+    entry = read_entry(spec.folder, key)
+    assert (
+        np.abs(scaled(entry.stiffness - exact(0.3, 0.02), entry.stiffness)).max() < 1e-9
+    )
+    C = read_compliance(spec.folder, key)
+    np.testing.assert_allclose(C, np.linalg.inv(entry.stiffness), rtol=1e-9, atol=1e-20)
+    assert entry.parameters["radius"] == 0.02
+    assert entry.about["program"].startswith("forcefit")
+    assert entry.about["date"].endswith("+00:00")
+
+
+def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
+    made = []
+    whole = library_module._make_entry
+
+    def stops_after_four(spec, point):
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        made.append(point)
+        whole(spec, point)
+
+    monkeypatch.setattr(library_module, "_make_entry", stops_after_four)
+    with pytest.raises(KeyboardInterrupt):
+        build_library(spec)
+    assert len(read_library(spec.folder)) == 4
+    seen = []
+    monkeypatch.setattr(
+        library_module, "_make_entry", lambda s, p: (seen.append(p), whole(s, p))
+    )
+    build_library(spec)
+    assert len(seen) == 5
+    assert len(read_library(spec.folder)) == 9
+
+
+def test_two_processes_build_the_same(spec):
+    told = []
+    build_library(
+        spec, workers=2, update=lambda done, total: told.append((done, total))
+    )
+    assert told[0] == (0, 9)
+    assert told[-1] == (9, 9)
+    assert len(read_library(spec.folder)) == 9
+
+
+def test_between_the_grid_points_the_error_is_covered(spec, rng):
+    """Nearly powers of the lengths: a grid of three is good to a per cent or two."""
+    build_library(spec)
+    entries = read_library(spec.folder)
+    for _ in range(20):
+        length, radius = rng.uniform(0.2, 0.45), rng.uniform(0.01, 0.04)
+        wanted = {"length": length, "radius": radius, "young": 6e10, "poisson": 0.3}
+        K, error = look_up(entries, wanted)
+        truth = exact(length, radius)
+        gap = np.abs(scaled(K - truth, truth)).max()
+        assert gap <= scaled(error, K).max() + 1e-9
+        assert gap < 0.02
+
+
+def test_a_grid_point_is_given_back_as_it_is(spec):
+    build_library(spec)
+    wanted = {"length": 0.3, "radius": 0.04, "young": 6e10, "poisson": 0.3}
+    K, error = look_up(read_library(spec.folder), wanted)
+    assert np.abs(scaled(K - exact(0.3, 0.04), K)).max() < 1e-9
+    assert scaled(error, K).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"radius": 0.05}, "radius = 0.05 is outside the grid, 0.01 .. 0.04"),
+        ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
+        ({"young": None}, "young: missing; the grid has it"),
+    ],
+)
+def test_what_the_grid_does_not_hold_is_refused(spec, change, message):
+    build_library(spec)
+    wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3} | change
+    wanted = {k: v for k, v in wanted.items() if v is not None}
+    with pytest.raises(BadInput) as caught:
+        look_up(read_library(spec.folder), wanted)
+    assert message in str(caught.value)
+
+
+def test_a_grid_with_a_hole_is_refused(spec):
+    files = build_library(spec)
+    files[0].unlink()
+    wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
+    with pytest.raises(BadInput, match="do not fill a grid"):
+        look_up(read_library(spec.folder), wanted)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("rubbish", "damaged entry"),
+        ("[]", "damaged entry"),
+        ("{}", 'not an entry; expected format "forcefit link 1"'),
+        ('{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
+    ],
+)
+def test_a_damaged_entry_is_refused(spec, content, message):
+    (file, *_) = build_library(spec)
+    file.write_text(content)
+    with pytest.raises(BadInput) as caught:
+        read_entry(spec.folder, file.stem)
+    assert message in str(caught.value)
+
+
+def test_an_entry_in_another_order_or_not_definite_is_refused(spec):
+    (file, *_) = build_library(spec)
+    content = json.loads(file.read_text())
+    swapped = content | {"wrench": ["FX", "FY", "FZ", "MX", "MY", "MZ"]}
+    file.write_text(json.dumps(swapped))
+    with pytest.raises(BadInput, match="another order than RX RY RZ TX TY TZ"):
+        read_entry(spec.folder, file.stem)
+    content["stiffness"][0][0] = -1.0
+    file.write_text(json.dumps(content))
+    with pytest.raises(BadInput, match="not positive definite"):
+        read_entry(spec.folder, file.stem)
+
+
+def test_what_is_not_there_is_named(spec, tmp_path):
+    build_library(spec)
+    with pytest.raises(BadInput, match='no entry "round-beam"'):
+        read_entry(spec.folder, "round-beam")
+    with pytest.raises(BadInput, match="no entry"):
+        read_entry(spec.folder, "../links/x")
+    with pytest.raises(BadInput, match="no library there"):
+        read_entry(tmp_path / "absent", "x")
+
+
+SPEC = """
+library = "links"
+shape = "round"
+method = "beam"
+[grid]
+length = [0.2, 0.3]
+radius = 0.01
+young = 6e10
+poisson = 0.3
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("round", "rond"), 'unknown "rond"; did you mean "round"?'),
+        (("radius", "radios"), 'unknown length "radios"'),
+        (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
+        (("0.01", '"a"'), "expected a number, or a list"),
+        (("[0.2, 0.3]", "[0.2, 0.2]"), "a value stands there twice"),
+        (("young = 6e10", ""), "young: missing"),
+        (('"beam"', '"bem"'), '"beam"'),
+        (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
+        (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
+    ],
+)
+def test_a_build_file_that_is_none_is_refused(tmp_path, change, message):
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC.replace(*change))
+    with pytest.raises(BadInput) as caught:
+        read_spec(path)
+    assert message in str(caught.value)
+
+
+def test_the_commands_build_list_look_up_and_export(tmp_path):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(EXAMPLE.read_text())
+    folder = tmp_path / "link_library"
+
+    def run(*arguments):
+        result = CliRunner().invoke(
+            app, ["library", *map(str, arguments)], catch_exceptions=False
+        )
+        assert result.exit_code == 0, result.output
+        return result.stdout
+
+    keys = json.loads(run("build", spec, "--json", "-"))["keys"]
+    assert len(keys) == 16
+    assert run("list", folder).count("\n") == 16
+    at = "length=0.37,radius=0.02,young=6e10,poisson=0.3"
+    found = json.loads(run("look-up", folder, "--at", at, "--json", "-"))
+    truth = exact(0.37, 0.02)
+    gap = np.abs(scaled(np.array(found["stiffness"]) - truth, truth)).max()
+    assert gap < found["relative_error_estimate"] < 0.02
+    rows = list(csv.DictReader(io.StringIO(run("export", folder))))
+    assert len(rows) == 16
+    row = next(r for r in rows if r["length"] == "0.45" and r["radius"] == "0.04")
+    assert float(row["K_RX_RX"]) == pytest.approx(exact(0.45, 0.04)[0, 0], rel=1e-9)
+    text = run("export", folder, "--to", "mapdl", "--key", keys[0])
+    assert text.count("RMORE") == 12
+    with pytest.raises(BadInput, match="--key: missing"):
+        run("export", folder, "--to", "adams")
+    with pytest.raises(BadInput, match="expected name=number"):
+        run("look-up", folder, "--at", "length")
+
+
+def test_other_programs_get_translations_first():
+    K = exact(0.3, 0.02)
+    swapped = translations_first(K)
+    assert swapped[0, 0] == K[3, 3]
+    assert swapped[4, 0] == K[1, 3]
+    written = {}
+    exec(stiffness_for("exudyn", K), {}, written)
+    np.testing.assert_allclose(written["stiffness"], swapped, rtol=1e-12, atol=1e-3)
+    lines = stiffness_for("mapdl", K).splitlines()[1:]
+    numbers = [float(v) for line in lines for v in line.split(",")[-6:]]
+    assert len(numbers) == 78
+    # the lower triangle of [[K, -K], [-K, K]]: last row ends with K[5, 5]
+    assert numbers[-1] == pytest.approx(swapped[5, 5])
+    assert numbers[0] == pytest.approx(swapped[0, 0])
+    with pytest.raises(BadInput, match='did you mean "adams"'):
+        stiffness_for("adam", K)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_surfaces_of_shapes_hold_their_volume(shape):
+    """Polygons of 64 corners lack 0.16 % of a circle's area."""
+    lengths = {
+        "length": 0.3, "radius": 0.03, "inner_radius": 0.02, "tip_radius": 0.02,
+        "width": 0.02, "height": 0.05,
+    }  # fmt: skip
+    r = 0.03**2
+    volumes = {
+        "round": np.pi * r,
+        "tube": np.pi * (r - 0.02**2),
+        "cone": np.pi * (r + 0.03 * 0.02 + 0.02**2) / 3,
+        "rectangle": 0.02 * 0.05,
+    }
+    surface = shape_surface(shape, {k: lengths[k] for k in SHAPES[shape]})
+    assert surface.volume == pytest.approx(0.3 * volumes[shape], rel=2e-3)
+    assert surface.repairs == ()
+
+
+@pytest.mark.slow
+def test_finite_elements_fill_a_library_too(tmp_path):
+    grid = {"length": (0.2,), "radius": (0.03,), "young": (6e10,), "poisson": (0.3,)}
+    grid["density"] = (2700.0,)
+    spec = Spec(tmp_path / "links", "round", "fea", grid)
+    (file,) = build_library(spec)
+    entry = read_entry(spec.folder, file.stem)
+    ratio = entry.stiffness[2, 2] / exact(0.2, 0.03)[2, 2]
+    assert ratio == pytest.approx(1, abs=2e-3)
+    assert entry.about["mass"] == pytest.approx(2700 * np.pi * 0.03**2 * 0.2, rel=1e-3)
+    assert len(entry.about["geometry"]) == 64
