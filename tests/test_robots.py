@@ -19,17 +19,15 @@ from assembly.mobility import mobility
 from assembly.pose_error import bound_pose_error
 from assembly.posture import POSE, home_posture, place_robot
 from assembly.reference import reference_energy
-from assembly.robot import Clearance, Robot
+from assembly.robot import BeamLink, Clearance, Robot, beam_axis
 from assembly.robot_file import read_robot, write_robot
 from assembly.robots import BUILT_IN, load_robot
-from assembly.robots.delta import AZIMUTHS, drive_angle
 from assembly.robots.delta import Parameters as DeltaParameters
+from assembly.robots.delta import drive_angle
 from assembly.robots.five_bar import Parameters as FiveBarParameters
 from assembly.robots.hexapod import Parameters as HexapodParameters
-from assembly.robots.hexapod import points
 from assembly.robots.irsbot2 import ERROR_FRAMES
 from assembly.robots.planar import arm_angle
-from assembly.robots.three_rrr import Parameters as ThreeRrrParameters
 from assembly.zone import zone_margin
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, skew
@@ -45,6 +43,11 @@ COUNTS = {
     "orthoglide": (3, 0, 12),  # 3 parallelograms, 3 each, and 6 couples for 3 turns
     "arm6": (6, 0, 0),
 }
+# joints with play, each counted once: all that are not driven, and the arm's drives
+PLAYING = {
+    "irsbot2": 8, "four_bar": 3, "five_bar": 3, "3rrr": 6,
+    "hexapod": 12, "delta": 12, "orthoglide": 18, "arm6": 6,
+}  # fmt: skip
 # boxes of platform poses, about those the robots are used in
 WORKSPACE = {
     "irsbot2": {"tx": (-0.3, 0.3), "tz": (-0.6, -0.35)},
@@ -154,6 +157,26 @@ def drive_jacobian(posture, step=1e-4):
 
 def test_the_home_pose_closes(robot):
     assert home_posture(robot).mismatch < 1e-12
+
+
+def test_every_joint_plays_once(name, robot):
+    playing = [f for f in robot.frames if f.clearance is not None]
+    assert len(playing) == PLAYING[name]
+    assert all(f.clearance.radial > 0 and f.clearance.axial > 0 for f in playing)
+
+
+def test_beams_run_from_the_parents_origin_to_the_frames(robot):
+    """At home, also where a slide lies between and the length is written out."""
+    origins = home_posture(robot).transforms[:, :3, 3]
+    beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
+    assert beams
+    for frame in beams:
+        row = robot.index(frame.name)
+        parent = robot.parents[row]
+        start = origins[parent] if parent >= 0 else np.zeros(3)
+        length, axis = beam_axis(frame)
+        R = home_posture(robot).transforms[row, :3, :3]
+        assert np.abs(origins[row] - start - length * R @ axis).max() < 1e-12
 
 
 def test_freedoms_and_overconstraint_are_the_published_ones(name, robot, rng):
@@ -379,16 +402,17 @@ def half_angle_solutions(foot, tip, near, far):
 
 
 def test_3rrr_drives_follow_gosselin_and_angeles(rng):
-    P = ThreeRrrParameters()
     robot = BUILT_IN["3rrr"]()
+    angles = np.radians([90, 210, 330])
+    corners = np.column_stack([np.cos(angles), np.sin(angles)])
     for _ in range(5):
         pose = random_pose("3rrr", rng)
         posture = place_robot(robot, pose=pose)
         R = rotation_matrix([0, 0, pose["rz"]])[:2, :2]
-        tips = [pose["tx"], pose["ty"]] + P.corners() @ R.T
+        tips = [pose["tx"], pose["ty"]] + 0.08 * corners @ R.T
         found = joints_of(posture).values()
-        for q, foot, tip in zip(found, P.feet(), tips, strict=True):
-            both = half_angle_solutions(foot, tip, P.leg.near, P.leg.far)
+        for q, foot, tip in zip(found, 0.3 * corners, tips, strict=True):
+            both = half_angle_solutions(foot, tip, 0.16, 0.16)
             away = [abs(math.remainder(q - angle, 2 * math.pi)) for angle in both]
             assert min(away) < 1e-10
 
@@ -468,10 +492,16 @@ def test_planar_legs_out_of_reach_are_refused_with_the_reach():
 
 # Hexapod
 
+MERLET = np.array([  # [cm] joint centres on the base, then on the platform
+    [-9.7, 9.1], [9.7, 9.1], [12.76, 3.9], [3, -13], [-3, -13], [-12.76, 3.9],
+    [-3, 7.3], [3, 7.3], [7.822, -1.052], [4.822, -6.248], [-4.822, -6.248],
+    [-7.822, -1.052],
+]).reshape(2, 6, 2)  # fmt: skip
+
 
 def strut_lines(posture):
     """(6, 6) unit wrenches of the struts at the platform's origin, and lengths."""
-    a, b = points()
+    a, b = np.pad(MERLET / 100, ((0, 0), (0, 0), (0, 1)))
     arms = b @ posture.platform[:3, :3].T
     along = posture.platform[:3, 3] + arms - a
     lengths = np.linalg.norm(along, axis=1)
@@ -518,29 +548,34 @@ def test_hexapod_struts_carry_forces_along_themselves_only(rng):
         assert np.abs(found - expected).max() < 1e-9 * np.abs(forces).max()
 
 
-def test_hexapod_pose_error_is_the_farthest_of_64_corners(rng):
-    """(27) in closed form: each strut's play along itself, J^-1 of a box."""
-    posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
+def assert_pose_error_is_of_64_corners(posture, lines, joints):
+    """(27) in closed form: six lines give by their joints' play along them.
+
+    The platform's errors are J^-1 of a box, the farthest at one of its corners.
+    """
     robot, T = posture.robot, posture.transforms
-    w, _ = strut_lines(posture)
-    plays = []
-    for k, line in enumerate(w, 1):
-        ends = []
-        for end in ("cardan_2", "ball_3"):
-            frame = robot.frame(f"leg{k}.{end}")
-            u = T[robot.index(frame.name), :3, :3].T @ line[3:]
-            across, along = np.hypot(u[0], u[1]), abs(u[2])
-            ends.append(frame.clearance.radial * across + frame.clearance.axial * along)
-        plays.append(sum(ends))
-    turn, shift = farthest_corner(w, np.array(plays))
+    plays = np.zeros(6)
+    for k, (line, ends) in enumerate(zip(lines, joints, strict=True)):
+        for name in ends:
+            u = T[robot.index(name), :3, :3].T @ line[3:]
+            play = robot.frame(name).clearance
+            plays[k] += play.radial * np.hypot(u[0], u[1]) + play.axial * abs(u[2])
+    turn, shift = farthest_corner(lines, plays)
     found = bound_pose_error(solve_assembly(posture))
-    for (low, high), expected, tolerance in (
-        (found.rotation_error, turn, 1e-6),
-        (found.translation_error, shift, 1e-6),
+    for (low, high), expected in (
+        (found.rotation_error, turn),
+        (found.translation_error, shift),
     ):
         assert low <= expected * (1 + 1e-8)
         assert high >= expected * (1 - 1e-8)
-        assert high - low <= tolerance
+        assert high - low <= 1e-6
+
+
+def test_hexapod_pose_error_is_the_farthest_of_64_corners(rng):
+    posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
+    lines, _ = strut_lines(posture)
+    joints = [(f"leg{k}.cardan_2", f"leg{k}.ball_3") for k in range(1, 7)]
+    assert_pose_error_is_of_64_corners(posture, lines, joints)
 
 
 # Delta
@@ -562,21 +597,32 @@ def test_delta_drives_are_those_of_williams_examples(position, degrees):
 
 
 def test_delta_platform_is_where_three_spheres_meet(rng):
-    P = DeltaParameters()
+    base, platform = 0.567 * math.sqrt(3) / 6, 0.076 * math.sqrt(3) / 3
     robot = BUILT_IN["delta"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("delta", rng))
         centres = []
         angles = joints_of(posture).values()
-        for azimuth, q in zip(AZIMUTHS, angles, strict=True):
-            out = P.base_radius - P.platform_radius + P.arm * math.cos(q)
+        for azimuth, q in zip(np.radians([-90, 30, 150]), angles, strict=True):
+            out = base - platform + 0.524 * math.cos(q)
             centres.append([
                 out * math.cos(azimuth),
                 out * math.sin(azimuth),
-                -P.arm * math.sin(q),
+                -0.524 * math.sin(q),
             ])
-        found = lower_meeting_point(np.array(centres), P.rod)
+        found = lower_meeting_point(np.array(centres), 1.244)
         assert np.abs(posture.platform[:3, 3] - found).max() < 1e-10
+
+
+def test_delta_drive_angle_is_the_drives_coordinate(rng):
+    robot = BUILT_IN["delta"]()
+    for _ in range(5):
+        posture = place_robot(robot, pose=random_pose("delta", rng))
+        for azimuth, q in zip((-90, 30, 150), joints_of(posture).values(), strict=True):
+            found = drive_angle(
+                DeltaParameters(), math.radians(azimuth), posture.platform[:3, 3]
+            )
+            assert found == pytest.approx(q, abs=1e-11)
 
 
 def lower_meeting_point(centres, radius):
@@ -615,6 +661,20 @@ def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
 def test_delta_out_of_reach_is_refused_with_the_reach():
     with pytest.raises(BadInput, match=r"delta: a leg needs a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
+
+
+def test_delta_pose_error_is_the_farthest_of_64_corners(rng):
+    """Its six rods hold the platform as six struts would."""
+    posture = place_robot(BUILT_IN["delta"](), pose=random_pose("delta", rng))
+    T, index = posture.transforms, posture.robot.index
+    rods = [f"leg{k}.{r}" for k in (1, 2, 3) for r in "ab"]
+    lines = []
+    for rod in rods:
+        high, low = (T[index(f"{rod}_{end}_3"), :3, 3] for end in ("high", "low"))
+        n = (low - high) / np.linalg.norm(low - high)
+        lines.append([*np.cross(low - posture.platform[:3, 3], n), *n])
+    joints = [(f"{rod}_high_3", f"{rod}_low_3") for rod in rods]
+    assert_pose_error_is_of_64_corners(posture, np.array(lines), joints)
 
 
 # Orthoglide
