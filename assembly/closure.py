@@ -19,7 +19,7 @@ q       ``free``       (6n, nq)    motions without bound, in units of their scre
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,7 @@ class VirtualJoints:
     bounded_motion: bool
 
 
+@lru_cache(maxsize=16)
 def virtual_joints(
     robot: Robot, compliant: str = "elastic", bounded_motion: bool = False
 ) -> VirtualJoints:
