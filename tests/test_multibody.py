@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,12 @@ from assembly.posture import home_posture
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from stiffness.reading import BadInput
 from validation.motion import exponential, inverse, logarithm, placement
-from validation.multibody import SimulationFailed, simulate_assembly, without_clearance
+from validation.multibody import (
+    SimulationFailed,
+    closing_sequence,
+    simulate_assembly,
+    without_clearance,
+)
 
 pytestmark = pytest.mark.exudyn
 
@@ -409,3 +415,54 @@ def test_the_logarithm_undoes_the_exponential(rng):
         np.testing.assert_allclose(logarithm(T), screw, rtol=0, atol=1e-13)
         np.testing.assert_allclose(T @ exponential(-screw), np.eye(4), atol=1e-14)
         np.testing.assert_allclose(inverse(T), exponential(-screw), atol=1e-14)
+
+
+def test_the_closing_sequence_goes_from_open_to_shut(rng):
+    """First what the errors alone do, last the assembly; gaps shrink evenly."""
+    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    robot = posture.robot
+    sequence = closing_sequence(posture, steps=5)
+    gaps = [
+        np.linalg.norm(T[robot.index(first), :3, 3] - T[robot.index(second), :3, 3])
+        for first, second in robot.closures
+        for T in sequence
+    ]
+    gaps = np.reshape(gaps, (len(robot.closures), -1))
+    assert len(sequence) >= 6
+    # what is left after the last pull is the connectors' yield, a per cent
+    expected = gaps[:, :1] * np.linspace(1, 0, 6)
+    np.testing.assert_allclose(gaps[:, :6], expected, atol=0.02 * gaps.max())
+    assert gaps[:, -1].max() < 1e-11
+    shut = simulate_assembly(posture).transforms
+    np.testing.assert_allclose(sequence[-1], shut, rtol=0, atol=1e-9)
+
+
+def test_the_closing_figure_marks_the_open_closures(rng):
+    from validation.plot import closing_figure
+
+    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    panels = closing_figure(posture, closing_sequence(posture)).axes
+    assert [panel.get_title() for panel in panels] == ["open", "closing", "shut"]
+    lengths = []
+    for panel in panels:
+        ends = np.array([line.get_data_3d() for line in panel.lines[-2:]])
+        lengths.append(np.linalg.norm(np.diff(ends, axis=2), axis=1).max())
+    assert lengths[0] > lengths[1] > 1e6 * lengths[2]
+
+
+@pytest.mark.slow
+def test_five_hundred_models_leave_nothing_behind(rng):
+    """Resident memory after the first fifty, in MiB; a leaked model is half of one."""
+
+    def resident():
+        status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        (line,) = (line for line in status if line.startswith("VmRSS"))
+        return int(line.split()[1]) / 1024
+
+    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    for _ in range(50):
+        simulate_assembly(posture)
+    before = resident()
+    for _ in range(500):
+        simulate_assembly(posture)
+    assert resident() - before < 10

@@ -128,6 +128,9 @@ class Model:
         ground = self.mbs.AddObject(self.item.ObjectGround())
         self.ground = Place(int(ground), np.eye(4), np.eye(4))
         self.width = WIDE  # [-] of the contacts' smoothing
+        self.steps = 0  # in which closures are pulled shut, if more than needed
+        self.watched: list[Place] = []  # places whose way from open to shut is kept
+        self.seen: list[NDArray] = []
 
     def discard(self) -> None:
         """Give the memory back; Exudyn keeps models and user functions otherwise."""
@@ -234,6 +237,7 @@ class Model:
         shift = np.zeros((2, len(closures), 6))  # of the targets, at 2 times
 
         def pull(mbs: Any, t: float) -> bool:
+            self._look()
             self.width = WIDE * (NARROW / WIDE) ** min(max(t - 1.0, 0.0), 1.0)
             way = min(max(t - 2.0, 0.0), 1.0)
             shifts = (1.0 - way) * shift[0] + way * shift[1]
@@ -245,11 +249,12 @@ class Model:
 
         self.mbs.SetPreStepUserFunction(pull)
         self.mbs.Assemble()
-        self._equilibrate(0.0, _LOAD_STEPS)
+        self._equilibrate(0.0, max(_LOAD_STEPS, self.steps))
         if narrow:
             self._equilibrate(1.0, _NARROWING_STEPS)
         for _ in range(_CLOSING_STEPS):
             if self.largest_gap(closures) <= _SHUT:
+                self._look()
                 return
             shift[0] = shift[1]
             shift[1] -= [self._left_open(closure) for closure in closures]
@@ -289,6 +294,11 @@ class Model:
             self.mbs.SolveStatic(settings, updateInitialValues=True)
         except self.exu.SolverError as error:
             raise SimulationFailed(self.robot, f"Exudyn: {error}") from None
+
+    def _look(self) -> None:
+        """Keep where the watched places are now."""
+        if self.watched:
+            self.seen.append(np.array([self.pose(place) for place in self.watched]))
 
     def largest_gap(self, closures: list[Closure]) -> float:
         """[rad, m] largest component left open."""

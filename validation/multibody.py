@@ -193,6 +193,42 @@ def _simulate(
         model.discard()
 
 
+def closing_sequence(
+    posture: Placed, steps: int = 8, scale: float = 1.0, load: ArrayLike | None = None
+) -> NDArray:
+    """Where the frames are while the closures of a tight robot are pulled shut.
+
+    Args:
+        posture: as in :func:`simulate_assembly`; links with a section are beams, the
+            others must be given by a matrix.
+        steps: in which the closures are shut, at least 4.
+        scale: factor on the geometric errors.
+        load: (6,) [N m, N] on the platform, which grows meanwhile.
+
+    Returns:
+        (k, n, 4, 4) frames seen from the base: open and stress-free first, shut last;
+        k is at least ``steps + 1``.
+
+    Raises:
+        BadInput: a link's stiffness is not known.
+        SimulationFailed: no equilibrium was found.
+    """
+    robot = posture.robot
+    case = _Case(posture, scale, _link_springs(robot, "beam", {}), 4, clearances=False)
+    model = Model(*_import_exudyn(), robot.name, CLOSING[-1])
+    try:
+        tree = _build(model, case)
+        model.steps = steps
+        model.watched = [tree.before[frame.name] for frame in robot.frames]
+        if load is not None:
+            wrench = np.asarray(load, dtype=float)
+            model.add_load(tree.before[robot.platform], wrench)
+        model.solve(tree.closures)
+        return np.array(model.seen)
+    finally:
+        model.discard()
+
+
 def without_clearance(robot: Robot) -> Robot:
     """The same robot with every joint tight, to compare with a simulation.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.posture import Posture
 from stiffness.link import scaled
 from stiffness.screws import SCREW
 from validation.crosscheck import Crosscheck
@@ -72,4 +73,46 @@ def stiffness_figure(beam: NDArray, fea: NDArray) -> "Figure":
         panel.text(j, i, f"{value:+.2f}", ha="center", va="center", fontsize=8)
     panel.set(xticks=range(6), yticks=range(6), xticklabels=SCREW, yticklabels=SCREW)
     panel.set_title("K_E, finite elements minus beam", fontsize="medium")
+    return figure
+
+
+def closing_figure(
+    posture: Posture, sequence: NDArray, exaggeration: float | None = None
+) -> "Figure":
+    """A robot open, half shut and shut, its displacements exaggerated.
+
+    Args:
+        posture: nominal.
+        sequence: (k, n, 4, 4) frames of
+            :func:`validation.multibody.closing_sequence`.
+        exaggeration: factor on displacements from the nominal posture; default: the
+            widest open closure is drawn as a tenth of the robot.
+
+    Returns:
+        A figure of three panels; red lines join the frames that are to coincide.
+    """
+    from matplotlib.figure import Figure
+
+    robot, nominal = posture.robot, posture.transforms[:, :3, 3]
+    pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
+    moved = sequence[:, :, :3, 3] - nominal
+    size = float(np.ptp(nominal, axis=0).max()) or 1.0
+    if exaggeration is None:
+        gaps = [np.linalg.norm(moved[0, a] - moved[0, b]) for a, b in pairs]
+        widest = float(max(gaps, default=0.0))
+        exaggeration = 0.1 * size / widest if widest > 0 else 1.0
+    shown = nominal + exaggeration * moved
+    figure = Figure(figsize=(11, 4), layout="constrained")
+    chosen = {"open": 0, "closing": len(sequence) // 3, "shut": -1}
+    for k, (title, step) in enumerate(chosen.items(), 1):
+        panel = figure.add_subplot(1, 3, k, projection="3d")
+        for points, colour in ((nominal, "0.8"), (shown[step], "C0")):
+            starts = np.vstack([points, np.zeros(3)])[robot.parents]
+            for start, end in zip(starts, points, strict=True):
+                panel.plot(*np.transpose([start, end]), color=colour, lw=1.5)
+        for a, b in pairs:
+            panel.plot(*np.transpose(shown[step][[a, b]]), color="C3", lw=2)
+        panel.set(title=title, xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        panel.set_aspect("equal")
+    figure.suptitle(f"displacements {exaggeration:.3g} times", fontsize="medium")
     return figure
