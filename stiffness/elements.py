@@ -164,6 +164,24 @@ def integration(
             yield part, N, G, weights * np.linalg.det(J)
 
 
+def node_gradients(mesh: Quadratic) -> Iterator[tuple[NDArray, NDArray]]:
+    """Gradients of the shape functions at the nodes of each element.
+
+    Args:
+        mesh: the tetrahedra.
+
+    Yields:
+        Indices (c,) of elements and gradients (c, 10, 10, 3) [1/m]: node, function,
+        direction.
+    """
+    places = np.concatenate([np.eye(4), np.eye(4)[EDGES].mean(axis=1)])
+    dN = _gradients(places)
+    for first in range(0, len(mesh.cells), _CHUNK):
+        part = np.arange(first, min(first + _CHUNK, len(mesh.cells)))
+        J = np.einsum("qai,tax->tqix", dN, mesh.nodes[mesh.cells[part]])
+        yield part, np.einsum("qai,tqxi->tqax", dN, np.linalg.inv(J))
+
+
 def lame(E: float, nu: float) -> tuple[float, float]:
     """Lame's constants.
 

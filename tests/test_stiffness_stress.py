@@ -1,0 +1,97 @@
+"""Stress: superposition, closed forms of bars, the singular edge kept out."""
+
+import numpy as np
+import pytest
+
+from stiffness.condense import condense
+from stiffness.elements import lame, quadratic
+from stiffness.estimate import error_matrices
+from stiffness.fea import Level, MeshedLink
+from stiffness.link import LinkStiffness, inverted
+from stiffness.reading import BadInput
+from stiffness.stress import round_beam_peak, stress_influence, von_mises
+from tests.solids_for_tests import bar_solid
+
+R, L = 0.04, 0.4
+AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
+
+
+@pytest.fixture(scope="module")
+def solved():
+    solid = bar_solid(3, 20, R, L)
+    mesh = quadratic(solid)
+    material = np.tile([*lame(60e9, 0.3), 2700.0], (len(mesh.cells), 1))
+    lam, mu = material[:, 0], material[:, 1]
+    centers = np.array([[0, 0, 0], [0, 0, L]])
+    solution = condense(mesh, lam, mu, centers)
+    errors = error_matrices(mesh, solution.fields, lam, mu, len(solid.points))
+    level = Level(solid, mesh, material, solution, errors)
+    C = inverted(solution.stiffness)
+    link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
+    return MeshedLink(link, level, centers)
+
+
+def test_von_mises_by_hand():
+    """Uniaxial s, pure shear sqrt(3) t, pressure nothing."""
+    assert von_mises([2.0, 0, 0, 0, 0, 0]) == 2.0
+    assert von_mises([0, 0, 0, 0, 3.0, 0]) == pytest.approx(3 * np.sqrt(3))
+    assert von_mises([5.0, 5, 5, 0, 0, 0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("wrench", "expected"),
+    [
+        ([0, 0, 0, 0, 0, 1e3], 1e3 / AREA),
+        ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
+        ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
+    ],
+)
+def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expected):
+    """Four radii from both ends the ends are forgotten (e^-4 a radius): 1 %, the
+    mesh's (recovered at nodes, elements of a third of the radius)."""
+    stress = stress_influence(solved, away=4 * R)
+    assert stress.peak(wrench)[0] == pytest.approx(expected, rel=0.01)
+    assert round_beam_peak(R, wrench, L / 2) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
+    stress = stress_influence(solved, away=2 * R)
+    value, place = stress.peak([0, 0, 0, 1e3, 0, 0])
+    distance = L - place[2]
+    assert place[2] < 2.6 * R
+    assert np.hypot(place[0], place[1]) == pytest.approx(R, rel=1e-6)
+    expected = round_beam_peak(R, [0, 0, 0, 1e3, 0, 0], distance)
+    assert expected == pytest.approx(1e3 * distance * R / SECOND, rel=1e-12)
+    assert value == pytest.approx(expected, rel=0.02)
+
+
+def test_stresses_superpose(solved, rng):
+    stress = stress_influence(solved)
+    a, b = rng.normal(size=(2, 6))
+    np.testing.assert_allclose(
+        stress.stresses(2 * a - b),
+        2 * stress.stresses(a) - stress.stresses(b),
+        atol=1e-6,
+    )
+    assert stress.peak(3 * a)[0] == pytest.approx(3 * stress.peak(a)[0])
+
+
+def test_the_region_is_stated_and_the_edge_kept_out(solved):
+    stress = stress_influence(solved)
+    assert stress.away == pytest.approx(R, rel=1e-6)
+    assert stress.places[:, 2].min() >= R * (1 - 1e-9)
+    assert stress.places[:, 2].max() <= (L - R) * (1 + 1e-9)
+    assert "at least 0.04 m away" in stress.region
+    with pytest.raises(BadInput, match="nothing of the link is 1 m away"):
+        stress_influence(solved, away=1.0)
+
+
+def test_shear_of_tubes_by_the_formula():
+    """Solid 4/3 of the mean, thin tube 2 of it."""
+    wrench = [0, 0, 0, 1.0, 0, 0]
+    assert round_beam_peak(R, wrench, 0) == pytest.approx(np.sqrt(3) * 4 / 3 / AREA)
+    inner = 0.999 * R
+    thin = np.pi * (R**2 - inner**2)
+    assert round_beam_peak(R, wrench, 0, inner) == pytest.approx(
+        np.sqrt(3) * 2 / thin, rel=1e-3
+    )
