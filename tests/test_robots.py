@@ -645,6 +645,8 @@ def test_delta_platform_keeps_its_orientation_and_its_rods_stay_parallel(rng):
             one, two = (at[f"{leg}.{r}_low_1"] - at[f"{leg}.{r}_high_1"] for r in "ab")
             assert np.abs(one - two).max() < 1e-11
             assert np.linalg.norm(one) == pytest.approx(1.244, abs=1e-11)
+            apart = at[f"{leg}.a_low_1"] - at[f"{leg}.b_low_1"]
+            assert np.linalg.norm(apart) == pytest.approx(0.131, abs=1e-11)
 
 
 def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
