@@ -19,9 +19,8 @@ Sources:
 
 import contextlib
 import io
-import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -29,8 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
-from stiffness.beam import Section, rectangular_section, round_section
 from stiffness.reading import BadInput
+from validation.beams import beam_axes, beam_span, element_stiffness, section_of
 from validation.contact import joint_play
 from validation.exudyn_model import (
     CLOSING,
@@ -49,7 +48,6 @@ from validation.motion import (
     placement,
     shifted,
     turn_of,
-    turned,
 )
 
 LINKS = ("beam", "spring")
@@ -355,20 +353,12 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
     """A straight beam, clamped to the place's body so that it ends at the place."""
     link = frame.link
     assert isinstance(link, BeamLink)
-    length, x = _span(frame, link)
-    axes = matrix(_section_axes(x, link.up), np.zeros(3))
+    length, x = beam_span(frame, link)
+    axes = matrix(beam_axes(x, link.up), np.zeros(3))
     base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
-    K = _section_stiffness(link, length / elements)
+    K = element_stiffness(link, length / elements)
     parts, nodes = model.add_beam(base, length, K, elements)
     return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
-
-
-def _span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
-    """[m] length of a beam, and (3,) its direction in the frame's axes, any length."""
-    if link.length is not None and link.axis is not None:
-        return link.length, np.array(link.axis)
-    x = turned(frame.rotation).T @ frame.translation
-    return float(np.linalg.norm(x)), x
 
 
 def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
@@ -384,12 +374,12 @@ def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
         link = frame.link
         if not isinstance(link, BeamLink) or link.density is None:
             continue
-        length, x = _span(frame, link)
+        length, x = beam_span(frame, link)
         line = x / np.linalg.norm(x) * length
         part = tree.links[frame.name]
         nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
         step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
-        weight = link.density * _section(link).area * length * gravity
+        weight = link.density * section_of(link).area * length * gravity
         weight = weight / (len(nodes) - 1)
         moment = np.cross(step, weight) / 12
         for k, node in enumerate(nodes):
@@ -397,50 +387,6 @@ def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
             force = weight * (0.5 if first or last else 1.0)
             couple = moment * (float(first) - float(last))
             model.add_load(node, np.concatenate([couple, force]))
-
-
-def _section_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
-    """Columns: along the beam, across, up; up is y unless the beam lies along y."""
-    x = x / np.linalg.norm(x)
-    if up is None:
-        up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
-    y = np.cross(up, x)
-    y /= np.linalg.norm(y)
-    return np.column_stack([x, y, np.cross(x, y)])
-
-
-def _section_stiffness(link: BeamLink, step: float) -> NDArray:
-    """EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
-
-    An element of constant strain lacks the deflection step^3 / 12 EI of its own
-    bending; given to its shear, the tip of a cantilever is exact for any number.
-
-    Args:
-        link: the beam.
-        step: [m] length of an element.
-
-    Returns:
-        (6, 6) diagonal [N, N m^2].
-    """
-    section = _section(link)
-    E, G = link.young, link.young / (2 * (1 + link.poisson))
-    bending = E * np.array([section.I_y, section.I_z])
-    shear = step**2 / (12 * bending[::-1])  # a force along y bends about z
-    if link.theory == "timoshenko":
-        shares = np.array([section.shear_y, section.shear_z])
-        shear = shear + 1 / (G * section.area * shares)
-    return np.diag([E * section.area, *(1 / shear), G * section.J, *bending])
-
-
-def _section(link: BeamLink) -> Section:
-    """The section of a beam from its declared numbers."""
-    given = link.section
-    if "radius" in given:
-        inner = given.get("inner_radius", 0.0)
-        return round_section(given["radius"], link.poisson, inner)
-    if "width" in given:
-        return rectangular_section(given["width"], given["height"], link.poisson)
-    return Section(**given)
 
 
 def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyAssembly:
