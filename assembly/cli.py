@@ -118,6 +118,25 @@ def solve(
 
 
 @app.command()
+def exact(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Close the robot with finite motions: closures hold exactly."""
+    from assembly.results import exact_of, exact_text
+
+    results = exact_of(posture_of(robot, pose, joint), parse_load(load))
+    write_json(results, json)
+    if json != "-":
+        print(exact_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
 def error(
     robot: RobotArgument,
     pose: PoseOption = None,

@@ -10,6 +10,7 @@ Sources:
     quadratic objectives.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -152,7 +153,10 @@ def _by_clarabel(
     return x[:nu], -z[r : r + len(k)], status
 
 
-_ROADS = (_compiled, *(partial(_by_clarabel, value) for value in _REGULARISATIONS))
+_ROADS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = (
+    _compiled,
+    *(partial(_by_clarabel, value) for value in _REGULARISATIONS),
+)
 
 
 def _certify(

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.exact import ExactAssembly, solve_exact
 from assembly.mobility import mobility
 from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture
@@ -49,16 +50,30 @@ def solution_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, An
             "margin_free_bound": free.bound,
         }
         return results | _answer(solve_assembly(posture, load))
-    except CannotAssemble as error:
-        return results | empty | {"status": "cannot assemble", "reason": str(error)}
-    except FreeMotion as error:
-        return results | empty | {"status": "no equilibrium", "reason": str(error)}
-    except SolverFailed as error:
-        return results | empty | {"status": "solver failed", "reason": str(error)}
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        status = _STATUS[_kind(error)]
+        return results | empty | {"status": status, "reason": str(error)}
 
 
 def _answer(answer: Assembly) -> dict[str, Any]:
     """The part that only a solved assembly has."""
+    certificate = {
+        "closure_residual": answer.closure_residual(),
+        "reference_length": answer.linearisation.size,
+        "clearance_excess": answer.clearance_excess(),
+        "duality_gap": answer.duality_gap(),
+        "relative_gap": answer.relative_gap(),
+    }
+    return {
+        **_screws_and_wrenches(answer),
+        "certificate": certificate,
+        "ranks": answer.ranks,
+        "linearisation_error": _linearisation_error(answer),
+    }
+
+
+def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
+    """Energy, pose error, and what happens at every frame and closure."""
     robot = answer.posture.robot
     frames = {
         f.name: {
@@ -73,22 +88,104 @@ def _answer(answer: Assembly) -> dict[str, Any]:
         {"frames": list(pair), "wrench": answer.closure_wrenches[k]}
         for k, pair in enumerate(robot.closures)
     ]
-    certificate = {
-        "closure_residual": answer.closure_residual(),
-        "reference_length": answer.linearisation.size,
-        "clearance_excess": answer.clearance_excess(),
-        "duality_gap": answer.duality_gap(),
-        "relative_gap": answer.relative_gap(),
-    }
     return {
         "energy": answer.energy,
         "potential": answer.potential,
         "platform_screw": answer.platform_screw,
         "frames": frames,
         "closures": closures,
-        "certificate": certificate,
-        "ranks": answer.ranks,
     }
+
+
+def _linearisation_error(answer: Assembly) -> dict[str, Any]:
+    """What the linear closures cost here: linear minus exact, or why it is unknown."""
+    try:
+        exact = solve_exact(answer.posture, answer.load, answer)
+    except SolverFailed as error:
+        return {"status": str(error)}
+    return {"status": "ok", **vars(exact.linearisation_error)}
+
+
+def exact_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, Any]:
+    """Everything ``assembly exact`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The keys of ``assembly solve`` for finite motions; ``status`` as there.
+    """
+    results: dict[str, Any] = {
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
+    }  # fmt: skip
+    try:
+        answer = solve_exact(posture, load)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
+    certificate = {
+        "closure_residual": answer.closure_residual(),
+        "reference_length": answer.linear.linearisation.size,
+        "clearance_excess": answer.clearance_excess(),
+        "stationarity": answer.stationarity,
+        "iterations": answer.iterations,
+    }
+    linear = {
+        "energy": answer.linear.energy, "platform_screw": answer.linear.platform_screw
+    }  # fmt: skip
+    return results | {
+        **_screws_and_wrenches(answer),
+        "certificate": certificate,
+        "linear": linear,
+        "linearisation_error": vars(answer.linearisation_error),
+    }
+
+
+_STATUS = {
+    CannotAssemble: "cannot assemble",
+    FreeMotion: "no equilibrium",
+    SolverFailed: "solver failed",
+}
+
+
+def _kind(error: Exception) -> type:
+    """Which of the known failures an error is."""
+    return next(kind for kind in _STATUS if isinstance(error, kind))
+
+
+def exact_text(results: dict[str, Any]) -> str:
+    """An exact solution for people: a few lines."""
+    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    if results["status"] != "ok":
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    screw, certificate = results["platform_screw"], results["certificate"]
+    return "\n".join([
+        *lines,
+        f"energy: {results['energy']:.6g} J with finite motions",
+        _screw_text(screw),
+        _linearisation_text(results["linearisation_error"]),
+        f"closures hold to {certificate['closure_residual']:.1e}, balance to "
+        f"{certificate['stationarity']:.1e}; {certificate['iterations']} steps",
+    ])  # fmt: skip
+
+
+def _screw_text(screw: NDArray) -> str:
+    """The platform's error."""
+    return (
+        f"platform error: {_numbers(screw[:3] * 1e3)} mrad, "
+        f"{_numbers(screw[3:] * 1e3)} mm"
+    )
+
+
+def _linearisation_text(found: dict[str, Any]) -> str:
+    """What the linear closures cost."""
+    if found.get("status", "ok") != "ok":
+        return f"linearisation error: unknown, {found['status']}"
+    return (
+        f"linearisation error: {1e3 * np.linalg.norm(found['rotation']):.3g} mrad, "
+        f"{1e6 * np.linalg.norm(found['translation']):.3g} um, energy "
+        f"{100 * found['relative_energy']:+.3g} %"
+    )
 
 
 def pose_error_of(
@@ -113,10 +210,8 @@ def pose_error_of(
     try:
         answer = solve_assembly(posture)
         found = [bound_pose_error(answer, name, **options) for name in readings]
-    except CannotAssemble as error:
-        return results | {"status": "cannot assemble", "reason": str(error)}
-    except SolverFailed as error:
-        return results | {"status": "solver failed", "reason": str(error)}
+    except (CannotAssemble, SolverFailed) as error:
+        return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
     table = {
         one.reading: {
             "rotation": _bracket(one.rotation_error, one.rotation_screw),
@@ -172,8 +267,8 @@ def solution_text(results: dict[str, Any]) -> str:
     screw, certificate = results["platform_screw"], results["certificate"]
     lines += [
         f"energy: {results['energy']:.6g} J",
-        f"platform error: {_numbers(screw[:3] * 1e3)} mrad, "
-        f"{_numbers(screw[3:] * 1e3)} mm",
+        _screw_text(screw),
+        _linearisation_text(results["linearisation_error"]),
         f"certificate: closure residual {certificate['closure_residual']:.1e}, "
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "

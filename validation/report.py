@@ -179,12 +179,29 @@ def _solution(results: StudyResults) -> str:
             rows.append([f"platform error {name} [rad, m]", f"{value:.6e}"])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {key}", f"{value:.2e}"])
+        rows += _linearisation_rows(solution["linearisation_error"])
     parts.append(_table(["quantity", "value"], rows))
     if solution["status"] == "ok":
         parts.append(_wrenches(results))
     if results.error:
         parts.append(_pose_error(results))
     return "".join(parts)
+
+
+def _linearisation_rows(found: dict[str, Any]) -> list[list[str]]:
+    """What linear closures cost against finite motions."""
+    if found["status"] != "ok":
+        return [["linearisation error", found["status"]]]
+    return [
+        ["linearisation error, rotation [rad]", _size(found["rotation"])],
+        ["linearisation error, translation [m]", _size(found["translation"])],
+        ["linearisation error, energy", f"{100 * found['relative_energy']:+.3g} %"],
+    ]
+
+
+def _size(vector: NDArray) -> str:
+    """Length of a vector."""
+    return f"{np.linalg.norm(vector):.2e}"
 
 
 def _pose_error(results: StudyResults) -> str:
