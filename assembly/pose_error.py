@@ -34,7 +34,7 @@ from assembly.conic import cone_sizes, minimise_energy
 from assembly.energy import Assembly, solve_with
 from assembly.majorant import majorant_bound
 from assembly.polytope import Polytope
-from assembly.reduction import complement
+from assembly.reduction import NOISE, complement
 from stiffness.screws import skew
 
 READINGS = ("frozen", "free", "budget")
@@ -268,9 +268,10 @@ class _Moving:
         Z = complement(A_q, _RANK + 30 * self.answer.posture.mismatch)
         follow = np.linalg.lstsq(A_q.T, P_q.T, rcond=_RANK)[0]
         left = np.abs(A_q.T @ follow - P_q.T).max(initial=0.0)
+        rows = _rows(Z.T @ A_v, NOISE * np.abs(A_v).max(initial=0.0))
         return Reach(
-            self.answer.platform_screw, P_v - follow.T @ A_v, _rows(Z.T @ A_v),
-            start, group, unbounded=bool(left > 1e-8),
+            self.answer.platform_screw, P_v - follow.T @ A_v, rows, start, group,
+            unbounded=bool(left > 1e-8),
         )  # fmt: skip
 
     def _start(self) -> NDArray:
@@ -281,10 +282,10 @@ class _Moving:
         return u / np.maximum(1.0, cone_sizes(u, self.joints.group))[self.joints.group]
 
 
-def _rows(A: NDArray) -> NDArray:
-    """Orthonormal rows spanning those of A."""
+def _rows(A: NDArray, noise: float) -> NDArray:
+    """Orthonormal rows spanning those of A, but for rounding."""
     _, S, Vt = svd(A, full_matrices=False)
-    return Vt[: int(np.sum(S > 1e-9 * S.max(initial=0.0)))]
+    return Vt[: int(np.sum(S > max(noise, 1e-9 * S.max(initial=0.0))))]
 
 
 def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:

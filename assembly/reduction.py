@@ -28,6 +28,8 @@ from scipy.linalg import qr, svd
 from assembly.closure import Linearisation, VirtualJoints
 
 _RANK = 1e-10  # relative size below which a singular value counts as zero
+# what a projection leaves of columns that it removes whole is rounding of their size
+NOISE = 1e-12
 
 
 class FreeMotion(ValueError):
@@ -84,13 +86,6 @@ class Reduction:
         return self.joints.elastic.T @ pull
 
     @property
-    def offset(self) -> float:
-        """[J] energy minus the load's work, beyond the small problem's objective."""
-        lin, alone = self.linearisation, self.load_springs
-        work = self.load @ lin.error_screw + self.preload @ lin.misfit
-        return -float(alone @ alone) / 2 - float(work)
-
-    @property
     def energy_without_play(self) -> float:
         """[J] what closing would cost if every bounded clearance stayed at zero."""
         return float(self.h @ self.h) / 2
@@ -135,11 +130,15 @@ def reduce_problem(
     right = -Z.T @ linearisation.misfit - A_y @ (joints.elastic.T @ pull)
 
     U, S, Vt = svd(A_y, full_matrices=True)
-    rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
+    noise = NOISE * np.abs(A @ joints.elastic).max(initial=0.0)
+    rank = int(np.sum(S > max(noise, tolerance * S.max(initial=0.0))))
     grip, loose = U[:, :rank], U[:, rank:]
     G = -(grip.T @ A_u) / S[:rank, None]
     h = grip.T @ right / S[:rank]
-    H, k, rigid, inconsistent = _rigid_rows(loose, A_u, right, linearisation, tolerance)
+    H, k, rigid, inconsistent = _rigid_rows(
+        loose, A_u, right, linearisation, tolerance,
+        noise=NOISE * np.abs(A @ joints.cones).max(initial=0.0),
+    )  # fmt: skip
     return Reduction(
         linearisation, joints, G, h, joints.cones.T @ pull, H, k, inconsistent,
         load, preload, Z, rigid,
@@ -179,15 +178,18 @@ def _preload(A_q: NDArray, P_q: NDArray, load: NDArray) -> NDArray:
 
 
 def _rigid_rows(
-    loose: NDArray, A_u: NDArray, right: NDArray, lin: Linearisation, tolerance: float
+    loose: NDArray,
+    A_u: NDArray,
+    right: NDArray,
+    lin: Linearisation,
+    tolerance: float,
+    noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
     """Independent rows that only clearances can satisfy, and what nothing satisfies."""
     rows, wanted = loose.T @ A_u, loose.T @ right
     U, S, _ = svd(rows, full_matrices=True)
     # clearances are small: their columns count against their own size
-    rank = int(np.sum(S > 1e-9 * S.max(initial=0.0))) if A_u.size else 0
-    if rank and S[0] < 1e-12 * np.abs(A_u).max():
-        rank = 0
+    rank = int(np.sum(S > max(noise, 1e-9 * S.max(initial=0.0)))) if A_u.size else 0
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     left = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * errors

@@ -201,6 +201,21 @@ def test_frames_in_another_order_give_the_same_answer():
     assert np.allclose(a, b, rtol=1e-6, atol=1e-6 * np.abs(a).max())
 
 
+def test_the_certificate_trusts_nothing_but_the_wrenches():
+    """Answers spoilt on purpose: a gap opens that the wrong part accounts for."""
+    robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
+    answer = solve_assembly(home_posture(robot))
+    assert answer.duality_gap() < 1e-12 * answer.energy
+    for wrong in (0.0, 0.9, 1.1, 2.0):
+        spoilt = replace(answer, multipliers=answer.multipliers * wrong)
+        # complementary energy: f g - f^2 C / 2, off by (wrong - 1)^2 of the energy
+        expected = (wrong - 1) ** 2 * answer.energy
+        assert spoilt.duality_gap() == pytest.approx(expected, rel=1e-9)
+    stiffer = replace(answer, elastic=answer.elastic * 1.01)
+    assert stiffer.duality_gap() == pytest.approx(0.0201 * answer.energy, rel=1e-6)
+    assert stiffer.closure_residual() > 1e-7
+
+
 @settings(deadline=None, max_examples=25)
 @given(seed=seeds, legs=st.integers(1, 3), joints=st.integers(1, 3))
 def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):

@@ -65,14 +65,7 @@ WORKSPACE = {
         "rx": (-0.2, 0.2), "ry": (1.4, 1.7), "rz": (-0.2, 0.2),
     },
 }  # fmt: skip
-ROUNDING_COUNTS = pytest.mark.xfail(
-    reason="columns that free motions take up whole leave rounding, and its rank counts"
-)
-ELASTIC_DRIVES = [  # the paper's robot has none
-    pytest.param(name, marks=ROUNDING_COUNTS if COUNTS[name][2] else ())
-    for name in COUNTS
-    if name != "irsbot2"
-]
+ELASTIC_DRIVES = [n for n in COUNTS if n != "irsbot2"]  # whose own has none
 WITHOUT_SPRINGY_PASSIVE_JOINTS = sorted(set(COUNTS) - {"irsbot2"})
 LOAD = [3.0, -2.0, 1.0, 40.0, -30.0, 20.0]  # [N m, N]
 
@@ -436,7 +429,6 @@ def farthest_corner(lines, plays):
     return [np.linalg.norm(part, axis=1).max() for part in (turns, shifts)]
 
 
-@ROUNDING_COUNTS
 def test_3rrr_pose_error_is_the_farthest_corner_of_a_prism(rng):
     """(27) in closed form: 3 lines that give by 2c each, 8 corners."""
     robot = only_radial(BUILT_IN["3rrr"]())
@@ -701,7 +693,6 @@ def test_orthoglide_moves_as_its_slides_do_at_the_isotropic_point():
     assert np.abs(J[:3]).max() < 1e-7
 
 
-@ROUNDING_COUNTS
 def test_orthoglide_gives_as_its_drives_do_at_the_isotropic_point():
     posture = home_posture(only_drives_give(BUILT_IN["orthoglide"]()))
     found = platform_compliance(posture) * 5e7
