@@ -1,5 +1,6 @@
 """The commands ``forcefit stiffness ...``: parse, call, print or save."""
 
+import logging
 from pathlib import Path
 from typing import Annotated
 
@@ -43,6 +44,13 @@ Json = Annotated[
     str | None, typer.Option("--json", help="Write results as JSON; - is stdout.")
 ]
 Figure = Annotated[Path | None, typer.Option(help="Draw the comparison (png, svg).")]
+
+
+def _tell_progress() -> None:
+    """Each mesh's unknowns, error and expected cost, on stderr, as they come."""
+    log = logging.getLogger("stiffness.fea")
+    log.setLevel(logging.INFO)
+    log.handlers = [logging.StreamHandler()]
 
 
 @app.command()
@@ -93,6 +101,7 @@ def fea(
     budget = Budget(seconds=checked("--seconds", seconds, "s", above=0))
     if json not in {None, "-"}:
         check_writable(Path(str(json)))
+    _tell_progress()
     link = mesh_link(
         surface, held, moved, E, nu,
         unit=unit, accuracy=accuracy, interface=interface, density=density,
@@ -134,6 +143,7 @@ def compare(
     for path in (figure, None if json in {None, "-"} else Path(str(json))):
         if path is not None:
             check_writable(path)
+    _tell_progress()
     meshed = mesh_link(
         surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
     )

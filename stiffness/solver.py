@@ -79,14 +79,16 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Rough cost of a solve, from measured ones of 31 k to 232 k unknowns.
+    """Rough cost of a solve, from measured ones of 100 k to 430 k unknowns.
 
     Args:
         unknowns: rows of the matrix.
 
     Returns:
-        Memory [byte] and time [s] on one core of a common machine.
+        Memory [byte] and time [s] on two cores of a common machine.
     """
-    factor = 10.0 if solver_name() == "SuperLU" else 1.0
-    share = unknowns / 97e3
-    return 1.6e9 * share**1.33 * (1 + (factor > 1)), 3.6 * share**1.7 * factor
+    share = unknowns / 400e3
+    memory, seconds = 3.4e9 * share**1.33, 30.0 * share**1.7
+    if solver_name() == "SuperLU":
+        return 3 * memory, 10 * seconds
+    return memory, seconds

@@ -1,0 +1,78 @@
+"""Print the true and the estimated error of K_E, mesh by mesh.
+
+``python benchmarks/stiffness_accuracy.py [link ...] [--kind rigid|distributing]``
+
+Each link of ``meshes/`` is refined until 430 k unknowns or seven meshes.  The truth is
+the finest K less 0.85 of its own estimated error (before the safety factor); the last
+mesh is therefore not judged.  Allow about two minutes a link.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from stiffness import fea
+from stiffness.interface import parse_interface
+from stiffness.link import scaled
+from stiffness.surface import read_surface
+
+MESHES = Path(__file__).parents[1] / "meshes"
+BORE = "bore=0,0,{}/0,1,0/0.011"
+LINKS = {
+    "distal_plain": ("z=0", "z=0.452"),
+    "tube": ("z=0", "z=0.4"),
+    "tapered_arm": ("z=0", "z=0.35"),
+    "l_bracket": ("z=0", "x=0.15"),
+    "delta_forearm": ("z=0", "z=0.4"),
+    "distal_forks": (BORE.format(0), BORE.format(0.452)),
+}
+
+
+def levels(name, kind, most=430e3):
+    """Stiffness, recovered error, unknowns and seconds of each mesh."""
+    surface = read_surface(MESHES / f"{name}.stl")
+    faces = [parse_interface(text) for text in LINKS[name]]
+    centers = np.array([fea.interface_center(surface, f, "face") for f in faces])
+    solid = fea.first_mesh(surface, *faces, fea.Budget())
+    found = []
+    while True:
+        start = time.perf_counter()
+        level = fea._solve_level(solid, [fea.Material(60e9, 0.3)], centers, kind)
+        answer = level.solution
+        seconds = time.perf_counter() - start
+        found.append((answer.stiffness, level.errors.sum(0), answer.unknowns, seconds))
+        finer = [fea._finer(level, growth) for growth in (1.3, 1.1)]
+        finer = [s for s in finer if 4.4 * len(s.cells) < most]
+        if len(found) == 7 or not finer:
+            return found
+        solid = finer[0]
+
+
+def report(name, kind):
+    """One row a mesh: unknowns, true error, estimate, their ratio, seconds."""
+    found = levels(name, kind)
+    history = [(K, recovered) for K, recovered, *_ in found]
+    error, _ = fea.estimated_error(history)
+    truth = history[-1][0] + 0.85 / fea._SAFETY * error
+    for count, (K, _, unknowns, seconds) in enumerate(found[:-1], start=1):
+        true = np.abs(scaled(K - truth, truth)).max()
+        estimate = np.abs(scaled(fea.estimated_error(history[:count])[0], K)).max()
+        print(
+            f"{name:14} {kind:12} {unknowns:8d} {100 * true:9.4f} % "
+            f"{100 * estimate:9.4f} % {estimate / true:6.2f} {seconds:7.1f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("links", nargs="*", default=list(LINKS))
+    parser.add_argument("--kind", choices=("rigid", "distributing"), default="rigid")
+    asked = parser.parse_args()
+    print(
+        "link           interfaces   unknowns  true error   estimate    ratio    time"
+    )
+    for link in asked.links:
+        report(link, asked.kind)
