@@ -104,10 +104,14 @@ class FiniteRobot:
         return self.joints.free.shape[1]
 
     @property
+    def springs(self) -> slice:
+        """Where the springs are among the unknowns."""
+        return slice(0, len(self.joints.links))
+
+    @property
     def bounded(self) -> slice:
         """Where the clearances are among the unknowns."""
-        springs = len(self.joints.links)
-        return slice(springs, springs + len(self.joints.group))
+        return slice(self.springs.stop, self.springs.stop + len(self.joints.group))
 
     @cached_property
     def units(self) -> NDArray:
@@ -154,12 +158,16 @@ class FiniteRobot:
     def chains(self) -> tuple[NDArray, NDArray]:
         """(K, N) bool each: unknowns on a closure's first and second whole chain."""
         robot = self.posture.robot
-        ends = np.array([
-            [robot.index(name) for name in pair] for pair in robot.closures
-        ])
-        ends = ends.reshape(-1, 2)
+        ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
         return first, second
+
+    @cached_property
+    def closed_frames(self) -> NDArray:
+        """(K, 2) rows of the frames that each closure joins."""
+        robot = self.posture.robot
+        rows = [[robot.index(name) for name in pair] for pair in robot.closures]
+        return np.array(rows, dtype=int).reshape(-1, 2)
 
     @cached_property
     def on_platform(self) -> NDArray:
@@ -187,10 +195,8 @@ class FiniteRobot:
     @cached_property
     def shut(self) -> NDArray:
         """(K, 4, 4) a closure's second frame seen from its first, nominally."""
-        T, robot = self.posture.transforms, self.posture.robot
-        pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
-        frames = [inverse(T[a]) @ T[b] for a, b in pairs]  # rounded files: not quite 1
-        return np.array(frames).reshape(-1, 4, 4)
+        first, second = self.posture.transforms[self.closed_frames.T]
+        return inverse(first) @ second  # rounded files: not quite 1
 
     def place(self, x: NDArray) -> "Placement":
         """The robot moved by finite screws.
@@ -278,10 +284,8 @@ class Placement:
     @cached_property
     def _open(self) -> NDArray:
         """(K, 4, 4) motions that closures lack, read at the platform's origin."""
-        robot, T = self.model.posture.robot, self.transforms
-        pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-        first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
-        G = T[first] @ self.model.shut @ inverse(T[second])
+        first, second = self.transforms[self.model.closed_frames.T]
+        G = first @ self.model.shut @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
         G[:, :3, 3] += (G[:, :3, :3] - np.eye(3)) @ origin
         return G
@@ -295,6 +299,11 @@ class Placement:
     def residual(self) -> NDArray:
         """(6 K,) how closures are open: [rad], translations per reference length."""
         return (self._open_screws * self.model.scale).ravel()
+
+    @cached_property
+    def largest_gap(self) -> float:
+        """[rad, reference lengths] largest component of the residual."""
+        return float(np.abs(self.residual).max(initial=0.0))
 
     @cached_property
     def _readings(self) -> NDArray:
