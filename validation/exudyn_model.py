@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import identity
 from scipy.spatial.transform import Rotation
 
 from validation.contact import NARROW, WIDE, Play, cone_energy, cone_push
@@ -74,6 +75,7 @@ class Elastic:
         parts: Exudyn's numbers, of one connector or of the elements of a beam.
         beam: which of the two.
         nodes: places along a beam, from base to tip, at equal distances.
+        modes: of a meshed body, which is one part and no beam; None otherwise.
     """
 
     near: Place
@@ -81,6 +83,43 @@ class Elastic:
     parts: tuple[int, ...]
     beam: bool = False
     nodes: tuple[Place, ...] = ()
+    modes: "Modes | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class MeshBody:
+    """A link as a solid of finite elements, with two rigid interfaces.
+
+    Attributes:
+        nodes: (n, 3) [m] in the mesh's axes.
+        stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
+        base: (k,) nodes of the interface at the parent's side.
+        tip: (m,) nodes of the interface at the frame's side.
+        centers: (2, 3) [m] where base and tip are read.
+        turn: (3, 3) the mesh's axes seen from the frame's.
+    """
+
+    nodes: NDArray
+    stiffness: Any
+    base: NDArray
+    tip: NDArray
+    centers: NDArray
+    turn: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Interface modes of a meshed body, seen from its base.
+
+    Attributes:
+        node: Exudyn's number of the node of their coordinates.
+        stiffness: (6, 6) reduced to the modes.
+        wrench: (6, 6) from mode coordinates to the wrench at the tip, frame's axes.
+    """
+
+    node: int
+    stiffness: NDArray
+    wrench: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +159,10 @@ class Contact:
 class Model:
     """An Exudyn model: what it is built of, how it is solved, what can be read."""
 
-    def __init__(self, exudyn: Any, items: Any, robot: str, closing: float) -> None:
-        self.exu, self.item = exudyn, items
+    def __init__(
+        self, exudyn: Any, items: Any, fem: Any, robot: str, closing: float
+    ) -> None:
+        self.exu, self.item, self.fem = exudyn, items, fem
         self.robot, self.closing = robot, closing
         self.container = self.exu.SystemContainer()
         self.mbs = self.container.AddSystem()
@@ -207,6 +248,62 @@ class Model:
             )
             parts.append(int(self.mbs.AddObject(beam)))
         return tuple(parts), tuple(bodies)
+
+    def add_mesh(self, place: Place, body: MeshBody) -> Elastic:
+        """A meshed body in its floating frame, clamped so that its tip is at the place.
+
+        Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), found
+        by Exudyn from the full stiffness matrix.
+
+        Args:
+            place: where the frame is while the body is free of stress.
+            body: the solid.
+
+        Returns:
+            The elastic part from the place to the tip.
+        """
+        femlink = self.fem.FEMinterface()
+        femlink.nodes = {"Position": body.nodes}
+        femlink.surface = [{"Name": "none", "Trigs": []}]
+        femlink.stiffnessMatrix = body.stiffness
+        femlink.massMatrix = identity(3 * len(body.nodes), format="csr")  # unused
+        femlink.ComputeHurtyCraigBamptonModes(
+            [body.base.tolist(), body.tip.tolist()],
+            0,
+            computationMode=self.fem.HCBstaticModeSelection.RBE2,
+        )
+        floating = self.fem.ObjectFFRFreducedOrderInterface(femlink)
+        origin = place.moved(matrix(body.turn, -body.turn @ body.centers[1]))
+        numbers = floating.AddObjectFFRFreducedOrder(
+            self.mbs,
+            positionRef=origin.built[:3, 3].tolist(),
+            rotationMatrixRef=origin.built[:3, :3],
+        )
+        solid = numbers["oFFRFreducedOrder"]
+        base = origin.moved(shifted(body.centers[0]))
+        markers = [self._interface(solid, body, k) for k in range(2)]
+        far = self.add_body(origin.moved(shifted(body.centers[1])).built)
+        for pair in (
+            [self.add_marker(base), markers[0]],
+            [markers[1], self.add_marker(far)],
+        ):
+            self.mbs.AddObject(self.item.GenericJoint(markerNumbers=pair))
+        K = np.asarray(floating.stiffnessMatrixReduced)
+        wrench = _tip_wrenches(body, np.asarray(floating.modeBasis), K)
+        modes = Modes(int(numbers["nGenericODE2"]), K, wrench)
+        tip = far.moved(matrix(body.turn.T, np.zeros(3)))
+        return Elastic(place, tip, (int(solid),), modes=modes)
+
+    def _interface(self, solid: Any, body: MeshBody, side: int) -> int:
+        """A marker that moves with an interface, 0 the base and 1 the tip."""
+        nodes, center = (body.base, body.tip)[side], body.centers[side]
+        marker = self.item.MarkerSuperElementRigid(
+            bodyNumber=solid,
+            meshNodeNumbers=nodes.tolist(),
+            weightingFactors=np.full(len(nodes), 1 / len(nodes)),
+            offset=(center - body.nodes[nodes].mean(axis=0)).tolist(),
+        )
+        return int(self.mbs.AddMarker(marker))
 
     def add_closure(self, first: Place, second: Place, shut: NDArray) -> Closure:
         """A connector that is stress-free while the closure is open."""
@@ -318,6 +415,9 @@ class Model:
 
     def energy(self, part: Elastic) -> float:
         """[J] stored in an elastic part."""
+        if part.modes is not None:
+            q = self._mode_coordinates(part.modes)
+            return float(q @ part.modes.stiffness @ q) / 2
         kind = self.exu.OutputVariableType.PotentialEnergy
         mbs = self.mbs
         read = mbs.GetObjectOutputBody if part.beam else mbs.GetObjectOutput
@@ -333,6 +433,10 @@ class Model:
 
     def wrench(self, part: Elastic) -> NDArray:
         """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
+        if part.modes is not None:
+            near, far = (self.pose(p)[:3, :3] for p in (part.near, part.far))
+            halves = part.modes.wrench @ self._mode_coordinates(part.modes)
+            return np.concatenate([far.T @ near @ half for half in np.split(halves, 2)])
         if not part.beam:
             return self._connector_wrench(part.parts[0])
         last = self.exu.ObjectIndex(part.parts[-1])
@@ -362,6 +466,11 @@ class Model:
             read(number, kind.ForceLocal),
         ])
 
+    def _mode_coordinates(self, modes: Modes) -> NDArray:
+        """(6,) of a meshed body."""
+        kind = self.exu.OutputVariableType.Coordinates
+        return np.array(self.mbs.GetNodeOutput(modes.node, kind))
+
     def _connect(self, markers: list[int], K: NDArray) -> int:
         """A 6 by 6 spring between two markers."""
         spring = self.item.RigidBodySpringDamper(
@@ -382,3 +491,16 @@ class Model:
     def _transform(self, T: NDArray) -> Any:
         """Exudyn's own kind of transform."""
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
+
+
+def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
+    """(6, 6) wrench at the tip, frame's axes, of unit mode coordinates."""
+    arms = body.nodes[body.tip] - body.centers[1]
+    rigid = np.zeros((len(arms), 3, 6))
+    for k in range(3):
+        rigid[:, :, k] = np.cross(np.eye(3)[k], arms)
+        rigid[:, k, 3 + k] = 1.0
+    moved = basis.reshape(-1, 3, basis.shape[1])[body.tip]
+    screws = np.linalg.lstsq(rigid.reshape(-1, 6), moved.reshape(-1, 6))[0]
+    turn = np.kron(np.eye(2), body.turn)
+    return turn @ np.linalg.solve(screws.T, K)

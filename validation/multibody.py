@@ -37,6 +37,7 @@ from validation.exudyn_model import (
     Closure,
     Contact,
     Elastic,
+    MeshBody,
     Model,
     Place,
 )
@@ -120,6 +121,7 @@ def simulate_assembly(
     gravity: ArrayLike | None = None,
     elements: int = 4,
     clearances: bool = False,
+    meshes: Mapping[str, MeshBody] | None = None,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
 
@@ -136,6 +138,7 @@ def simulate_assembly(
             weigh; other links, whose mass is not known, do not.
         elements: beam elements per link.
         clearances: whether joints play, scaled like the errors; tight otherwise.
+        meshes: by frame, links that are solids of finite elements in a floating frame.
 
     Returns:
         The assembled robot.
@@ -148,8 +151,9 @@ def simulate_assembly(
         raise BadInput(f"simulate_assembly: links = {links!r}, expected one of {LINKS}")
     started = time.perf_counter()
     given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
-    springs = _link_springs(posture.robot, links, given)
-    case = _Case(posture, scale, springs, elements, clearances)
+    solids = dict(meshes or {})
+    springs = _link_springs(posture.robot, links, given, solids)
+    case = _Case(posture, scale, springs, elements, clearances, solids)
     *first, last = CLOSING_CONTACTS if clearances else CLOSING
     for closing in first:
         with contextlib.suppress(SimulationFailed):
@@ -166,6 +170,7 @@ class _Case:
     springs: Mapping[str, NDArray]
     elements: int
     clearances: bool
+    meshes: Mapping[str, MeshBody]
 
 
 def _simulate(
@@ -212,7 +217,8 @@ def closing_sequence(
         SimulationFailed: no equilibrium was found.
     """
     robot = posture.robot
-    case = _Case(posture, scale, _link_springs(robot, "beam", {}), 4, clearances=False)
+    springs = _link_springs(robot, "beam", {}, {})
+    case = _Case(posture, scale, springs, elements=4, clearances=False, meshes={})
     model = Model(*_import_exudyn(), robot.name, CLOSING[-1])
     try:
         tree = _build(model, case)
@@ -241,13 +247,17 @@ def without_clearance(robot: Robot) -> Robot:
 
 
 def _link_springs(
-    robot: Robot, links: str, given: Mapping[str, NDArray]
+    robot: Robot,
+    links: str,
+    given: Mapping[str, NDArray],
+    meshes: Mapping[str, MeshBody],
 ) -> dict[str, NDArray]:
-    """Stiffness of every link that is not to be a beam."""
+    """Stiffness of every link that is to be neither a beam nor a mesh."""
     springs = {}
     for frame in robot.frames:
         link = frame.link
-        if link is None or (isinstance(link, BeamLink) and links == "beam"):
+        beam = isinstance(link, BeamLink) and links == "beam"
+        if link is None or beam or frame.name in meshes:
             continue
         if isinstance(link, MatrixLink):
             springs[frame.name] = given.get(frame.name, link.stiffness)
@@ -300,7 +310,10 @@ def _build(model: Model, case: _Case) -> _Tree:
         error = case.scale * frame.geometric_error
         place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
         place = place.moved(placement(error[:3], error[3:]))
-        if frame.name in case.springs:
+        if frame.name in case.meshes:
+            links[frame.name] = model.add_mesh(place, case.meshes[frame.name])
+            place = links[frame.name].far
+        elif frame.name in case.springs:
             links[frame.name] = model.add_spring(place, case.springs[frame.name])
             place = links[frame.name].far
         elif isinstance(frame.link, BeamLink):
@@ -432,12 +445,12 @@ def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyA
     )
 
 
-def _import_exudyn() -> tuple[Any, Any]:
+def _import_exudyn() -> tuple[Any, Any, Any]:
     """Exudyn without windows and without a word on the console."""
     with contextlib.redirect_stdout(io.StringIO()):
         import exudyn
-        from exudyn import itemInterface
+        from exudyn import FEM, itemInterface
 
     exudyn.special.userInterface.SuppressAll(True)
     exudyn.config.printToConsole = False
-    return exudyn, itemInterface
+    return exudyn, itemInterface, FEM

@@ -1,0 +1,79 @@
+"""Solids in a floating frame: Exudyn condenses our matrix, and gets our K_E."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix, diags
+
+from assembly.posture import home_posture
+from assembly.robot import Frame, MatrixLink, Robot
+from stiffness.condense import condense
+from stiffness.elements import assemble, lame, quadratic
+from tests.solids_for_tests import box_solid
+from validation.exudyn_model import MeshBody
+from validation.motion import placement
+from validation.multibody import simulate_assembly
+
+pytestmark = pytest.mark.exudyn
+
+SIZE = np.array([0.03, 0.04, 0.2])  # m; the link runs along the mesh's z
+TURN = np.array([0.4, -0.3, 0.8])  # rad: mesh axes seen from the frame's
+
+
+@pytest.fixture(scope="module")
+def block():
+    """A slender box as a mesh body, and its K_E at the tip in the frame's axes."""
+    solid = box_solid((2, 2, 8), SIZE)
+    mesh = quadratic(solid)
+    constants = np.array(lame(70e9, 0.33))[:, None] * np.ones(len(solid.cells))
+    centers = np.array([[*SIZE[:2] / 2, 0], [*SIZE[:2] / 2, SIZE[2]]])
+    upper = assemble(mesh, *constants)
+    turn = placement(TURN, np.zeros(3))[:3, :3]
+    body = MeshBody(
+        nodes=mesh.nodes,
+        stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
+        base=np.unique(mesh.faces[mesh.patch == 0]),
+        tip=np.unique(mesh.faces[mesh.patch == 1]),
+        centers=centers,
+        turn=turn,
+    )
+    A = np.kron(np.eye(2), turn)
+    return body, A @ condense(mesh, *constants, centers).stiffness @ A.T
+
+
+def test_a_loaded_solid_deforms_by_our_stiffness(block):
+    """screw = K_E^-1 w and E = w K_E^-1 w / 2; 1e-6 rad is linear to 1e-6."""
+    body, K = block
+    frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
+    posture = home_posture(Robot("block", "tip", (frame,)))
+    wrench = np.array([0.03, -0.02, 0.01, 0.3, 0.2, -0.4])
+    answer = simulate_assembly(posture, load=wrench, meshes={"tip": body})
+    screw = np.linalg.solve(K, wrench)
+    scale = np.abs(screw[:3]).max() * np.array([1, 1, 1, 0.2, 0.2, 0.2])
+    assert 1e-7 < scale[0] < 1e-5
+    np.testing.assert_allclose(answer.link_screws[0] / scale, screw / scale, atol=1e-5)
+    assert answer.energy == pytest.approx(wrench @ screw / 2, rel=1e-5)
+    np.testing.assert_allclose(answer.link_wrenches[0], wrench, atol=1e-5 * 0.4)
+
+
+def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
+    """The same loop with the solid and with its K_E: the difference is of second order.
+
+    A tenth of the misfit, a hundredth of the difference.
+    """
+    body, K = block
+    error = np.array([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
+    frames = (
+        Frame("a", translation=[0.1, 0, 0], link=MatrixLink(K), geometric_error=error),
+        Frame("wall", translation=[0.3, 0, 0]),
+        Frame("b", "wall", translation=[-0.2, 0, 0], link=MatrixLink(K / 3)),
+    )
+    posture = home_posture(Robot("walls", "a", frames, (("a", "b"),)))
+    difference = []
+    for scale in (1.0, 0.1):
+        solid = simulate_assembly(posture, scale, meshes={"a": body})
+        spring = simulate_assembly(posture, scale)
+        gap = np.abs(solid.platform_screw - spring.platform_screw).max()
+        assert solid.energy == pytest.approx(spring.energy, rel=1e-2 * scale)
+        difference.append(gap)
+    assert difference[0] > 1e-9
+    assert np.log10(difference[0] / difference[1]) > 1.8
