@@ -1,20 +1,26 @@
 """Solids in a floating frame: Exudyn condenses our matrix, and gets our K_E."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags
 
 from assembly.posture import home_posture
-from assembly.robot import Frame, MatrixLink, Robot
+from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from stiffness.condense import condense
 from stiffness.elements import assemble, lame, quadratic
+from stiffness.reading import BadInput
 from tests.solids_for_tests import box_solid
-from validation.exudyn_model import MeshBody
+from validation.comparison import link_models
+from validation.crosscheck import crosscheck
+from validation.exudyn_model import MeshBody, Solid
 from validation.motion import placement
 from validation.multibody import simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 
+SURFACE = Path(__file__).parents[1] / "meshes" / "distal_plain.stl"
 SIZE = np.array([0.03, 0.04, 0.2])  # m; the link runs along the mesh's z
 TURN = np.array([0.4, -0.3, 0.8])  # rad: mesh axes seen from the frame's
 
@@ -28,16 +34,17 @@ def block():
     centers = np.array([[*SIZE[:2] / 2, 0], [*SIZE[:2] / 2, SIZE[2]]])
     upper = assemble(mesh, *constants)
     turn = placement(TURN, np.zeros(3))[:3, :3]
-    body = MeshBody(
+    meshed = Solid(
         nodes=mesh.nodes,
         stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
         base=np.unique(mesh.faces[mesh.patch == 0]),
         tip=np.unique(mesh.faces[mesh.patch == 1]),
         centers=centers,
-        turn=turn,
     )
     A = np.kron(np.eye(2), turn)
-    return body, A @ condense(mesh, *constants, centers).stiffness @ A.T
+    return MeshBody(meshed, turn), A @ condense(
+        mesh, *constants, centers
+    ).stiffness @ A.T
 
 
 def test_a_loaded_solid_deforms_by_our_stiffness(block):
@@ -77,3 +84,29 @@ def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
         difference.append(gap)
     assert difference[0] > 1e-9
     assert np.log10(difference[0] / difference[1]) > 1.8
+
+
+@pytest.mark.slow
+def test_a_robot_of_meshed_links_passes_with_solids():
+    """From the surface file: K_E in the linear model, the solid in the simulation.
+
+    Both come from one mesh; what K_E is off the solid by is the sparse solver's
+    rounding, and a floating frame bends linearly about its base.
+    """
+    link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
+    error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
+    frames = (
+        Frame("a", translation=[0.452, 0, 0], link=link, geometric_error=error),
+        Frame("wall", translation=[0.5, 0.4, 0.2]),
+        Frame("b", "wall", translation=[-0.048, -0.4, -0.2],
+              link=BeamLink({"radius": 0.02}, 60e9, 0.3)),
+    )  # fmt: skip
+    posture = home_posture(Robot("meshed", "a", frames, (("a", "b"),)))
+    answer = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
+    assert answer.passed, answer.checks
+    assert max(answer.limits.values()) < 1e-3
+
+
+def test_an_unknown_kind_of_link_is_refused():
+    with pytest.raises(BadInput, match="found 'shell', expected one of beam, spring"):
+        link_models(Robot("one", "f", (Frame("f"),)), "shell")

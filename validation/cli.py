@@ -59,7 +59,7 @@ def crosscheck(
         str, typer.Option(help="Factors on errors and load, largest first.")
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
-        str, typer.Option(help="How the simulation models links: beam | spring.")
+        str, typer.Option(help="How the simulation models links: beam | spring | fem.")
     ] = "beam",
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")

@@ -25,11 +25,14 @@ from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from assembly.robot import BeamLink, Clearance, Frame, Robot
 from stiffness.reading import BadInput
+from validation.exudyn_model import MeshBody
 from validation.multibody import MultibodyAssembly
+from validation.solids import mesh_bodies
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to no error
 FLOOR = {"rotation": 1e-10, "translation": 1e-11}  # [rad], [m] what simulations resolve
+KINDS = ("beam", "spring", "fem")
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 
@@ -213,12 +216,52 @@ def check_scales(scales: Sequence[float]) -> list[float]:
     return factors
 
 
+@dataclass(frozen=True, eq=False)
+class LinkModels:
+    """How a simulation models links, ready for ``simulate_assembly``.
+
+    Attributes:
+        links: ``"beam"`` or ``"spring"``.
+        stiffness: K_E of springs by frame.
+        meshes: solids by frame.
+    """
+
+    links: str
+    stiffness: Mapping[str, NDArray]
+    meshes: Mapping[str, MeshBody]
+
+
+def link_models(robot: Robot, kind: str) -> LinkModels:
+    """What a simulation needs to model a robot's links in one of three ways.
+
+    Args:
+        robot: any.
+        kind: ``"beam"``: beams as beams, all others as springs; ``"spring"``: all as
+            springs; ``"fem"``: meshed links as solids, the others as with ``"beam"``.
+
+    Returns:
+        Stiffnesses and solids.
+
+    Raises:
+        BadInput: an unknown kind, or a mesh is not usable.
+    """
+    if kind not in KINDS:
+        raise BadInput(f"links: found {kind!r}, expected one of {', '.join(KINDS)}")
+    meshes = mesh_bodies(robot) if kind == "fem" else {}
+    stiffness = {
+        name: K
+        for name, K in link_stiffnesses(robot, kind).items()
+        if name not in meshes
+    }
+    return LinkModels("spring" if kind == "spring" else "beam", stiffness, meshes)
+
+
 def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
     """K_E of the links that a simulation will model as springs.
 
     Args:
         robot: any.
-        links: ``"beam"``, where beams need none, or ``"spring"``.
+        links: ``"spring"``, or anything else, where beams need none.
 
     Returns:
         By frame, (6, 6) [N m/rad .. N/m] in its axes.

@@ -43,7 +43,7 @@ from validation.comparison import (
     exact_answer,
     fit_slope,
     limit_difference,
-    link_stiffnesses,
+    link_models,
     scaled,
     spring_limits,
 )
@@ -230,7 +230,8 @@ def crosscheck(
         scales: at least two different factors on errors and load, > 0.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"beam"``: beams bend geometrically exactly; ``"spring"``: every link
-            is its K_E in the simulation too, which checks everything but the beams.
+            is its K_E in the simulation too, which checks everything but the beams;
+            ``"fem"``: meshed links are solids in floating frames.
 
     Returns:
         Both answers at every scale, and the verdict.
@@ -244,11 +245,11 @@ def crosscheck(
     factors = check_scales(scales)
     tight = replace(posture, robot=without_clearance(posture.robot))
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    stiffness = link_stiffnesses(tight.robot, links)
+    models = link_models(tight.robot, links)
     pairs = []
     for s in factors:
         linear = solve_assembly(scaled(tight, s), s * wrench)
-        simulated = simulate_assembly(tight, s, links, stiffness, s * wrench)
+        simulated = simulate_assembly(tight, s, load=s * wrench, **vars(models))
         pairs.append(Pair(s, linear, simulated, exact_answer(linear)))
     return Crosscheck(tight, wrench, links, tuple(pairs))
 

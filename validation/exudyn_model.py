@@ -7,6 +7,7 @@ wrenches [T R]; everything in and out of here is [R T] like in the whole library
 
 from dataclasses import dataclass, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,16 +88,15 @@ class Elastic:
 
 
 @dataclass(frozen=True, eq=False)
-class MeshBody:
-    """A link as a solid of finite elements, with two rigid interfaces.
+class Solid:
+    """A link as finite elements, with two rigid interfaces, in its mesh's axes.
 
     Attributes:
-        nodes: (n, 3) [m] in the mesh's axes.
+        nodes: (n, 3) [m].
         stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
         base: (k,) nodes of the interface at the parent's side.
         tip: (m,) nodes of the interface at the frame's side.
         centers: (2, 3) [m] where base and tip are read.
-        turn: (3, 3) the mesh's axes seen from the frame's.
     """
 
     nodes: NDArray
@@ -104,6 +104,18 @@ class MeshBody:
     base: NDArray
     tip: NDArray
     centers: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeshBody:
+    """A solid put where a robot has it.
+
+    Attributes:
+        solid: shared by all links of one shape; it is condensed once.
+        turn: (3, 3) the mesh's axes seen from the frame's.
+    """
+
+    solid: Solid
     turn: NDArray
 
 
@@ -262,27 +274,18 @@ class Model:
         Returns:
             The elastic part from the place to the tip.
         """
-        femlink = self.fem.FEMinterface()
-        femlink.nodes = {"Position": body.nodes}
-        femlink.surface = [{"Name": "none", "Trigs": []}]
-        femlink.stiffnessMatrix = body.stiffness
-        femlink.massMatrix = identity(3 * len(body.nodes), format="csr")  # unused
-        femlink.ComputeHurtyCraigBamptonModes(
-            [body.base.tolist(), body.tip.tolist()],
-            0,
-            computationMode=self.fem.HCBstaticModeSelection.RBE2,
-        )
-        floating = self.fem.ObjectFFRFreducedOrderInterface(femlink)
-        origin = place.moved(matrix(body.turn, -body.turn @ body.centers[1]))
+        solid = body.solid
+        floating = _floating(self.fem, solid)
+        origin = place.moved(matrix(body.turn, -body.turn @ solid.centers[1]))
         numbers = floating.AddObjectFFRFreducedOrder(
             self.mbs,
             positionRef=origin.built[:3, 3].tolist(),
             rotationMatrixRef=origin.built[:3, :3],
         )
-        solid = numbers["oFFRFreducedOrder"]
-        base = origin.moved(shifted(body.centers[0]))
-        markers = [self._interface(solid, body, k) for k in range(2)]
-        far = self.add_body(origin.moved(shifted(body.centers[1])).built)
+        number = int(numbers["oFFRFreducedOrder"])
+        base = origin.moved(shifted(solid.centers[0]))
+        markers = [self._interface(number, solid, k) for k in range(2)]
+        far = self.add_body(origin.moved(shifted(solid.centers[1])).built)
         for pair in (
             [self.add_marker(base), markers[0]],
             [markers[1], self.add_marker(far)],
@@ -292,16 +295,17 @@ class Model:
         wrench = _tip_wrenches(body, np.asarray(floating.modeBasis), K)
         modes = Modes(int(numbers["nGenericODE2"]), K, wrench)
         tip = far.moved(matrix(body.turn.T, np.zeros(3)))
-        return Elastic(place, tip, (int(solid),), modes=modes)
+        return Elastic(place, tip, (number,), modes=modes)
 
-    def _interface(self, solid: Any, body: MeshBody, side: int) -> int:
+    def _interface(self, number: int, solid: Solid, side: int) -> int:
         """A marker that moves with an interface, 0 the base and 1 the tip."""
-        nodes, center = (body.base, body.tip)[side], body.centers[side]
+        nodes = (solid.base, solid.tip)[side]
+        arms = solid.nodes[nodes] - solid.centers[side]
+        # weights whose mean is the centre: an offset would not turn with the nodes
+        rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
+        weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
         marker = self.item.MarkerSuperElementRigid(
-            bodyNumber=solid,
-            meshNodeNumbers=nodes.tolist(),
-            weightingFactors=np.full(len(nodes), 1 / len(nodes)),
-            offset=(center - body.nodes[nodes].mean(axis=0)).tolist(),
+            bodyNumber=number, meshNodeNumbers=nodes.tolist(), weightingFactors=weights
         )
         return int(self.mbs.AddMarker(marker))
 
@@ -495,12 +499,33 @@ class Model:
 
 def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
     """(6, 6) wrench at the tip, frame's axes, of unit mode coordinates."""
-    arms = body.nodes[body.tip] - body.centers[1]
+    solid = body.solid
+    arms = solid.nodes[solid.tip] - solid.centers[1]
     rigid = np.zeros((len(arms), 3, 6))
     for k in range(3):
         rigid[:, :, k] = np.cross(np.eye(3)[k], arms)
         rigid[:, k, 3 + k] = 1.0
-    moved = basis.reshape(-1, 3, basis.shape[1])[body.tip]
+    moved = basis.reshape(-1, 3, basis.shape[1])[solid.tip]
     screws = np.linalg.lstsq(rigid.reshape(-1, 6), moved.reshape(-1, 6))[0]
     turn = np.kron(np.eye(2), body.turn)
     return turn @ np.linalg.solve(screws.T, K)
+
+
+_CONDENSED: WeakKeyDictionary[Solid, Any] = WeakKeyDictionary()
+
+
+def _floating(fem: Any, solid: Solid) -> Any:
+    """Exudyn's floating body of a solid, condensed at its first use."""
+    if solid not in _CONDENSED:
+        link = fem.FEMinterface()
+        link.nodes = {"Position": solid.nodes}
+        link.surface = [{"Name": "none", "Trigs": []}]
+        link.stiffnessMatrix = solid.stiffness
+        link.massMatrix = identity(3 * len(solid.nodes), format="csr")  # unused
+        link.ComputeHurtyCraigBamptonModes(
+            [solid.base.tolist(), solid.tip.tolist()],
+            0,
+            computationMode=fem.HCBstaticModeSelection.RBE2,
+        )
+        _CONDENSED[solid] = fem.ObjectFFRFreducedOrderInterface(link)
+    return _CONDENSED[solid]

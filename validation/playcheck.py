@@ -34,7 +34,7 @@ from validation.comparison import (
     exact_answer,
     extrapolate,
     limit_difference,
-    link_stiffnesses,
+    link_models,
     scaled,
 )
 from validation.multibody import simulate_assembly
@@ -197,7 +197,7 @@ def optimality_gap(pair: Pair) -> float:
         cones, minus the least one; relative to the energy stored without any play.
     """
     best = pair.linear
-    small = reduce_problem(linearise(best.posture), best.joints, best.load)
+    small = reduce_problem(linearise(best.posture), best.joints, best.forces)
     cones = best.joints.cones
     # a column of cones has one entry, its bound
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
@@ -219,7 +219,7 @@ def playcheck(
         posture: where the robot stands.
         scales: at least two different factors on errors, clearances and load, > 0.
         load: (6,) [N m, N] on the platform at its origin, base axes.
-        links: ``"beam"`` or ``"spring"``, as in :func:`simulate_assembly`.
+        links: ``"beam"``, ``"spring"`` or ``"fem"``, as for a cross-check.
 
     Returns:
         Both answers at every scale, and the verdict.
@@ -230,12 +230,12 @@ def playcheck(
         CannotAssemble: the virtual-joint model has none.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    stiffness = link_stiffnesses(posture.robot, links)
+    models = link_models(posture.robot, links)
     pairs = []
     for s in check_scales(scales):
         linear = solve_assembly(scaled(posture, s), s * wrench)
         simulated = simulate_assembly(
-            posture, s, links, stiffness, s * wrench, clearances=True
+            posture, s, load=s * wrench, clearances=True, **vars(models)
         )
         pairs.append(Pair(s, linear, simulated, exact_answer(linear)))
     return PlayCheck(posture, wrench, links, tuple(pairs))
