@@ -29,6 +29,10 @@ LoadOption = Annotated[
     list[str] | None,
     typer.Option("--load", help="Load on the platform, such as fx=10,mz=1."),
 ]
+GravityOption = Annotated[
+    list[str] | None,
+    typer.Option("--gravity", help="Gravity in base axes [m/s^2], such as z=-9.81."),
+]
 JsonOption = Annotated[
     str | None,
     typer.Option("--json", help="Write results as JSON to a file; - is stdout."),
@@ -56,6 +60,29 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
             hint = nearest(name, names)
             raise BadInput(f'--load: unknown component "{name}"{hint}')
     return [given.get(name, 0.0) for name in names]
+
+
+def parse_gravity(texts: list[str] | None) -> list[float] | None:
+    """Gravity (3,) [m/s^2] from ``--gravity``; None if not given.
+
+    Args:
+        texts: such as ``["z=-9.81"]``.
+
+    Returns:
+        Three numbers in base axes.
+
+    Raises:
+        BadInput: a name other than x, y, z, or not a number.
+    """
+    if not texts:
+        return None
+    given = parse_assignments(texts, "--gravity")
+    for name in given:
+        if name not in "xyz":
+            raise BadInput(
+                f'--gravity: unknown component "{name[:60]}"; valid: x, y, z'
+            )
+    return [given.get(name, 0.0) for name in "xyz"]
 
 
 def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
@@ -104,17 +131,36 @@ def solve(
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
+    gravity: GravityOption = None,
     json: JsonOption = None,
 ) -> None:
     """Close the robot at least energy: pose error, energy, wrenches, zone margin."""
     from assembly.results import solution_of, solution_text
 
-    results = solution_of(posture_of(robot, pose, joint), parse_load(load))
+    results = solution_of(
+        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity)
+    )
     write_json(results, json)
     if json != "-":
         print(solution_text(results))
     if results["status"] != "ok":
         raise typer.Exit(1)
+
+
+@app.command()
+def zone(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Say whether the rigid robot goes together by its play alone, and the margin."""
+    from assembly.results import zone_of, zone_text
+
+    found = zone_of(posture_of(robot, pose, joint))
+    write_json({"robot": robot, "zone": found}, json)
+    if json != "-":
+        print(zone_text(found))
 
 
 @app.command()

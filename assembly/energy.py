@@ -34,6 +34,7 @@ from assembly.closure import (
     virtual_joints,
 )
 from assembly.conic import LeastEnergy, cone_sizes, minimise_energy
+from assembly.load import Forces, forces_on, weights
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion, Reduction, reduce_problem
 
@@ -53,6 +54,7 @@ class Assembly:
         linearisation: the assembly constraints it satisfies.
         joints: what was allowed to move.
         load: (6,) [N m, N] on the platform at its origin, base axes.
+        forces: of all loads, this one among them, on every small screw.
         elastic: (ny,) [sqrt(2 J)] scaled deformation of the springs.
         clearances: (nu,) clearances in units of their cones.
         motions: (nq,) [rad, m] free motions.
@@ -64,6 +66,7 @@ class Assembly:
     linearisation: Linearisation
     joints: VirtualJoints
     load: NDArray
+    forces: Forces
     elastic: NDArray
     clearances: NDArray
     motions: NDArray
@@ -83,8 +86,11 @@ class Assembly:
 
     @property
     def potential(self) -> float:
-        """[J] energy minus the work of the load."""
-        return self.energy - float(self.load @ self.platform_screw)
+        """[J] energy minus the work of the loads."""
+        bodies = self.posture.robot.errors + self.link_screws
+        joints = self.clearance_screws + self.joint_screws
+        work = self.forces.body @ bodies.ravel() + self.forces.joint @ joints.ravel()
+        return self.energy - float(work)
 
     @cached_property
     def clearance_screws(self) -> NDArray:
@@ -126,14 +132,24 @@ class Assembly:
 
     @cached_property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on the inner through each frame.
+        """(n, 6) [N m, N] what the outer part exerts on the inner through each body.
 
-        At the frame's origin, in its axes; equal to K times the deformation there.
+        At the frame's origin, in its axes; equal to K_E times the link's deformation.
         """
-        robot = self.posture.robot
-        at_platform = closure_signs(robot).T @ self.closure_wrenches
-        loaded = robot.on_path[robot.index(robot.platform)]
-        at_platform = at_platform + loaded[:, None] * self.load
+        return self._closing + self.forces.body.reshape(-1, 6)
+
+    @cached_property
+    def joint_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] the same through each joint, equal to K_B times its screw.
+
+        They differ from :attr:`wrenches` by loads on the body, its weight for one.
+        """
+        return self._closing + self.forces.joint.reshape(-1, 6)
+
+    @cached_property
+    def _closing(self) -> NDArray:
+        """(n, 6) [N m, N] through each frame from the closures alone."""
+        at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("nji,nj->ni", self.posture.paths, at_platform)
 
     @cached_property
@@ -145,12 +161,14 @@ class Assembly:
         gain).  Nothing of how the problem was solved enters; free motions count as
         no larger than the answer's.
         """
-        w = self.wrenches.ravel()
-        joints = self.joints
-        springs = joints.elastic.T @ w
-        play = float(cone_sizes(joints.cones.T @ w, joints.group).sum())
-        slip = float(np.abs(joints.free.T @ w) @ np.abs(self.motions))
-        errors = float(w @ self.posture.robot.errors.ravel())
+        body, joint = self.wrenches.ravel(), self.joint_wrenches.ravel()
+        columns = self.joints
+        springs = np.where(
+            columns.links, columns.elastic.T @ body, columns.elastic.T @ joint
+        )
+        play = float(cone_sizes(columns.cones.T @ joint, columns.group).sum())
+        slip = float(np.abs(columns.free.T @ joint) @ np.abs(self.motions))
+        errors = float(body @ self.posture.robot.errors.ravel())
         return -errors - float(springs @ springs) / 2 - play - slip
 
     def closure_residual(self) -> float:
@@ -174,28 +192,42 @@ class Assembly:
         return self.duality_gap() / scale
 
 
-def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
-    """Close a manipulator at least energy, problem (22), under an optional load.
+def solve_assembly(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> Assembly:
+    """Close a manipulator at least energy, problem (22), under optional loads.
 
     Args:
         posture: where the robot stands; its errors, clearances, links and joint
             springs are the robot's.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes; energy
             minus its work is then what is minimised.
+        bodies: (n, 6) [N m, N] wrenches on the bodies of all frames, each at its
+            frame's origin, base axes.
+        gravity: (3,) [m/s^2] base axes; links with a density and bodies with a mass
+            then have weight.
 
     Returns:
         The assembled manipulator with its certificate.
 
     Raises:
         CannotAssemble: a closure is open that no play and no spring can close.
-        FreeMotion: the load drives a motion that nothing resists.
+        FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
     """
     lin = linearise(posture)
-    wrench = None if load is None else np.asarray(load, dtype=float)
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    carried = None
+    if gravity is not None:
+        own, carried = weights(posture, gravity)
+        bodies = own if bodies is None else own + np.asarray(bodies)
+    forces = forces_on(posture, wrench, bodies, carried)
     robot = posture.robot
     try:
-        answer = solve_with(lin, virtual_joints(robot), wrench)
+        answer = solve_with(lin, virtual_joints(robot), wrench, forces)
     except FreeMotion:
         if not has_bounded_motion(robot):
             raise
@@ -203,11 +235,12 @@ def solve_assembly(posture: Posture, load: ArrayLike | None = None) -> Assembly:
         if answer.clearance_excess() <= 1e-9:
             return answer
     # the bound of a passive joint's own motion was left out, but it matters
-    return solve_with(lin, virtual_joints(robot, bounded_motion=True), wrench)
+    joints = virtual_joints(robot, bounded_motion=True)
+    return solve_with(lin, joints, wrench, forces)
 
 
 def solve_with(
-    lin: Linearisation, joints: VirtualJoints, load: NDArray | None = None
+    lin: Linearisation, joints: VirtualJoints, load: NDArray, forces: Forces
 ) -> Assembly:
     """Close a manipulator at least energy with a given choice of what may move.
 
@@ -215,23 +248,24 @@ def solve_with(
         lin: the assembly constraints.
         joints: what may move.
         load: (6,) [N m, N] on the platform at its origin, base axes.
+        forces: of all loads, this one among them.
 
     Returns:
         The assembled manipulator.
 
     Raises:
         CannotAssemble: a closure is open that nothing can close.
-        FreeMotion: the load drives a motion that nothing resists.
+        FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
     """
-    small = reduce_problem(lin, joints, load)
+    small = reduce_problem(lin, joints, forces)
     least = _minimise(small)
     u = least.clearances
     y = small.springs(u)
     q = small.motions(u, y)
     multipliers = small.multipliers(u, least.rigid_multipliers)
     return Assembly(
-        lin, joints, small.load, y, u, q, multipliers, small.energy_without_play,
+        lin, joints, load, forces, y, u, q, multipliers, small.energy_without_play,
         small.ranks,
     )  # fmt: skip
 

@@ -214,7 +214,7 @@ def reachable_screws(
     """
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
-    if reading == "budget" and (np.any(answer.load) or energy_budget < 0):
+    if reading == "budget" and (answer.forces or energy_budget < 0):
         raise ValueError("the budget reading needs no load and a budget >= 0")
     robot = answer.posture.robot
     bounded = answer.joints.bounded_motion
@@ -298,7 +298,7 @@ def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:
     Returns:
         (nu,) bool, the same for all columns of a cone.
     """
-    wrenches = answer.wrenches.ravel()
+    wrenches = answer.joint_wrenches.ravel()
     push = cone_sizes(joints.cones.T @ wrenches, joints.group)
     screws = answer.clearance_screws.ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
@@ -311,7 +311,7 @@ def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:
 def _without_own_springs(answer: Assembly) -> Assembly:
     """The least energy when compliant joints turn freely about their own axis."""
     joints = virtual_joints(answer.posture.robot, "hinged")
-    return solve_with(answer.linearisation, joints, answer.load)
+    return solve_with(answer.linearisation, joints, answer.load, answer.forces)
 
 
 def _farthest(

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, svd
 
 from assembly.closure import Linearisation, VirtualJoints
+from assembly.load import Forces, forces_on
 
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 # what a projection leaves of columns that it removes whole is rounding of their size
@@ -49,8 +50,8 @@ class Reduction:
         H: (p, nu) rows that no spring can take up.
         k: (p,) their right sides.
         inconsistent: [-] scaled misfit that nothing at all can take up; 0 if none.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        preload: (6 closures,) multipliers by which the load passes free motions.
+        forces: of the loads on every small screw.
+        preload: (6 closures,) multipliers by which the loads pass free motions.
         basis: (6 closures, m) orthonormal, orthogonal to all free motions.
         rigid: (m, p) rows of ``basis`` combined into those of H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
@@ -66,7 +67,7 @@ class Reduction:
     H: NDArray
     k: NDArray
     inconsistent: float
-    load: NDArray
+    forces: Forces
     preload: NDArray
     basis: NDArray
     rigid: NDArray
@@ -80,10 +81,8 @@ class Reduction:
 
     @property
     def load_springs(self) -> NDArray:
-        """(ny,) [sqrt(2 J)] the deformation the load alone would cause."""
-        rows, platform = self.linearisation.rows, self.linearisation.platform
-        pull = rows.T @ self.preload + platform.T @ self.load
-        return self.joints.elastic.T @ pull
+        """(ny,) [sqrt(2 J)] the deformation the loads alone would cause."""
+        return spring_pull(self.linearisation, self.joints, self.forces, self.preload)
 
     @property
     def energy_without_play(self) -> float:
@@ -105,29 +104,31 @@ class Reduction:
 
 
 def reduce_problem(
-    linearisation: Linearisation, joints: VirtualJoints, load: NDArray | None = None
+    linearisation: Linearisation, joints: VirtualJoints, forces: Forces | None = None
 ) -> Reduction:
     """Eliminate free motions and springs.
 
     Args:
         linearisation: the assembly constraints.
         joints: what may move.
-        load: (6,) [N m, N] wrench on the platform at its origin in base axes.
+        forces: of the loads on every small screw; none if absent.
 
     Returns:
         The problem in the clearances.
 
     Raises:
-        FreeMotion: the load works along a motion that nothing resists.
+        FreeMotion: a load works along a motion that nothing resists.
     """
-    load = np.zeros(6) if load is None else np.asarray(load, dtype=float)
-    A, P = linearisation.rows, linearisation.platform
+    if forces is None:
+        forces = forces_on(linearisation.posture)
+    A = linearisation.rows
     tolerance = _RANK + 30.0 * linearisation.posture.mismatch
     Z = complement(A @ joints.free, tolerance)
-    preload = _preload(A @ joints.free, P @ joints.free, load)
+    preload = _preload(A @ joints.free, joints.free.T @ forces.joint)
     A_u, A_y = Z.T @ A @ joints.cones, Z.T @ A @ joints.elastic
-    pull = A.T @ preload + P.T @ load  # how the load acts on every small screw
-    right = -Z.T @ linearisation.misfit - A_y @ (joints.elastic.T @ pull)
+    d = joints.cones.T @ (A.T @ preload + forces.joint)
+    sag = spring_pull(linearisation, joints, forces, preload)
+    right = -Z.T @ linearisation.misfit - A_y @ sag
 
     U, S, Vt = svd(A_y, full_matrices=True)
     noise = NOISE * np.abs(A @ joints.elastic).max(initial=0.0)
@@ -140,8 +141,8 @@ def reduce_problem(
         noise=NOISE * np.abs(A @ joints.cones).max(initial=0.0),
     )  # fmt: skip
     return Reduction(
-        linearisation, joints, G, h, joints.cones.T @ pull, H, k, inconsistent,
-        load, preload, Z, rigid,
+        linearisation, joints, G, h, d, H, k, inconsistent,
+        forces, preload, Z, rigid,
         elastic_inverse=(Vt[:rank].T / S[:rank]) @ grip.T,
         spread=Vt[:rank].T,
         ranks={
@@ -167,12 +168,30 @@ def complement(A: NDArray, tolerance: float) -> NDArray:
     return Q[:, rank:]
 
 
-def _preload(A_q: NDArray, P_q: NDArray, load: NDArray) -> NDArray:
-    """Multipliers that balance the load along every free motion."""
-    wanted = -P_q.T @ load
-    found = np.linalg.lstsq(A_q.T, wanted, rcond=_RANK)[0]
-    left = np.abs(A_q.T @ found - wanted).max(initial=0.0)
-    if left > 1e-8 * np.abs(P_q.T * load).max(initial=1e-300):
+def spring_pull(
+    lin: Linearisation, joints: VirtualJoints, forces: Forces, multipliers: NDArray
+) -> NDArray:
+    """How closures and loads pull the springs.
+
+    Args:
+        lin: the assembly constraints.
+        joints: whose springs are asked about.
+        forces: of the loads.
+        multipliers: (6 closures,) of the scaled closures.
+
+    Returns:
+        (ny,) [sqrt(2 J)]: the springs' scaled deformations in balance with them.
+    """
+    closing = lin.rows.T @ multipliers
+    body = joints.elastic.T @ (closing + forces.body)
+    return np.where(joints.links, body, joints.elastic.T @ (closing + forces.joint))
+
+
+def _preload(A_q: NDArray, drive: NDArray) -> NDArray:
+    """Multipliers that balance the loads along every free motion."""
+    found = np.linalg.lstsq(A_q.T, -drive, rcond=_RANK)[0]
+    left = np.abs(A_q.T @ found + drive).max(initial=0.0)
+    if left > 1e-8 * np.abs(drive).max(initial=1e-300):
         raise FreeMotion("the load drives a motion that no joint or spring resists")
     return found
 

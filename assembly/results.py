@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
+from assembly.load import forces_on
 from assembly.mobility import mobility
 from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture
@@ -16,12 +17,38 @@ from assembly.reduction import FreeMotion
 from assembly.zone import zone_margin
 
 
-def solution_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, Any]:
+def zone_of(posture: Posture) -> dict[str, Any]:
+    """Margins of (21) in both readings of compliant joints, as plain values."""
+    rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
+    return {
+        "assemblable": rigid.assemblable,
+        "assemblable_free": free.assemblable,
+        "margin": rigid.margin,
+        "margin_free": free.margin,
+        "margin_bound": rigid.bound,
+        "margin_free_bound": free.bound,
+    }
+
+
+def zone_text(zone: dict[str, Any]) -> str:
+    """Margins for people: one line."""
+    return (
+        f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
+        f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
+    )
+
+
+def solution_of(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> dict[str, Any]:
     """Everything ``assembly solve`` reports, as plain values.
 
     Args:
         posture: where the robot stands.
         load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
 
     Returns:
         The keys of the public format; ``status`` is ``"ok"``, or says what could not
@@ -37,19 +64,12 @@ def solution_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, An
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
         "load": np.zeros(6) if load is None else np.asarray(load),
+        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
     empty = {"energy": None, "platform_screw": None, "frames": None, "closures": None}
     try:
-        rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
-        results["zone"] = {
-            "assemblable": rigid.assemblable,
-            "assemblable_free": free.assemblable,
-            "margin": rigid.margin,
-            "margin_free": free.margin,
-            "margin_bound": rigid.bound,
-            "margin_free_bound": free.bound,
-        }
-        return results | _answer(solve_assembly(posture, load))
+        results["zone"] = zone_of(posture)
+        return results | _answer(solve_assembly(posture, load, gravity=gravity))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = _STATUS[_kind(error)]
         return results | empty | {"status": status, "reason": str(error)}
@@ -75,12 +95,15 @@ def _answer(answer: Assembly) -> dict[str, Any]:
 def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
     """Energy, pose error, and what happens at every frame and closure."""
     robot = answer.posture.robot
+    # a body's own weight is what the two may differ by; the exact model has none
+    through = answer.joint_wrenches if isinstance(answer, Assembly) else answer.wrenches
     frames = {
         f.name: {
             "clearance": answer.clearance_screws[i],
             "link": answer.link_screws[i],
             "joint": answer.joint_screws[i],
             "wrench": answer.wrenches[i],
+            "joint_wrench": through[i],
         }
         for i, f in enumerate(robot.frames)
     }
@@ -99,6 +122,9 @@ def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
 
 def _linearisation_error(answer: Assembly) -> dict[str, Any]:
     """What the linear closures cost here: linear minus exact, or why it is unknown."""
+    platform_only = forces_on(answer.posture, answer.load)
+    if not np.array_equal(platform_only.joint, answer.forces.joint):
+        return {"status": "not known with weights and loads on bodies"}
     try:
         exact = solve_exact(answer.posture, answer.load, answer)
     except SolverFailed as error:
@@ -257,11 +283,7 @@ def solution_text(results: dict[str, Any]) -> str:
     """
     lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
     if "zone" in results:
-        zone = results["zone"]
-        lines.append(
-            f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
-            f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
-        )
+        lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
     screw, certificate = results["platform_screw"], results["certificate"]

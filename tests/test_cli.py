@@ -50,7 +50,7 @@ def test_solve_writes_the_public_keys_to_standard_output_and_nothing_else(
     }  # fmt: skip
     frame = found["frames"]["leg1.link_a"]
     assert {k: len(v) for k, v in frame.items()} == dict.fromkeys(
-        ("clearance", "link", "joint", "wrench"), 6
+        ("clearance", "link", "joint", "wrench", "joint_wrench"), 6
     )
     assert found["closures"][-1]["frames"] == ["leg1.tip", "leg2.tip"]
     assert len(found["closures"][-1]["wrench"]) == 6
@@ -121,6 +121,35 @@ def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+def test_zone_gives_both_margins(run, robot_file):
+    status, out, _ = run("assembly", "zone", robot_file, "--pose", "tx=0.4,tz=-0.45",
+                         "--json", "-")  # fmt: skip
+    zone = json.loads(out)["zone"]
+    point = NUMBERS["cases"][0]["points"][3]
+    assert status == 0
+    assert zone["margin"] == pytest.approx(point["t_compliant_rigid"])
+    assert zone["margin_free"] == pytest.approx(point["t_compliant_free"])
+    assert (zone["assemblable"], zone["assemblable_free"]) == (False, True)
+
+
+def test_exact_states_what_the_linear_model_gets_wrong(run, robot_file):
+    status, out, _ = run("assembly", "exact", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", "-")  # fmt: skip
+    found = json.loads(out)
+    assert status == 0
+    assert found["certificate"]["closure_residual"] < 1e-11
+    gap = np.subtract(found["linear"]["platform_screw"], found["platform_screw"])
+    assert np.allclose(found["linearisation_error"]["rotation"], gap[:3])
+    assert 1e-6 < np.linalg.norm(gap[3:]) < 2e-4  # tens of micrometres at full errors
+
+
+def test_gravity_pulls_an_arm_down(run):
+    _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
+    found = json.loads(out)
+    assert found["platform_screw"][5] < 0
+    assert found["potential"] == pytest.approx(-found["energy"], rel=1e-9)
+
+
 def test_show_draws_a_picture(run, robot_file, tmp_path):
     status, _, _ = run("assembly", "show", robot_file, "-o", tmp_path / "robot.png")
     assert status == 0
@@ -143,6 +172,7 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
         (["assembly", "solve", "irsbot2", "--load", "f=1"], '--load: unknown'),
         (["assembly", "solve", "irsbot2", "--json", "/nowhere/x.json"],
          "/nowhere/x.json: "),
+        (["assembly", "solve", "irsbot2", "--gravity", "w=1"], "--gravity: unknown"),
         (["assembly", "error", "irsbot2", "--reading", "fre"], '--reading: found'),
         (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
          "--tolerance-rotation: found -1.0, expected a finite number > 0"),

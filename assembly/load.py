@@ -1,0 +1,118 @@
+"""What pushes on a robot: the load on its platform, loads on its bodies, gravity.
+
+A dead load does work on every small screw between it and the base.  A load on the body
+of frame j acts before j's joint: the body's own error and deformation count, the
+joint's play and spring do not.  A load on what j's joint carries acts after it.
+
+The weight of a beam is spread over its length.  Its equivalent at the two ends is half
+the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
+then sags and turns as under the spread load (an exact statement for its ends; between
+them the beam sags a little more).
+
+Sources:
+    Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
+    load: end moments q L^2 / 12).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.links import beam_section
+from assembly.posture import Posture
+from assembly.robot import BeamLink, beam_axis
+from stiffness.screws import screw_map
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Loads as they act on the small screws of every frame, in its axes.
+
+    Attributes:
+        body: (6n,) [N m, N] on errors and deformations of bodies.
+        joint: (6n,) [N m, N] on play, springs and motion of joints.
+    """
+
+    body: NDArray
+    joint: NDArray
+
+    def __bool__(self) -> bool:
+        return bool(np.any(self.body) or np.any(self.joint))
+
+
+def forces_on(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None,
+    carried: ArrayLike | None = None,
+) -> Forces:
+    """Forces on all small screws of a robot.
+
+    Args:
+        posture: where it stands, of n frames.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
+        carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
+
+    Returns:
+        The forces; all zero where nothing is given.
+    """
+    robot = posture.robot
+    on_body, after = np.zeros((2, len(robot.frames), 6))
+    if bodies is not None:
+        on_body += np.asarray(bodies, dtype=float)
+    if carried is not None:
+        after += np.asarray(carried, dtype=float)
+    if load is not None:
+        on_body[robot.index(robot.platform)] += np.asarray(load, dtype=float)
+    # all read at the platform's origin, then summed over what each frame carries
+    read = screw_map(posture.platform[:3, 3] - posture.transforms[:, :3, 3])
+    read = np.swapaxes(read, 1, 2)
+    own = np.einsum("nij,nj->ni", read, on_body)
+    after = np.einsum("nij,nj->ni", read, after)
+    below = (robot.on_path & ~np.eye(len(own), dtype=bool)).T
+    joint = below @ (own + after) + after
+    paths = posture.paths
+    return Forces(
+        np.einsum("nji,nj->ni", paths, joint + own).ravel(),
+        np.einsum("nji,nj->ni", paths, joint).ravel(),
+    )
+
+
+def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Weight of all links with a density and of all bodies with a mass.
+
+    Args:
+        posture: where the robot stands, of n frames.
+        gravity: (3,) [m/s^2] base axes, such as (0, 0, -9.81).
+
+    Returns:
+        ``bodies`` (n, 6) and ``carried`` (n, 6) of :func:`forces_on` [N m, N].  Links
+        given by a matrix, a mesh or a library have no weight of their own here.
+    """
+    g = np.asarray(gravity, dtype=float)
+    robot, T = posture.robot, posture.transforms
+    bodies, carried = np.zeros((2, len(robot.frames), 6))
+    for i, frame in enumerate(robot.frames):
+        R = T[i, :3, :3]
+        if frame.mass:
+            arm = R @ frame.centre_of_mass
+            bodies[i] += _wrench(frame.mass * g, np.cross(arm, frame.mass * g))
+        link = frame.link
+        if isinstance(link, BeamLink) and link.density is not None:
+            length, axis = beam_axis(frame)
+            W = link.density * beam_section(link).area * length * g
+            clamp = np.cross(R @ (length * axis), W) / 12
+            bodies[i] += _wrench(W / 2, -clamp)
+            parent = robot.parents[i]
+            if parent >= 0:  # else the base carries it
+                # the beam starts where it starts, be that the parent's origin or not
+                arm = T[i, :3, 3] - R @ (length * axis) - T[parent, :3, 3]
+                carried[parent] += _wrench(W / 2, clamp + np.cross(arm, W / 2))
+    return bodies, carried
+
+
+def _wrench(force: NDArray, moment: NDArray) -> NDArray:
+    """``[m f]``."""
+    return np.concatenate([moment, force])
