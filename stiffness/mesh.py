@@ -46,7 +46,7 @@ class Solid:
         cells: (t, 4) corners of tetrahedra, of positive volume.
         faces: (f, 3) corners of boundary triangles, outward.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: of the patches; None where only facets are known.
+        shapes: of the patches; None leaves a patch's nodes where they are.
     """
 
     points: NDArray

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.facets import Facets
 from stiffness.interface import Interface
 from stiffness.reading import BadInput
 from stiffness.shapes import (
@@ -30,11 +31,11 @@ class Patches:
 
     Attributes:
         patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
-        shapes: of each patch; None where the facets are all that is known.
+        shapes: of each patch; lifted facets where no simpler one is known.
     """
 
     patch: NDArray
-    shapes: tuple[Shape | None, ...]
+    shapes: tuple[Shape, ...]
 
 
 def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
@@ -52,7 +53,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
         BadInput: an interface has no part of the surface, or both have the same.
     """
     patch = np.full(len(surface.triangles), -1)
-    shapes: list[Shape | None] = []
+    shapes: list[Shape] = []
     for number, (name, interface) in enumerate((("base", base), ("tip", tip))):
         members = triangles_on(surface, interface, name)
         if (patch[members] >= 0).any():
@@ -63,7 +64,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
     for members in facets.smooth_parts(patch < 0):
         for part, shape in _recognise(facets, members):
             patch[part] = len(shapes)
-            shapes.append(shape)
+            shapes.append(shape or facets.lifted(part))
     return Patches(patch, tuple(shapes))
 
 
@@ -155,6 +156,11 @@ class _Facets:
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
         ]
+
+    def lifted(self, part: NDArray) -> Facets:
+        """A part of no known shape."""
+        used, index = np.unique(self.triangles[part], return_inverse=True)
+        return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
         """Which triangles of a part lie on a shape, corners and direction."""

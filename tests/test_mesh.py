@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from stiffness import mesh as mesh_module
+from stiffness.elements import integration, quadratic
+from stiffness.facets import Facets
 from stiffness.interface import parse_interface
 from stiffness.mesh import (
     MeshFailed,
@@ -314,6 +316,61 @@ def test_a_slot_is_two_planes_and_two_half_cylinders():
     patches = find_patches(surface, parse_interface("z=0"), parse_interface("z=0.05"))
     kinds = sorted(type(shape).__name__ for shape in patches.shapes[2:])
     assert kinds == ["Cone", "Cone", "Plane", "Plane"]
+
+
+def barrel(facets=32, layers=12):
+    """A surface of revolution that is no cone, sphere or torus; ends flat."""
+    z = np.linspace(0, 0.1, layers + 1)
+    radius = 0.02 + 0.006 * np.sin(np.pi * z / 0.1)
+    angle = 2 * np.pi * np.arange(facets) / facets
+    rings = np.stack(
+        np.broadcast_arrays(
+            radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle), z[:, None]
+        ),
+        axis=-1,
+    )
+    points = np.concatenate([rings.reshape(-1, 3), [[0, 0, 0], [0, 0, 0.1]]])
+    i = np.arange(facets)
+    j = (i + 1) % facets
+    triangles = []
+    for k in range(layers):
+        a, b = k * facets, (k + 1) * facets
+        triangles += [np.column_stack([i + a, j + a, j + b])]
+        triangles += [np.column_stack([i + a, j + b, i + b])]
+    last = layers * facets
+    triangles += [np.column_stack([0 * i + len(points) - 2, j, i])]
+    triangles += [np.column_stack([0 * i + len(points) - 1, i + last, j + last])]
+    exact = np.trapezoid(
+        np.pi * (0.02 + 0.006 * np.sin(np.pi * np.linspace(0, 1, 100001))) ** 2,
+        dx=0.1 / 100000,
+    )
+    return check_surface(points, np.concatenate(triangles), "barrel"), exact
+
+
+def test_facets_of_no_known_shape_are_lifted_toward_it():
+    """Middles of 32-sided rings lack 0.48 % of the radius, lifted ones 0.02 %."""
+    surface, _ = barrel()
+    patches = find_patches(surface, parse_interface("z=0"), parse_interface("z=0.1"))
+    (side,) = patches.shapes[2:]
+    assert isinstance(side, Facets)
+    half = np.pi / 32
+    middle = 0.026 * np.cos(half) * np.array([[np.cos(half), np.sin(half), 0]])
+    moved = project(middle + [0, 0, 0.05], (side,))
+    flat = 1 - np.hypot(*middle[0, :2]) / 0.026
+    lifted = abs(1 - np.hypot(*moved[0, :2]) / 0.026)
+    assert flat == pytest.approx(0.0048, abs=1e-4)
+    assert lifted < 2e-4
+
+
+@pytest.mark.slow
+def test_a_barrels_mesh_has_its_volume_not_its_facets(tmp_path):
+    """The facets lack more than 0.6 % of it; the curved mesh less than 0.1 %."""
+    surface, exact = barrel()
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    solid = mesh_solid(surface, *faces, edge=0.012, envelope=1e-3, cache=tmp_path)
+    volume = sum(w.sum() for *_, w in integration(quadratic(solid)))
+    assert surface.volume / exact - 1 < -0.006
+    assert abs(volume / exact - 1) < 0.001
 
 
 def test_an_interface_off_the_part_is_refused_with_the_parts_box():
