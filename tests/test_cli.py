@@ -147,7 +147,8 @@ def test_gravity_pulls_an_arm_down(run):
     _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
     found = json.loads(out)
     assert found["platform_screw"][5] < 0
-    assert found["potential"] == pytest.approx(-found["energy"], rel=1e-9)
+    # springs alone would give potential = -energy; the arm's play falls as well
+    assert found["potential"] < -found["energy"]
 
 
 def test_show_draws_a_picture(run, robot_file, tmp_path):
