@@ -89,6 +89,18 @@ class Expansion:
     rigid_right: NDArray
     rigid_basis: NDArray
 
+    @property
+    def small_wrench(self) -> float:
+        """[N m] scaled wrench of a misfit of 1e-9 in the stiffest spring: as good as 0."""
+        model = self.here.model
+        softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
+        return _MISFIT / float(softness.min(initial=1.0))
+
+    @property
+    def small_energy(self) -> float:
+        """[J] energy of a misfit of 1e-9."""
+        return _MISFIT * self.small_wrench / 2
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -191,7 +203,8 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     """
     start = local.here
     left_open = penalty * float(np.linalg.norm(start.residual))
-    least = max(float(np.abs(local.multipliers).max(initial=0.0)), 1e-9)
+    least = float(np.abs(local.multipliers).max(initial=local.small_wrench))
+    least = max(least, float(np.abs(local.load / start.model.scale).max()))
     before = potential(start, local.load) + left_open
     noise = 1e-13 * (abs(before) + abs(potential(start, np.zeros(6))))
     noise += 1e-14 * penalty
@@ -285,8 +298,7 @@ def imbalance(local: Expansion) -> float:
     """
     here, A, model = local.here, local.here.rows, local.here.model
     left = local.gradient - A.T @ local.multipliers
-    stiffness = np.linalg.norm(local.inverse[model.springs]) ** 2
-    wrench = np.linalg.norm(local.multipliers) + _MISFIT * stiffness
+    wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     pull = np.abs(here.platform_rows).T @ np.abs(local.load)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + pull
     # within a cone nothing pulls; at its rim the pull is straight outward

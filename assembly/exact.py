@@ -235,7 +235,7 @@ def _search(joints: VirtualJoints, linear: Assembly, load: NDArray) -> ExactAsse
         penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
         step = advance(local, penalty, damping, near)
         here, rigid, damping = step.there, step.rigid, step.damping
-        scale = _energy_scale(here, linear, load)
+        scale = max(_energy_scale(here, linear, load), local.small_energy)
         near = step.decrement <= _NEAR * scale
         still = damping == 0.0 and step.length <= _STILL
         still = still or abs(step.decrement) <= _DECREMENT * scale
@@ -266,4 +266,4 @@ def _energy_scale(here: Placement, linear: Assembly, load: NDArray) -> float:
     """[J] size of the energies at play."""
     energy = potential(here, np.zeros(6))
     work = abs(potential(here, load) - energy)
-    return max(energy, work, 1e-3 * linear.energy_without_play, 1e-300)
+    return max(energy, work, 1e-3 * linear.energy_without_play)

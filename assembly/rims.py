@@ -142,7 +142,7 @@ def _newton(p: PlayProblem) -> tuple[NDArray, NDArray] | None:
         u = u / np.where(rim | over, sizes, 1.0)[p.group]
         if not (over | slack).any() and np.abs(change).max(initial=0.0) < _STILL:
             v = u - p.start
-            rises = float(p.s @ v + v @ p.S @ v / 2) > 1e-12 * np.abs(p.S).max()
+            rises = float(p.s @ v + v @ p.S @ v / 2) > 1e-12 * np.abs(p.S).max(initial=0.0)
             return None if rises else (v, rigid)
         rim = (rim | over) & ~slack
     return None
