@@ -120,6 +120,26 @@ def test_a_load_is_scaled_with_the_errors(irsbot2):
         np.testing.assert_array_equal(pair.linear.load, pair.scale * answer.load)
 
 
+@pytest.mark.parametrize("links", ["beam", "spring"])
+def test_weight_is_the_same_on_both_sides(links):
+    """A slender, heavy pair of bars, and a body off its frame's origin."""
+    posture = triangle([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
+    heavy = replace(STEEL, density=7800.0)
+    frames = tuple(
+        replace(f, link=heavy, mass=3.0, centre_of_mass=[0.02, 0.05, -0.03])
+        if f.link is not None
+        else f
+        for f in posture.robot.frames
+    )
+    posture = home_posture(replace(posture.robot, frames=frames))
+    answer = crosscheck(posture, links=links, gravity=[1.0, -2.0, -9.81])
+    assert answer.passed, answer.checks
+    light = crosscheck(posture, links=links)
+    moved = answer.pairs[0].linear.platform_screw - light.pairs[0].linear.platform_screw
+    assert np.abs(moved[3:]).max() > 1e-5
+    assert ("energy" in answer.limits) == (links == "spring")
+
+
 def test_clearances_are_left_out_on_both_sides():
     """The play of 10 um would swallow the error of 8 um."""
     answer = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
@@ -363,6 +383,8 @@ def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
     assert len(found["optimality_gaps"]) == 2
     refused = run(str(file), "--clearances", "--figure", "slope.png")
     assert isinstance(refused.exception, BadInput)
+    refused = run(str(file), "--clearances", "--gravity", "z=-9.81")
+    assert "--gravity: not compared with --clearances" in str(refused.exception)
 
 
 def test_the_command_fails_with_status_1(monkeypatch):

@@ -6,11 +6,13 @@ from typing import Annotated
 import typer
 
 from assembly.cli import (
+    GravityOption,
     JointOption,
     JsonOption,
     LoadOption,
     PoseOption,
     RobotArgument,
+    parse_gravity,
     parse_load,
     posture_of,
 )
@@ -55,6 +57,7 @@ def crosscheck(
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
+    gravity: GravityOption = None,
     scale: Annotated[
         str, typer.Option(help="Factors on errors and load, largest first.")
     ] = "1,0.5,0.25,0.125",
@@ -76,16 +79,22 @@ def crosscheck(
     """
     from validation.crosscheck import Crosscheck, attempt
     from validation.crosscheck import crosscheck as compare_tight
-    from validation.playcheck import playcheck as compare_loose
+    from validation.playcheck import PlayCheck, playcheck
 
     scales, wrench = parse_scales(scale), parse_load(load)
+    g = parse_gravity(gravity)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
+    if clearances and g is not None:
+        raise BadInput("--gravity: not compared with --clearances")
     posture = posture_of(robot, pose, joint)
-    compare = compare_loose if clearances else compare_tight
-    answer, failure = attempt(
-        posture.robot.name, lambda: compare(posture, scales, wrench, links)
-    )
+
+    def compare() -> Crosscheck | PlayCheck:
+        if clearances:
+            return playcheck(posture, scales, wrench, links)
+        return compare_tight(posture, scales, wrench, links, g)
+
+    answer, failure = attempt(posture.robot.name, compare)
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
         print(failure["reason"] if answer is None else answer.text())

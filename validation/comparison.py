@@ -64,7 +64,7 @@ class Pair:
             "platform_screw": linear.platform_screw,
             "energy": linear.energy,
             "links": _named(robot, "link", linear.wrenches),
-            "joints": _named(robot, "joint_stiffness", linear.wrenches),
+            "joints": _named(robot, "joint_stiffness", linear.joint_wrenches),
         }
         multibody = {
             "platform_screw": simulated.platform_screw,
@@ -77,7 +77,9 @@ class Pair:
             "energy": simulated.energy - linear.energy,
             "links": _named(robot, "link", simulated.link_wrenches - linear.wrenches),
             "joints": _named(
-                robot, "joint_stiffness", simulated.joint_wrenches - linear.wrenches
+                robot,
+                "joint_stiffness",
+                simulated.joint_wrenches - linear.joint_wrenches,
             ),
         }
         check = {"closure_gap": simulated.gap, "seconds": simulated.seconds}
@@ -139,12 +141,16 @@ def scaled(posture: Posture, scale: float) -> Posture:
     return replace(posture, robot=replace(posture.robot, frames=frames))
 
 
-def spring_limits(robot: Robot, pairs: Sequence[Pair]) -> dict[str, float]:
+def spring_limits(
+    robot: Robot, pairs: Sequence[Pair], spread: bool = False
+) -> dict[str, float]:
     """Differences of springs and energy, extrapolated to no error.
 
     Args:
         robot: whose links and joint springs are looked at.
         pairs: both answers at several scales.
+        spread: loads act between the links' ends: what they store and carry there
+            is not in the linear model, and links' wrenches and energy are left out.
 
     Returns:
         By name, relative to the largest among all links or all joints; see
@@ -158,10 +164,11 @@ def spring_limits(robot: Robot, pairs: Sequence[Pair]) -> dict[str, float]:
         rows = [getattr(frame, part) is not None for frame in robot.frames]
         if not any(rows):
             continue
-        for what, linear, floor, labels in (
-            ("screws", f"{kind}_screws", screw, ("rotation", "translation")),
-            ("wrenches", "wrenches", stiff * screw, ("moment", "force")),
-        ):
+        wrench = "wrenches" if kind == "link" else "joint_wrenches"
+        compared = [("screws", f"{kind}_screws", screw, ("rotation", "translation"))]
+        if kind == "joint" or not spread:
+            compared.append(("wrenches", wrench, stiff * screw, ("moment", "force")))
+        for what, linear, floor, labels in compared:
             ours = np.array([getattr(p.linear, linear)[rows] for p in pairs])
             name = f"{kind}_{what}"
             theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
@@ -169,6 +176,8 @@ def spring_limits(robot: Robot, pairs: Sequence[Pair]) -> dict[str, float]:
                 limits[f"{kind} {label}"] = limit_difference(
                     scales, ours[..., half], theirs[..., half], 1, least
                 )
+    if spread:
+        return limits
     ours = np.array([pair.linear.energy for pair in pairs])
     theirs = np.array([pair.simulated.rigid_energy for pair in pairs])
     least = float((stiff * screw**2).max())

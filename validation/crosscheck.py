@@ -66,12 +66,14 @@ class Crosscheck:
         posture: nominal, of the robot without clearances.
         load: (6,) [N m, N] on the platform at scale 1, base axes.
         links: how the simulation modelled links, ``"beam"`` or ``"spring"``.
+        gravity: (3,) [m/s^2] at scale 1, base axes.
         pairs: one for each scale, largest first.
     """
 
     posture: Posture
     load: NDArray
     links: str
+    gravity: NDArray
     pairs: tuple[Pair, ...]
 
     @property
@@ -137,7 +139,8 @@ class Crosscheck:
                 self.scales, ours[:, half], theirs[:, half], 1, FLOOR[name]
             )
             limits[f"platform {name}"] = value
-        return limits | spring_limits(self.posture.robot, self.pairs)
+        spread = self.links != "spring" and bool(self.gravity.any())
+        return limits | spring_limits(self.posture.robot, self.pairs, spread)
 
     @cached_property
     def checks(self) -> dict[str, tuple[float, float]]:
@@ -170,6 +173,7 @@ class Crosscheck:
             "status": "ok",
             "pose": self.posture.pose(),
             "load": self.load,
+            "gravity": self.gravity,
             "links": self.links,
             "clearances": "left out on both sides",
             "scales": [pair.table(self.posture.robot) for pair in self.pairs],
@@ -222,6 +226,7 @@ def crosscheck(
     scales: Sequence[float] = SCALES,
     load: ArrayLike | None = None,
     links: str = "beam",
+    gravity: ArrayLike | None = None,
 ) -> Crosscheck:
     """Solve a robot with both models at several scales of its errors.
 
@@ -232,6 +237,8 @@ def crosscheck(
         links: ``"beam"``: beams bend geometrically exactly; ``"spring"``: every link
             is its K_E in the simulation too, which checks everything but the beams;
             ``"fem"``: meshed links are solids in floating frames.
+        gravity: (3,) [m/s^2] base axes; beams with a density and bodies with a mass
+            then have weight on both sides (the exact model has none and is left out).
 
     Returns:
         Both answers at every scale, and the verdict.
@@ -246,12 +253,16 @@ def crosscheck(
     tight = replace(posture, robot=without_clearance(posture.robot))
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     models = link_models(tight.robot, links)
+    g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     pairs = []
     for s in factors:
-        linear = solve_assembly(scaled(tight, s), s * wrench)
-        simulated = simulate_assembly(tight, s, load=s * wrench, **vars(models))
-        pairs.append(Pair(s, linear, simulated, exact_answer(linear)))
-    return Crosscheck(tight, wrench, links, tuple(pairs))
+        linear = solve_assembly(scaled(tight, s), s * wrench, gravity=s * g)
+        simulated = simulate_assembly(
+            tight, s, load=s * wrench, gravity=s * g, **vars(models)
+        )
+        exact = None if g.any() else exact_answer(linear)
+        pairs.append(Pair(s, linear, simulated, exact))
+    return Crosscheck(tight, wrench, links, g, tuple(pairs))
 
 
 def attempt(
@@ -286,6 +297,7 @@ def try_crosscheck(
     scales: Sequence[float] = SCALES,
     load: ArrayLike | None = None,
     links: str = "beam",
+    gravity: ArrayLike | None = None,
 ) -> tuple[Crosscheck | None, dict[str, Any]]:
     """A cross-check, or why there is none; see :func:`attempt` and :func:`crosscheck`.
 
@@ -294,9 +306,10 @@ def try_crosscheck(
         scales: factors on errors and load.
         load: (6,) [N m, N] on the platform.
         links: how the simulation models links.
+        gravity: (3,) [m/s^2] base axes.
 
     Returns:
         The cross-check or None, and the failure or nothing.
     """
     name = posture.robot.name
-    return attempt(name, lambda: crosscheck(posture, scales, load, links))
+    return attempt(name, lambda: crosscheck(posture, scales, load, links, gravity))
