@@ -22,7 +22,8 @@ from stiffness.surface import Surface
 
 _SHARP = np.cos(np.radians(35.0))  # a sharper edge than this is meant to be one
 _ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
-_SEEDS = 40  # tries to find a shape in what is left of a patch
+_SEEDS = 12  # tries to find a shape in what is left of a part
+_TRIES = 120  # on one surface; what is left then keeps its facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +131,7 @@ class _Facets:
         self.areas = np.linalg.norm(normals, axis=1)
         self.normals = normals / np.maximum(self.areas, 1e-300)[:, None]
         self.tolerance = _ON_SHAPE * surface.diagonal
+        self.tries = _TRIES
         edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         owner = np.repeat(np.arange(len(self.triangles)), 3)
         order = np.lexsort(edges.T)
@@ -202,6 +204,8 @@ def _fit(facets: _Facets, part: NDArray) -> Shape | None:
     """The simplest shape all corners of a part lie on."""
     points = facets.points[np.unique(facets.triangles[part])]
     normals = facets.normals[part]
+    # a few corners decide whether a shape is worth fitting to all of them
+    few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
         (fit_cone, 7),
@@ -211,27 +215,36 @@ def _fit(facets: _Facets, part: NDArray) -> Shape | None:
     for fit, least in tries:
         if len(points) < least:
             break
+        if len(few) < len(points) and not _lies_on(fit(few, normals), few, facets):
+            continue
         shape = fit(points, normals)
-        if np.abs(shape.signed(points)[0]).max() < facets.tolerance:
+        if _lies_on(shape, points, facets):
             return shape
     return None
+
+
+def _lies_on(shape: Shape, points: NDArray, facets: _Facets) -> bool:
+    """Whether points are on a shape, to the tolerance of the surface."""
+    return bool(np.abs(shape.signed(points)[0]).max() < facets.tolerance)
 
 
 def _largest_shape(facets: _Facets, part: NDArray) -> tuple[NDArray, Shape | None]:
     """The largest connected piece of a part that is one shape; none if none is."""
     inside = np.zeros(len(facets.triangles), dtype=bool)
     inside[part] = True
+    flat = facets.flooded(inside, 1 - 1e-10)
     best, largest, area = None, part[:0], 0.0
-    seeds = part[np.argsort(-facets.areas[part], kind="stable")]
-    tried = np.zeros(len(facets.triangles), dtype=bool)
-    count = 0
-    for seed in seeds:
-        if tried[seed] or count == _SEEDS:
-            continue
-        count += 1
+    whole = facets.areas[part].sum()
+    tried = ~inside
+    for _ in range(_SEEDS):
+        waiting = part[~tried[part]]
+        if len(waiting) == 0 or area > whole / 2 or facets.tries == 0:
+            break
+        facets.tries -= 1
+        seed = waiting[np.argmax(facets.areas[waiting])]
+        tried[flat == flat[seed]] = True
         for rings in (0, 2, 4):
-            start = _ring(facets, inside, seed, rings)
-            shape = _fit(facets, start)
+            shape = _fit(facets, _ring(facets, inside, flat, seed, rings))
             if shape is None:
                 continue
             on = np.zeros_like(inside)
@@ -245,13 +258,14 @@ def _largest_shape(facets: _Facets, part: NDArray) -> tuple[NDArray, Shape | Non
     return largest, best
 
 
-def _ring(facets: _Facets, inside: NDArray, seed: int, rings: int) -> NDArray:
+def _ring(
+    facets: _Facets, inside: NDArray, flat: NDArray, seed: int, rings: int
+) -> NDArray:
     """A seed with its coplanar neighbours, grown by some rings of facets."""
-    flat = facets.flooded(inside, 1 - 1e-10)
     members = inside & (flat == flat[seed])
+    touch = inside[facets.left] & inside[facets.right] & (facets.cosine > _SHARP)
+    left, right = facets.left[touch], facets.right[touch]
     for _ in range(rings):
-        touch = inside[facets.left] & inside[facets.right] & (facets.cosine > _SHARP)
-        left, right = facets.left[touch], facets.right[touch]
         grown = np.r_[right[members[left]], left[members[right]]]
         members = members | (inside & np.isin(flat, flat[grown]))
     return np.flatnonzero(members)

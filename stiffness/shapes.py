@@ -231,6 +231,6 @@ def _polish(
         xtol=1e-15,
         ftol=1e-15,
         gtol=1e-15,
-        max_nfev=400,
+        max_nfev=40,
     )
     return shape(result.x)
