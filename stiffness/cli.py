@@ -37,7 +37,7 @@ Base = Annotated[
 Tip = Annotated[str, typer.Option(help="Where the screw is read, like --base [m].")]
 Unit = Annotated[str, typer.Option(help="Of the file: m, cm, mm, um, inch.")]
 Accuracy = Annotated[float, typer.Option(help="Asked largest relative error of K.")]
-Kind = Annotated[str, typer.Option(help="Interfaces: rigid or distributing.")]
+Kind = Annotated[str, typer.Option(help="rigid, distributing, distributing-both.")]
 Density = Annotated[float, typer.Option(help="[kg/m^3] for mass and inertia.")]
 Seconds = Annotated[float, typer.Option(help="Budget of time [s].")]
 Json = Annotated[

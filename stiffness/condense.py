@@ -1,23 +1,25 @@
 """A solid condensed on its two interfaces: six numbers at the base, six at the tip.
 
 ``rigid`` (RBE2): every node of an interface moves with its joint, as when it is bolted
-to something much stiffer.  ``distributing`` (RBE3): a joint's wrench is spread over the
-interface as tractions that vary linearly, the interface is free to deform, and its
-screw is the mean motion, the least-squares rigid one over the area.  A rigid interface
-is always the stiffer of the two.
+to something much stiffer.  ``distributing`` (RBE3): the base is held like that, but the
+tip's wrench is spread over its interface as tractions that vary linearly, the interface
+is free to deform, and the tip's screw is the mean motion, the least-squares rigid one
+over the area.  ``distributing-both`` does the same at the base, so that the answer does
+not depend on which end is called the tip.  Each is softer than the one before.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from stiffness.elements import Quadratic, assemble
 from stiffness.link import inverted
 from stiffness.screws import screw_map, skew
 from stiffness.solver import solve
 
-KINDS = ("rigid", "distributing")
+KINDS = ("rigid", "distributing", "distributing-both")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ def condense(
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         centers: (2, 3) [m] centres of base and tip.
-        kind: of both interfaces, ``"rigid"`` or ``"distributing"``.
+        kind: of the interfaces, one of ``KINDS``.
 
     Returns:
         The stiffness and its fields.
@@ -57,6 +59,8 @@ def condense(
     upper = assemble(mesh, lam, mu)
     if kind == "rigid":
         return _rigid(mesh, upper, centers[1])
+    if kind == "distributing":
+        return _mean_of_tip(mesh, upper, centers[1])
     return _distributing(mesh, upper, centers)
 
 
@@ -74,12 +78,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
     return np.concatenate([-skew(points - center), shift], axis=2)
 
 
-def _product(upper: NDArray, fields: NDArray) -> NDArray:
+def _product(upper: csr_array, fields: NDArray) -> NDArray:
     """K times fields, from K's upper triangle."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
-def _rigid(mesh: Quadratic, upper: NDArray, tip_center: NDArray) -> Condensed:
+def _rigid(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Condensed:
     """Base nodes stand still, tip nodes follow six unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
@@ -96,7 +100,16 @@ def _rigid(mesh: Quadratic, upper: NDArray, tip_center: NDArray) -> Condensed:
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
 
-def _distributing(mesh: Quadratic, upper: NDArray, centers: NDArray) -> Condensed:
+def _mean_of_tip(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Condensed:
+    """Base nodes stand still; wrenches spread at the tip, its mean motion read."""
+    flat = _averaging(mesh, 1, tip_center).reshape(-1, 6)
+    free = np.ones(len(mesh.nodes), dtype=bool)
+    free[np.unique(mesh.faces[mesh.patch == 0])] = False
+    free = np.repeat(free, 3)
+    return _from_loads(upper, flat, free)
+
+
+def _distributing(mesh: Quadratic, upper: csr_array, centers: NDArray) -> Condensed:
     """Wrenches spread at the tip, balanced at the base; mean motions read."""
     base, tip = (_averaging(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and what balances them at the base
@@ -106,10 +119,15 @@ def _distributing(mesh: Quadratic, upper: NDArray, centers: NDArray) -> Condense
     held = _three_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[held] = False
-    u = np.zeros_like(flat)
-    u[free] = solve(upper[free][:, free], flat[free])
     # the tip's mean motion as seen from the base's: the supports carry nothing
-    C = flat.T @ u
+    return _from_loads(upper, flat, free)
+
+
+def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
+    """Stiffness from the work of six load cases on each other's displacements."""
+    u = np.zeros_like(loads)
+    u[free] = solve(upper[free][:, free], loads[free])
+    C = loads.T @ u
     K = inverted((C + C.T) / 2)
     fields = u.reshape(-1, 3, 6) @ K
     return Condensed(K, fields, int(free.sum()))

@@ -145,7 +145,8 @@ def mesh_link(
         nu: [-] Poisson's ratio, in (-1, 0.5).
         unit: of the surface file's coordinates.
         accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
-        interface: ``"rigid"`` or ``"distributing"``, see :mod:`stiffness.condense`.
+        interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
+            see :mod:`stiffness.condense`.
         density: [kg/m^3] for mass and inertia; 0 leaves them out.
         budget: what it may cost.
         cache: folder of meshes; the user's cache if absent.
@@ -194,7 +195,7 @@ def solve_link(
         tip: the interface that moves.
         materials: the first fills the link, later ones where they say.
         accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
-        interface: ``"rigid"`` or ``"distributing"``.
+        interface: ``"rigid"``, ``"distributing"`` or ``"distributing-both"``.
         point_masses: added to mass, centre and inertia.
         budget: what it may cost.
         cache: folder of meshes; the user's cache if absent.

@@ -115,9 +115,11 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
             f"{k} = {a:.5g} .. {b:.5g}"
             for k, a, b in zip("xyz", low, high, strict=True)
         )
+        hint = "; a disc must be an outline of the surface's own triangles"
         raise BadInput(
             f"{surface.name}: no face of the surface lies on the {name} interface "
             f"{interface} [m]; the part spans {box} m"
+            f"{hint if interface.kind == 'disc' else ''}"
         )
     return np.flatnonzero(on)
 

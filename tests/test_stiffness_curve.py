@@ -151,7 +151,9 @@ def measured_section(solid, center, lengths=(0.15, 0.25)):
         mesh = quadratic(solid(length))
         lam, mu = (np.full(len(mesh.cells), v) for v in lame(E, NU))
         centers = np.array([[*center, z] for z in (0, length)])
-        C.append(inverted(condense(mesh, lam, mu, centers, "distributing").stiffness))
+        C.append(
+            inverted(condense(mesh, lam, mu, centers, "distributing-both").stiffness)
+        )
     step, cubes = lengths[1] - lengths[0], lengths[1] ** 3 - lengths[0] ** 3
     grown = np.diag(C[1] - C[0])
     I_x = step / (E * grown[0])
