@@ -394,6 +394,14 @@ def test_the_command_fails_with_status_1(monkeypatch):
     assert "FAIL" in said.output or "cannot" in said.output
 
 
+@pytest.mark.parametrize("name", ["slope.txt", "no/such/folder/slope.png"])
+def test_a_figure_that_cannot_be_written_is_bad_input(name, tmp_path):
+    said = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
+               "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
+    assert isinstance(said.exception, BadInput)
+    assert "cannot be written" in str(said.exception)
+
+
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
 def test_the_command_refuses_bad_scales(text):
     said = run("irsbot2", "--scale", text)

@@ -386,6 +386,14 @@ def test_rigid_parts_that_do_not_fit_are_a_named_failure():
     assert error.value.robot == "block"
 
 
+def test_a_load_that_nothing_resists_is_a_named_failure():
+    """A free pin under 10 N m: at once, and it says when."""
+    frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
+    posture = home_posture(Robot("pendulum", "tip", frames))
+    with pytest.raises(SimulationFailed, match="no equilibrium while closures are pul"):
+        simulate_assembly(posture, load=[0, 0, 10.0, 0, 0, 0])
+
+
 def test_nothing_is_printed(capfd, rng):
     simulate_assembly(coaxial(1e-4 * np.ones(6)))
     assert capfd.readouterr() == ("", "")

@@ -101,6 +101,9 @@ def crosscheck(
     if figure is not None and isinstance(answer, Crosscheck):
         from validation.plot import slope_figure
 
-        slope_figure(answer).savefig(figure, dpi=150)
+        try:
+            slope_figure(answer).savefig(figure, dpi=150)
+        except (OSError, ValueError) as error:
+            raise BadInput(f"--figure {figure}: cannot be written: {error}") from None
     if answer is None or not answer.passed:
         raise typer.Exit(1)

@@ -23,6 +23,11 @@ CLOSING_CONTACTS = (1e12, 1e11)  # the same beside contacts: hardly softer than 
 _SHUT = 1e-12  # [rad, m] largest component a closure may keep open
 _LOAD_STEPS = 4
 _CLOSING_STEPS = 30
+_STAGES = (
+    "closures are pulled shut and loads grow",
+    "contacts harden",
+    "the last gaps are closed",
+)
 _NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
 _CENTRING = 1e3  # [N/m] of bounded play; 1e-3 of it in N m/rad, 1e-6 about own axes
 _NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
@@ -393,8 +398,10 @@ class Model:
         newton.numericalDifferentiation.relativeEpsilon = 1e-8  # of user functions
         try:
             self.mbs.SolveStatic(settings, updateInitialValues=True)
-        except self.exu.SolverError as error:
-            raise SimulationFailed(self.robot, f"Exudyn: {error}") from None
+        except self.exu.ExudynError as error:
+            said = str(error).splitlines()[0]
+            status = f"no equilibrium while {_STAGES[int(start)]} (Exudyn: {said})"
+            raise SimulationFailed(self.robot, status) from None
 
     def _look(self) -> None:
         """Keep where the watched places are now."""
