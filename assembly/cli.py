@@ -1,5 +1,7 @@
 """The commands ``forcefit assembly ...``: parse, call one function, print or save."""
 
+import os
+import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -259,20 +261,43 @@ def sweep(
 @app.command()
 def show(
     robot: RobotArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", help="PNG file.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="PNG file; a window opens without one."),
+    ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
     exaggeration: Annotated[
-        float | None, typer.Option(help="Factor on displacements.", min=0.0)
+        float | None, typer.Option(help="Factor on displacements.", min=1e-6)
     ] = None,
+    errors: Annotated[
+        str | None,
+        typer.Option(help="Also the body of possible errors: translation | rotation."),
+    ] = None,
+    reading: Annotated[
+        str, typer.Option(help="Of the errors: frozen | free | budget.")
+    ] = "budget",
 ) -> None:
-    """Draw the nominal and the forced robot, displacements exaggerated."""
+    """Draw the nominal and the forced robot, and the errors its platform can have."""
     from assembly.energy import solve_assembly
-    from assembly.plot import robot_plotter
+    from assembly.error_body import PARTS
+    from assembly.plot import draw_assembly
+    from assembly.pose_error import READINGS
 
-    check_writable(output)
+    if output is not None:
+        check_writable(output)
+    elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
+        raise BadInput("no display to open a window on; name a file with --output")
+    for option, value, valid in (
+        ("--errors", errors, PARTS), ("--reading", reading, READINGS)
+    ):  # fmt: skip
+        if value is not None and value not in valid:
+            raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
     answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
-    plotter = robot_plotter(answer, exaggeration)
-    plotter.screenshot(str(output))
+    plotter = draw_assembly(answer, exaggeration, errors, reading, output is not None)
+    if output is None:
+        plotter.show()
+    else:
+        plotter.screenshot(str(output))
     plotter.close()

@@ -1,6 +1,6 @@
 """Figures of assemblies: maps over the workspace, and the robot itself, deformed.
 
-Functions take a result and return a figure or a plotter; none solves, shows or saves.
+Functions take a result and return a figure or a plotter; none shows or saves.
 """
 
 from dataclasses import dataclass
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.energy import Assembly
+from assembly.error_body import ErrorBody, error_body
+from assembly.pose_error import reachable_screws
 from stiffness.screws import rotation_matrix, screw_map
 
 if TYPE_CHECKING:
@@ -80,7 +82,37 @@ def _states(panel: Any, data: "xarray.Dataset", x: str, y: str) -> None:
     panel.set(title=said, xlabel=f"{x} [m]", ylabel=f"{y} [m]", aspect="equal")
 
 
-def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
+def draw_assembly(
+    answer: Assembly,
+    exaggeration: float | None = None,
+    errors: str | None = None,
+    reading: str = "budget",
+    off_screen: bool = True,
+) -> Any:
+    """Draw an assembled robot and, if asked, the body of its platform's errors.
+
+    Args:
+        answer: an assembled robot.
+        exaggeration: factor on all displacements; chosen if absent.
+        errors: ``"translation"`` or ``"rotation"``, or None for no body.
+        reading: of problem (27), for the body.
+        off_screen: False opens a window when the plotter is shown.
+
+    Returns:
+        A pyvista plotter.
+    """
+    plotter = robot_plotter(answer, exaggeration, off_screen)
+    if errors is not None:
+        reach = reachable_screws(answer, reading)
+        body = error_body(reach, errors)
+        size = 0.15 * float(np.ptp(answer.posture.transforms[:, :3, 3], axis=0).max())
+        add_error_body(plotter, body, answer.posture.platform[:3, 3], size)
+    return plotter
+
+
+def robot_plotter(
+    answer: Assembly, exaggeration: float | None = None, off_screen: bool = True
+) -> Any:
     """Draw the nominal robot (grey) and the forced one (coloured), exaggerated.
 
     Args:
@@ -88,9 +120,10 @@ def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
         exaggeration: factor on all displacements, written on the picture; if absent,
             such that the largest shows as a tenth of the robot and no turn as more
             than 0.5 rad.
+        off_screen: False for a window.
 
     Returns:
-        A pyvista plotter, off screen; the caller shows it or takes a screenshot.
+        A pyvista plotter; the caller shows it or takes a screenshot.
     """
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -100,7 +133,7 @@ def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
     bodies = displaced_bodies(answer)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
     factor = exaggeration or _exaggeration(bodies, size)
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1100, 800))
+    plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1100, 800))
     for i, frame in enumerate(answer.posture.robot.frames):
         start, end = bodies.starts[i], bodies.ends[i]
         if np.linalg.norm(end - start) < 1e-9:
@@ -115,6 +148,29 @@ def robot_plotter(answer: Assembly, exaggeration: float | None = None) -> Any:
     plotter.view_vector((0.55, -1.0, 0.35))
     plotter.camera.zoom(1.5)
     return plotter
+
+
+def add_error_body(plotter: Any, body: ErrorBody, origin: NDArray, size: float) -> None:
+    """Add a body of translation or rotation errors to a picture, magnified.
+
+    Args:
+        plotter: of :func:`robot_plotter`.
+        body: what to draw.
+        origin: (3,) [m] where no error is, the platform's nominal origin.
+        size: [m] that the largest error is drawn with; the factor is written below.
+    """
+    import pyvista
+
+    largest = float(np.linalg.norm(body.points, axis=1).max()) or 1.0
+    shown = origin + body.points * (size / largest)
+    solid = pyvista.PolyData(shown)
+    if len(body.faces):
+        count = np.full((len(body.faces), 1), 3)
+        solid = pyvista.PolyData(shown, np.hstack([count, body.faces]).ravel())
+    plotter.add_mesh(solid, color="gold", opacity=0.6, point_size=6)
+    unit, scale = ("mm", 1e3) if body.part == "translation" else ("mrad", 1e3)
+    said = f"gold: {body.part} errors possible, up to {largest * scale:.3g} {unit}"
+    plotter.add_text(said, position="lower_left", font_size=9, name="body")
 
 
 @dataclass(frozen=True, eq=False)
