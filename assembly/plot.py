@@ -219,9 +219,11 @@ def displaced_bodies(answer: Assembly) -> Bodies:
 
 def _exaggeration(bodies: Bodies, size: float) -> float:
     """Largest of 1, 2, 5 times a power of ten that keeps the picture readable."""
-    shift = float(np.abs(bodies.end_screws[:, 3:]).max()) or 1.0
-    turn = float(np.abs(bodies.end_screws[:, :3]).max()) or 1.0
-    most = min(0.1 * size / shift, 0.5 / turn)
+    shift = float(np.abs(bodies.end_screws[:, 3:]).max())
+    turn = float(np.abs(bodies.end_screws[:, :3]).max())
+    if shift == turn == 0.0:
+        return 1.0
+    most = min(0.1 * size / max(shift, 1e-300), 0.5 / max(turn, 1e-300))
     power = 10.0 ** np.floor(np.log10(most))
     return float(power * max(d for d in (1, 2, 5) if d * power <= most * (1 + 1e-12)))
 
