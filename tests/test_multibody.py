@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.posture import home_posture
+from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
 from stiffness.reading import BadInput
+from validation.exudyn_model import Model
 from validation.motion import exponential, inverse, logarithm, placement
 from validation.multibody import (
     SimulationFailed,
@@ -474,3 +476,44 @@ def test_five_hundred_models_leave_nothing_behind(rng):
     for _ in range(500):
         simulate_assembly(posture)
     assert resident() - before < 10
+
+
+def relax(self, start, _steps):
+    """Instead of the static solver: 60 s of damped motion from the last state."""
+    settings = self.exu.SimulationSettings()
+    settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
+    settings.solution.file.write = False
+    run = settings.timeIntegration
+    run.startTime, run.endTime, run.numberOfSteps = start, start + 60.0, 600
+    run.verboseMode = 0
+    run.generalizedAlpha.spectralRadius = 0.1  # kills what oscillates
+    run.generalizedAlpha.computeInitialAccelerations = False
+    run.newton.useModifiedNewton = False
+    run.newton.relativeTolerance = run.newton.absoluteTolerance = 1e-6
+    kind = self.exu.DynamicSolverType.GeneralizedAlpha
+    self.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["coaxial beams", "table on three legs", "irsbot2"])
+def test_dynamic_relaxation_comes_to_rest_at_the_same_place(case, rng, monkeypatch):
+    """Another solver of the same model: time steps until nothing moves any more."""
+    if case == "irsbot2":
+        robot = load_robot("irsbot2")
+        errors = np.zeros((len(robot.frames), 6))
+        for name in ("leg1.link_a", "leg2.link_b", "leg1.tip"):
+            errors[robot.index(name)] = rng.uniform(-1, 1, 6) * (
+                [1e-2] * 3 + [1e-4] * 3
+            )
+        posture = place_robot(robot.with_errors(errors), {"tx": 0.1, "tz": -0.45})
+    elif case == "coaxial beams":
+        posture = coaxial(1e-3 * rng.uniform(-1, 1, 6))
+    else:
+        posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    static = simulate_assembly(posture)
+    monkeypatch.setattr(Model, "_equilibrate", relax)
+    relaxed = simulate_assembly(posture)
+    assert relaxed.energy == pytest.approx(static.energy, rel=1e-8)
+    np.testing.assert_allclose(
+        relaxed.platform_screw, static.platform_screw, rtol=0, atol=1e-10
+    )
