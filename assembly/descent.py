@@ -91,7 +91,7 @@ class Expansion:
 
     @property
     def small_wrench(self) -> float:
-        """[N m] scaled wrench of a misfit of 1e-9 in the stiffest spring: as good as 0."""
+        """[N m] scaled wrench of a misfit of 1e-9 in the stiffest spring."""
         model = self.here.model
         softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
         return _MISFIT / float(softness.min(initial=1.0))
@@ -208,8 +208,10 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     before = potential(start, local.load) + left_open
     noise = 1e-13 * (abs(before) + abs(potential(start, np.zeros(6))))
     noise += 1e-14 * penalty
-    for _ in range(_ATTEMPTS):
-        step = _solve(local, damping + _LEAST_DAMPING * least, near)
+    for attempt in range(_ATTEMPTS):
+        # refused, Newton's step is followed by the conic one before either is damped
+        newton = near and attempt != 1
+        step = _solve(local, damping + _LEAST_DAMPING * least, newton)
         if step is not None and step.length <= LONGEST:
             after = potential(step.there, local.load)
             after += penalty * float(np.linalg.norm(step.there.residual))
@@ -219,9 +221,8 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
                 damping = damping / 10 if good else damping
                 damping = damping if damping > 1e-8 * least else 0.0
                 return Step(**vars(step) | {"damping": damping})
-        if not near or step is None:
+        if attempt or not near or step is None:
             damping = max(4.0 * damping, _DAMPING * least)
-        near = False
     raise NotConverged(
         whose(start), f"no step lowers the energy; open by {start.largest_gap:.2g}"
     )

@@ -33,6 +33,7 @@ from assembly.conic import cone_sizes, minimise_energy
 _AT_RIM = 1e-5  # [-] below size 1 within which a cone counts as at its rim
 _INNER = 15  # steps along the rims
 _STILL = 1e-6  # [-] size of the last, in sizes of the cones
+_NO_FORCE = 1e-11  # of the largest on a rim: pulls as small do not leave it
 _FARTHEST = 0.3  # [-] of a step along a rim, which is round
 _SHIFTS = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # of the largest curvature, to get there
 _FLAT = 1e-10  # of the largest curvature: what less counts as
@@ -138,12 +139,12 @@ def _newton(p: PlayProblem) -> tuple[NDArray, NDArray] | None:
         u = u + change
         sizes = cone_sizes(u, p.group)
         over, slack = ~rim & (sizes > 1.0), rim.copy()
-        slack[rim] = forces < 0.0
+        slack[rim] = forces < -_NO_FORCE * forces.max(initial=0.0)
         u = u / np.where(rim | over, sizes, 1.0)[p.group]
         if not (over | slack).any() and np.abs(change).max(initial=0.0) < _STILL:
             v = u - p.start
-            rises = float(p.s @ v + v @ p.S @ v / 2) > 1e-12 * np.abs(p.S).max(initial=0.0)
-            return None if rises else (v, rigid)
+            rise, size = p.s @ v + v @ p.S @ v / 2, np.abs(p.S).max(initial=0.0)
+            return None if rise > 1e-12 * size else (v, rigid)
         rim = (rim | over) & ~slack
     return None
 
@@ -164,7 +165,7 @@ def _along_rims(
     normal = Q[:, :count] @ np.linalg.solve(R[:count].T, wanted)
     values, vectors = np.linalg.eigh(Q[:, count:].T @ S @ Q[:, count:])
     Z = Q[:, count:] @ vectors
-    largest = np.abs(values).max(initial=1e-150)
+    largest = np.abs(values).max(initial=1e-100)
     if values.min(initial=0.0) < -1e-9 * largest:
         return None
     slope = Z.T @ (pull + S @ normal)
@@ -173,5 +174,7 @@ def _along_rims(
         change = normal - Z @ (slope / stiff)
         if cone_sizes(change, p.group)[rim].max(initial=0.0) <= _FARTHEST:
             break
+    else:
+        return None
     forces = np.linalg.solve(R[:count], Q[:, :count].T @ -(pull + S @ change))
     return change, forces[:rims], -forces[rims:]

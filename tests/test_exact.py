@@ -215,6 +215,19 @@ def test_two_bars_close_like_a_triangle(longer):
     assert np.abs(answer.platform_screw[:3] - turned).max() < 1e-12
 
 
+def test_the_linearisation_error_is_linear_minus_exact():
+    """The linear model keeps the triangle's slopes at home; differences of 1e-6."""
+    longer, step = 0.06, 1e-6
+    slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
+    energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
+    turns = triangle(B + longer)
+    exactly = (np.array([K_ONE, K_TWO]) @ turns**2) / 2
+    error = solve_exact(two_bars(longer)).linearisation_error
+    assert error.energy == pytest.approx(energy - exactly, rel=1e-7)
+    assert error.relative_energy == pytest.approx(energy / exactly - 1, rel=1e-7)
+    assert error.rotation[2] == pytest.approx(slopes[1] * longer - turns[1], rel=1e-7)
+
+
 def bar_force(e, longer):
     """dE/de of the stretched bar: turns of a triangle per length of a side."""
     length, step = B + longer + e, 1e-6
@@ -236,18 +249,23 @@ def test_a_stretching_bar_shares_the_energy(longer):
     assert answer.least_curvature > 0
 
 
-def test_a_bound_on_a_passive_joint_is_met_exactly():
-    """The pin may turn by 0.1 rad only: the bar gives way until it turns no more."""
-    longer, bound = 0.12, 0.1
-    free = solve_exact(two_bars(longer, stretch=True)).clearance_screws[1, 2]
+@pytest.mark.parametrize(("longer", "bound"), [(0.12, 0.1), (-0.1, 0.4)])
+def test_a_bound_on_a_passive_joint_is_met_exactly(longer, bound):
+    """The bar gives way until the pin turns no more than it may.
+
+    The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
+    met only by finite motions, 0.497 rad.
+    """
+    free = solve_exact(two_bars(longer, stretch=True))
 
     def beyond(e):
         one, two = triangle(B + longer + e)
         return abs(two - one) - bound
 
-    e = brentq(beyond, -longer, 0.0, xtol=1e-15)
+    e = brentq(beyond, *sorted([-longer, 0.0]), xtol=1e-15)
     answer = solve_exact(two_bars(longer, Clearance(spin=bound), stretch=True))
-    assert abs(free) > 2 * bound
+    assert abs(free.clearance_screws[1, 2]) > bound
+    assert (abs(free.linear.clearance_screws[1, 2]) > bound) == (longer > 0)
     assert abs(answer.clearance_screws[1, 2]) == pytest.approx(bound, rel=1e-12)
     assert answer.joint_screws[4, 3] == pytest.approx(e, rel=1e-9)
     assert answer.clearance_excess() < 1e-12
@@ -296,6 +314,34 @@ def test_within_the_play_nothing_is_forced():
     assert answer.clearance_excess() == 0.0
 
 
+def test_closures_that_only_play_can_shut():
+    """Axes 0.1 rad apart are met by 0.1 rad of tilt, however far the bars turn."""
+    posture = two_bars(0.06, Clearance(tilt=0.2))
+    errors = posture.robot.errors.copy()
+    errors[4, 0] = 0.1  # about bar two, which no spring and no pin can undo
+    answer = solve_exact(replace(posture, robot=posture.robot.with_errors(errors)))
+    assert np.hypot(*answer.clearance_screws[1, :2]) == pytest.approx(0.1, rel=1e-12)
+    assert answer.joint_screws[0, 2] == pytest.approx(triangle(B + 0.06)[0], rel=1e-11)
+    assert answer.closure_residual() < 1e-12
+
+
+def test_a_load_passes_through_play_alone():
+    """Rigid: far may move by 0.2 mm, near then by 0.5 + 0.2 mm, 5 N go through far."""
+    frames = (
+        Frame("near", clearance=Clearance(axial=1e-3)),
+        Frame("tip", "near", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+        Frame("far", clearance=Clearance(axial=2e-4),
+              geometric_error=[0, 0, 0, 0, 0, 5e-4]),
+        Frame("end", "far", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+    )  # fmt: skip
+    posture = home_posture(Robot("slides", "tip", frames, (("tip", "end"),)))
+    answer = solve_exact(posture, [0, 0, 0, 0, 0, 5.0])
+    assert answer.platform_screw == pytest.approx([0, 0, 0, 0, 0, 7e-4], abs=1e-12)
+    assert answer.clearance_screws[[0, 2], 5] == pytest.approx([7e-4, 2e-4], rel=1e-9)
+    assert answer.potential == pytest.approx(-5 * 7e-4, rel=1e-9)
+    assert answer.closure_wrenches[0, 5] == pytest.approx(-5.0, rel=1e-9)
+
+
 @pytest.mark.parametrize(("force", "side"), [(30.0, 1.0), (10.0, -8.0), (0.0, 25.0)])
 def test_a_dead_load_bends_a_pendulum(force, side):
     """k a = L (P sin a + F cos a); with k = 10 and P L = 15 it buckles to 1.5 rad."""
@@ -310,6 +356,7 @@ def test_a_dead_load_bends_a_pendulum(force, side):
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
     work = -force * length * (np.cos(angle) - 1) + side * length * np.sin(angle)
     assert answer.potential == pytest.approx(stiffness * angle**2 / 2 - work, rel=1e-12)
+    assert answer.wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
     curvature = stiffness - length * (force * np.cos(angle) - side * np.sin(angle))
     assert answer.least_curvature == pytest.approx(curvature, rel=1e-7)
 
@@ -511,3 +558,28 @@ def test_the_simulation_agrees_at_full_errors(case, place):
     assert np.abs(other.transforms - answer.transforms).max() < 2e-7
     wrenches = other.closure_wrenches - answer.closure_wrenches
     assert np.abs(wrenches).max() < 2e-5 * np.abs(answer.closure_wrenches).max()
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_agrees_with_clearances_at_full_errors(case):
+    """Its contacts yield by what twice their energy corrects to first order."""
+    from validation.multibody import simulate_assembly
+
+    robot = irsbot2_with(CASES[case])
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    answer = solve_exact(posture)
+    other = simulate_assembly(
+        posture, links="spring", stiffness=stiffness, clearances=True
+    )
+    energy = other.energy + 2 * other.contact_energy
+    assert energy == pytest.approx(answer.energy, rel=5e-4)
+    difference = np.abs(other.platform_screw - answer.platform_screw)
+    assert difference[:3].max() < 1e-6
+    assert difference[3:].max() < 1e-8
