@@ -436,3 +436,16 @@ def test_the_crosscheck_of_one_pose_ignores_another_robots_errors(posture):
     before = posture.robot.errors.copy()
     crosscheck(replace(posture), scales=(1.0, 0.5))
     np.testing.assert_array_equal(posture.robot.errors, before)
+
+
+@pytest.mark.parametrize(
+    "name", ["four_bar", "five_bar", "3rrr", "delta", "orthoglide", "arm6", "hexapod"]
+)
+def test_every_built_in_robot_passes_under_a_load(name):
+    """Their drives are springs about one axis and rigid in the other five."""
+    posture = home_posture(load_robot(name))
+    found = crosscheck(posture, (1.0, 0.5, 0.25), load=[0, 0, 0, 10.0, 20.0, -50.0])
+    assert found.passed, found.text()
+    assert all(
+        abs(slope - 2) < 0.1 for slope in found.slopes.values() if slope == slope
+    )

@@ -21,7 +21,9 @@ OWNERS = {
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # the second opinion must not share the first one's mechanics
-INDEPENDENT = ("multibody.py", "exudyn_model.py", "motion.py")
+INDEPENDENT = (
+    "multibody.py", "exudyn_model.py", "motion.py", "contact.py", "beams.py"
+)  # fmt: skip
 
 
 def imports(path):

@@ -72,15 +72,12 @@ class Pair:
             "links": _named(robot, "link", simulated.link_wrenches),
             "joints": _named(robot, "joint_stiffness", simulated.joint_wrenches),
         }
+        joints = simulated.joint_wrenches - linear.joint_wrenches
         difference = {
             "platform_screw": self.screw_difference,
             "energy": simulated.energy - linear.energy,
             "links": _named(robot, "link", simulated.link_wrenches - linear.wrenches),
-            "joints": _named(
-                robot,
-                "joint_stiffness",
-                simulated.joint_wrenches - linear.joint_wrenches,
-            ),
+            "joints": _named(robot, "joint_stiffness", joints * sprung(robot)),
         }
         check = {"closure_gap": simulated.gap, "seconds": simulated.seconds}
         exact = self.exact and {
@@ -96,6 +93,22 @@ class Pair:
             "multibody": multibody | check,
             "difference": difference,
         }
+
+
+def sprung(robot: Robot) -> NDArray:
+    """Where joints have springs: in rigid directions the simulation has no wrench.
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6) 1 where K_B is finite, else 0.
+    """
+    rows = np.zeros((len(robot.frames), 6))
+    for row, frame in zip(rows, robot.frames, strict=True):
+        if frame.joint_stiffness is not None:
+            row[:] = np.isfinite(np.diag(frame.joint_stiffness))
+    return rows
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
@@ -169,9 +182,11 @@ def spring_limits(
         if kind == "joint" or not spread:
             compared.append(("wrenches", wrench, stiff * screw, ("moment", "force")))
         for what, linear, floor, labels in compared:
-            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs])
             name = f"{kind}_{what}"
+            known = sprung(robot)[rows] if name == "joint_wrenches" else 1.0
+            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs]) * known
             theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
+            theirs = theirs * known
             for label, half, least in zip(labels, HALVES.values(), floor, strict=True):
                 limits[f"{kind} {label}"] = limit_difference(
                     scales, ours[..., half], theirs[..., half], 1, least
