@@ -77,13 +77,26 @@ def error_matrices(
     blend, where, weight, stress = stresses(mesh, fields, lam, mu)
     smooth = _smoothed(mesh.cells[:, :4], blend, where, stress, corners)
     gap = (smooth - stress) * np.sqrt(weight)[:, :, None, None]
-    # D^-1 : (s / 2 mu) minus its trace's share
-    trace = gap[..., :3].sum(axis=-1)
+    return complementary_work(gap, lam, mu).sum(axis=1)
+
+
+def complementary_work(stress: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
+    """Work of each stress on the strains of each other.
+
+    Args:
+        stress: (t, q, k, 6) [Pa] xx yy zz yz xz xy.
+        lam: (t,) [Pa] Lame's first constant.
+        mu: (t,) [Pa] shear modulus.
+
+    Returns:
+        (t, q, k, k) [J/m^3] s_i : D^-1 : s_j.
+    """
+    trace = stress[..., :3].sum(axis=-1)
     double = np.array([1.0, 1, 1, 2, 2, 2])
-    plain = np.einsum("tqik,k,tqjk->tij", gap, double, gap, optimize=True)
-    round_ = np.einsum("tqi,tqj->tij", trace, trace)
-    m, l = mu[:, None, None], lam[:, None, None]
-    return (plain - l / (3 * l + 2 * m) * round_) / (2 * m)
+    plain = (stress * double) @ stress.swapaxes(-1, -2)
+    of_trace = trace[..., :, None] * trace[..., None, :]
+    m, l = mu[:, None, None, None], lam[:, None, None, None]
+    return (plain - l / (3 * l + 2 * m) * of_trace) / (2 * m)
 
 
 def _smoothed(

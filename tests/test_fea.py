@@ -6,7 +6,7 @@ import pytest
 from stiffness.beam import beam_compliance, rectangular_section, round_section
 from stiffness.condense import KINDS, condense, rigid_motions
 from stiffness.elements import assemble, integration, lame, quadratic
-from stiffness.estimate import error_matrices
+from stiffness.estimate import complementary_work, error_matrices
 from stiffness.fea import (
     Budget,
     Material,
@@ -329,6 +329,19 @@ def test_recovered_errors_are_a_matrix_of_energies(rng):
     still = rigid_motions(mesh.nodes, np.zeros(3))
     none = error_matrices(mesh, still, lam, mu, len(solid.points)).sum(axis=0)
     assert np.abs(scaled(none, solution.stiffness)).max() < 1e-15
+
+
+def test_complementary_work_is_stress_times_strain(rng):
+    """Hooke's law there and back: s_i : D^-1 : s_j = s_i : e_j."""
+    strain = rng.normal(size=(3, 3, 3))
+    strain = strain + strain.swapaxes(1, 2)
+    trace = np.trace(strain, axis1=1, axis2=2)
+    stress = LAM * trace[:, None, None] * np.eye(3) + 2 * MU * strain
+    i, j = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
+    lam, mu = np.array([LAM]), np.array([MU])
+    found = complementary_work(stress[None, None, :, i, j], lam, mu)[0, 0]
+    expected = np.einsum("axy,bxy->ab", stress, strain)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-3)
 
 
 def test_stiffness_falls_and_the_estimate_covers_the_fall():

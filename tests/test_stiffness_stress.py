@@ -54,6 +54,13 @@ def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expecte
     assert round_beam_peak(R, wrench, L / 2) == pytest.approx(expected, rel=1e-12)
 
 
+def test_a_pulled_bar_is_pulled_along_and_free_across(solved):
+    """Components, since von Mises does not see a pressure: zz = F / A, xx = yy = 0."""
+    stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
+    np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=0.01)
+    assert np.abs(stress[:, :2]).max() < 0.01 * 1e3 / AREA
+
+
 def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
     stress = stress_influence(solved, away=2 * R)
     value, place = stress.peak([0, 0, 0, 1e3, 0, 0])
