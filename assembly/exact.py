@@ -76,8 +76,8 @@ class LinearisationError:
 class ExactAssembly:
     """A manipulator forced together with finite motions; exists only if converged.
 
-    A local minimum: stationary, closed and within the cones as reported; that no
-    other equilibrium has less energy is not proved.
+    An equilibrium: stationary, closed and within the cones as reported.  Whether it
+    is a local minimum ``least_curvature`` says; that none is lower is not proved.
 
     Attributes:
         linear: the linear model's answer from which this one was reached.
@@ -213,9 +213,15 @@ def solve_exact(
         CannotAssemble: the linear model has no answer to start from.
         FreeMotion: the load drives a motion that nothing resists.
         NotConverged: no equilibrium was found; a :class:`SolverFailed`.
+        ValueError: ``start`` belongs to another posture or load.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     linear = solve_assembly(posture, wrench) if start is None else start
+    if linear.posture is not posture or not np.array_equal(linear.load, wrench):
+        raise ValueError(
+            "solve_exact: start is the linear answer of another posture or load, "
+            "expected that of these; leave it out to have it computed"
+        )
     answer = _search(linear.joints, linear, wrench)
     if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
         # the bound of a passive joint's own motion was left out, but it matters

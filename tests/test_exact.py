@@ -497,6 +497,14 @@ def test_rigid_parts_that_cannot_close_are_refused():
         solve_exact(home_posture(rigid))
 
 
+@pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
+def test_a_start_of_another_problem_is_refused(load):
+    posture = two_bars(0.01)
+    start = solve_assembly(posture if load else two_bars(0.02))
+    with pytest.raises(ValueError, match="start is the linear answer of another"):
+        solve_exact(posture, load, start)
+
+
 def test_too_few_steps_are_said_to_be_too_few(monkeypatch):
     monkeypatch.setattr(exact, "_STEPS", 1)
     posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
