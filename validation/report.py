@@ -330,12 +330,16 @@ def _picture(results: StudyResults) -> str:
 
 def _crosscheck(results: StudyResults) -> str:
     """VJM against the multibody simulation."""
-    from validation.plot import slope_figure
+    from validation.plot import closing_figure, slope_figure
 
     check = results.crosscheck
     head = "<h2>Against a multibody simulation</h2><p>"
     if check is None:
         return f"{head}Not compared: {html.escape(results.crosscheck_failure)}</p>"
+    closing = ""
+    if results.closing is not None:
+        drawn = closing_figure(check.posture, results.closing)
+        closing = _figure(drawn, "The simulation pulls the open robot shut by force.")
     return (
         head + "The same forced assembly, without "
         "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
@@ -343,6 +347,7 @@ def _crosscheck(results: StudyResults) -> str:
         f"slope 2. Measured: {check.slope:.3f}.</p>"
         + _table(check.header(), check.rows())
         + _figure(slope_figure(check), "Difference of the platform's pose.")
+        + closing
     )
 
 

@@ -25,6 +25,7 @@ from assembly.sweep import parse_grid, sweep_poses
 from stiffness.reading import BadInput, Table, read_toml
 from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
+from validation.multibody import SimulationFailed, closing_sequence, without_clearance
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
@@ -78,6 +79,8 @@ class StudyResults:
         maps: data set over the grid.
         crosscheck: against the multibody simulation.
         crosscheck_failure: why there is none although it was asked for; empty if so.
+        closing: (k, n, 4, 4) frames while the simulation pulls the closures shut, None
+            where there is none to show.
     """
 
     study: Study
@@ -90,6 +93,7 @@ class StudyResults:
     maps: Any
     crosscheck: Crosscheck | None
     crosscheck_failure: str
+    closing: NDArray | None
 
     @property
     def passed(self) -> bool:
@@ -277,15 +281,25 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     maps = None
     if "maps" in wanted:
         maps = sweep_poses(robot, study.grid, lambda d, n: progress("maps", d, n))
-    check, failure = None, {"reason": ""}
+    check, failure, closing = None, {"reason": ""}, None
     if "crosscheck" in wanted and solved:
         progress("cross-check", 0, 1)
         check, failure = try_crosscheck(posture, study.scales)
+        closing = _closing(posture) if check is not None else None
         progress("cross-check", 1, 1)
     return StudyResults(
         study, robot, solution, answer, error or {}, reference, stiffness, maps, check,
-        failure.get("reason", ""),
+        failure.get("reason", ""), closing,
     )  # fmt: skip
+
+
+def _closing(posture: Posture) -> NDArray | None:
+    """Frames while the tight robot is pulled shut; none where links are not known."""
+    tight = replace(posture, robot=without_clearance(posture.robot))
+    try:
+        return closing_sequence(tight)
+    except (BadInput, SimulationFailed):
+        return None
 
 
 def _compare_links(
