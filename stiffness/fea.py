@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.beam import check_material
+from stiffness.body import PointMass, mass_properties
 from stiffness.condense import KINDS, Condensed, condense
 from stiffness.elements import Quadratic, integration, lame, quadratic
 from stiffness.estimate import error_matrices
@@ -57,19 +58,6 @@ class Material:
         check_material("material", self.E, self.nu)
         if not (math.isfinite(self.density) and self.density >= 0):
             raise BadInput(f"material: density = {self.density:g} must be >= 0")
-
-
-@dataclass(frozen=True, eq=False)
-class PointMass:
-    """Something heavy on the link that does not stiffen it.
-
-    Attributes:
-        mass: [kg].
-        place: (3,) [m] in the mesh's axes.
-    """
-
-    mass: float
-    place: NDArray
 
 
 @dataclass(frozen=True)
@@ -438,7 +426,8 @@ def _link(
     point_masses: Sequence[PointMass],
 ) -> LinkStiffness:
     """Everything known of the link, as a table."""
-    mass, center, inertia = _body(level, point_masses)
+    density = level.material[:, 2]
+    mass, center, inertia = mass_properties(level.mesh, density, point_masses)
     return LinkStiffness(
         method=method,
         compliance=inverted(level.solution.stiffness),
@@ -450,27 +439,3 @@ def _link(
         center_of_mass=center,
         inertia=inertia,
     )
-
-
-def _body(
-    level: Level, point_masses: Sequence[PointMass]
-) -> tuple[float, NDArray, NDArray]:
-    """Mass, centre and inertia about the centre, of the elements and added points."""
-    origin = level.mesh.nodes.mean(axis=0)
-    mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-    for part, N, _, w in integration(level.mesh):
-        x = np.einsum("qa,tax->tqx", N, level.mesh.nodes[level.mesh.cells[part]])
-        x, dm = x - origin, w * level.material[part, 2, None]
-        mass += float(dm.sum())
-        first += np.einsum("tq,tqx->x", dm, x)
-        second += np.einsum("tq,tqx,tqy->xy", dm, x, x)
-    for point in point_masses:
-        x = np.asarray(point.place) - origin
-        mass, first = mass + point.mass, first + point.mass * x
-        second = second + point.mass * np.outer(x, x)
-    if mass == 0:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
-    center = first / mass
-    about_center = second - mass * np.outer(center, center)
-    inertia = np.trace(about_center) * np.eye(3) - about_center
-    return mass, center + origin, inertia
