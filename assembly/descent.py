@@ -41,8 +41,8 @@ LONGEST = 1.0  # [rad, reference lengths] of a step
 _MISFIT = 1e-9  # [rad, reference lengths] whose forces count as none
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _LEAST_DAMPING = 1e-9  # of the largest closure wrench: holds what nothing else holds
-_DAMPING = 1e-4  # the same, where damping starts once it is needed
-_ATTEMPTS = 40  # at a step, each damped four times as much
+_DAMPING = 1e-8  # the same, where damping starts once it is needed
+_ATTEMPTS = 40  # at a step, each damped eight times as much
 _DRAWN_BACK = 4  # corrections of a step onto the closures
 
 
@@ -219,10 +219,10 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
             if before - after >= 1e-4 * expected - noise:
                 good = before - after >= 0.5 * expected - noise
                 damping = damping / 10 if good else damping
-                damping = damping if damping > 1e-8 * least else 0.0
+                damping = damping if damping > _LEAST_DAMPING * least else 0.0
                 return Step(**vars(step) | {"damping": damping})
         if attempt or not near or step is None:
-            damping = max(4.0 * damping, _DAMPING * least)
+            damping = max(8.0 * damping, _DAMPING * least)
     raise NotConverged(
         whose(start), f"no step lowers the energy; open by {start.largest_gap:.2g}"
     )

@@ -26,6 +26,7 @@ from assembly.motion import (
 )
 from assembly.posture import home_posture, place_many, place_robot
 from assembly.robot import Clearance, Frame, Robot
+from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 from tests.robots_for_tests import (
@@ -485,6 +486,19 @@ def test_motions_without_energy_do_not_drift(rng):
         assert answer.energy < 1e-20
         assert answer.iterations <= 6
     assert differences[0] / differences[1] == pytest.approx(100, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_slowly_curved_valleys_are_followed_to_their_end(seed):
+    """Rods of a Delta spin by radians under a load, for 1e-6 of the energy."""
+    rng = np.random.default_rng(seed)
+    robot = delta()
+    errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
+    posture = home_posture(robot.with_errors(errors))
+    answer = solve_exact(posture, [1, 2, 0, 20, -10, -30])
+    assert answer.stationarity < 1e-9
+    assert answer.least_curvature > 0
+    assert np.abs(answer.placement.own).max() > 0.1
 
 
 # What cannot be solved
