@@ -12,7 +12,7 @@ BELOW = {"stiffness": (), "assembly": ("stiffness",)}
 BELOW["validation"] = ("stiffness", "assembly")
 OWNERS = {
     "pytetwild": ("stiffness/mesh.py", "stiffness/mesh_worker.py"),
-    "skfem": ("stiffness/fea.py",),
+    "skfem": ("stiffness/elements.py",),
     "clarabel": ("assembly/conic.py",),
     "cvxpy": ("assembly/reference.py",),
     "exudyn": ("validation/multibody.py",),
