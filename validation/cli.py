@@ -1,7 +1,8 @@
 """The commands ``forcefit validation ...``: parse, call one function, print or save."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,7 +16,9 @@ from assembly.cli import (
     parse_gravity,
     parse_load,
     posture_of,
+    progress_bars,
 )
+from assembly.posture import Posture
 from stiffness.reading import BadInput
 from stiffness.writing import write_json
 
@@ -67,6 +70,10 @@ def crosscheck(
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")
     ] = False,
+    grid: Annotated[
+        str | None,
+        typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
+    ] = None,
     json: JsonOption = None,
     figure: Annotated[
         Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
@@ -87,14 +94,19 @@ def crosscheck(
         raise BadInput("--figure: with --clearances there is no slope to draw")
     if clearances and g is not None:
         raise BadInput("--gravity: not compared with --clearances")
-    posture = posture_of(robot, pose, joint)
+    if grid is not None and (pose or joint or figure):
+        raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare() -> Crosscheck | PlayCheck:
+    def compare(posture: Posture) -> Crosscheck | PlayCheck:
         if clearances:
             return playcheck(posture, scales, wrench, links)
         return compare_tight(posture, scales, wrench, links, g)
 
-    answer, failure = attempt(posture.robot.name, compare)
+    if grid is not None:
+        _crosscheck_grid(robot, grid, compare, json)
+        return
+    posture = posture_of(robot, pose, joint)
+    answer, failure = attempt(posture.robot.name, lambda: compare(posture))
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
         print(failure["reason"] if answer is None else answer.text())
@@ -106,4 +118,22 @@ def crosscheck(
         except (OSError, ValueError) as error:
             raise BadInput(f"--figure {figure}: cannot be written: {error}") from None
     if answer is None or not answer.passed:
+        raise typer.Exit(1)
+
+
+def _crosscheck_grid(
+    robot: str, grid: str, compare: Callable[[Posture], Any], json: str | None
+) -> None:
+    """Every pose of a grid, with a progress bar."""
+    from assembly.robots import load_robot
+    from assembly.sweep import parse_grid
+    from validation.poses import check_poses, poses_table, poses_text
+
+    machine, axes = load_robot(robot), parse_grid(grid)
+    with progress_bars() as update:
+        rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
+    write_json(poses_table(rows), json)
+    if json != "-":
+        print(poses_text(rows))
+    if not poses_table(rows)["passed"]:
         raise typer.Exit(1)

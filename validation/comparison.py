@@ -204,6 +204,9 @@ def limit_difference(
 ) -> float:
     """Largest difference as the scale goes to 0, relative to the largest value.
 
+    Less what the extrapolation itself leaves open: with few scales and large errors
+    the limit is not known to a thousandth.
+
     Args:
         scales: (k,) all different.
         ours: (k, ...) values that fall as a power of the scale.
@@ -215,7 +218,12 @@ def limit_difference(
         [-] at most :data:`LIMIT_TOLERANCE` if only noise is left.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
-    gap = np.abs(extrapolate(scales, (theirs - ours) * weight)).max()
+    differences = (theirs - ours) * weight
+    limit = extrapolate(scales, differences)
+    # what leaving out the largest scale changes, the limit does not know to better
+    # than a factor of its own order
+    unsure = 2 * np.abs(limit - extrapolate(scales[1:], differences[1:]))
+    gap = np.maximum(0.0, np.abs(limit) - unsure).max()
     size = max(np.abs(ours * weight).max(), floor / LIMIT_TOLERANCE)
     return float(gap / size) if size > 0 else float(gap)
 
