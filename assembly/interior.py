@@ -24,7 +24,7 @@ _BACK_OFF = 0.99  # of the way to the nearest cone's boundary
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"}, error_model="numpy")
 def interior_point(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, starts: NDArray,
-    tolerance: float,
+    tolerance: float, relative: float = 0.0,
 ) -> tuple[NDArray, NDArray, int]:  # fmt: skip
     """Minimise; all arguments of order 1 (scale before).
 
@@ -35,7 +35,8 @@ def interior_point(
         H: (p, nu) of full row rank.
         k: (p,).
         starts: (cones + 1,) first column of each cone, and nu.
-        tolerance: of the gap.
+        tolerance: of the gap ..
+        relative: .. plus this part of the springs' energy |G u + h|^2 / 2.
 
     Returns:
         u (nu,), multipliers of H (p,), and the iterations taken; -1 if it broke down.
@@ -78,7 +79,10 @@ def interior_point(
             for j in range(nu):
                 left[i] -= H[i, j] * u[j]
             worst = max(worst, abs(left[i]))
-        if gap <= tolerance and worst <= 1e-13:
+        energy = 0.0
+        for i in range(r):
+            energy += 0.5 * v[i] * v[i]
+        if gap <= tolerance + relative * energy and worst <= 1e-13:
             return u, n, iteration
         mu = gap / cones
         # scaling of each cone, and S = M D^-1 M^T + diag(1 .. 1, 0 .. 0)

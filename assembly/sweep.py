@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.batch import Energies, minimise_energies
 from assembly.conic import SolverFailed
-from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import POSE, Posture, place_many
 from assembly.robot import Robot
 from assembly.robot_file import frame_table
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
 _LARGEST_GRID = 10_000_000  # points; more is a slip of the step
+_CHUNK = 256  # points solved together between two reports of progress
 _POINT = {
     "margin": "1", "margin_free": "1", "energy": "J", "closure_residual": "1",
     "clearance_excess": "1", "duality_gap": "J",
@@ -112,14 +113,29 @@ def sweep_poses(
     for name, values in zip(axes, mesh, strict=True):
         poses[:, POSE.index(name)] = values.ravel()
     postures, reasons = place_many(robot, poses)
-    rows = []
-    for i, (posture, reason) in enumerate(zip(postures, reasons, strict=True)):
-        rows.append(_point(posture, reason))
-        progress(i + 1, len(poses))
+    rows: list[dict] = []
+    for first in range(0, len(poses), _CHUNK):
+        some = postures[first : first + _CHUNK]
+        reached = [posture for posture in some if posture is not None]
+        energies, at = _energies(robot, reached), 0
+        for posture, reason in zip(some, reasons[first:], strict=False):
+            rows.append(_point(posture, reason, energies, at))
+            at += posture is not None
+            progress(len(rows), len(poses))
     return _dataset(robot, axes, shape, rows)
 
 
-def _point(posture: Posture | None, reason: str) -> dict:
+def _energies(robot: Robot, postures: list[Posture]) -> Energies:
+    """Least energies of some postures of one robot."""
+    frames = np.zeros((len(postures), len(robot.frames), 4, 4))
+    for T, posture in zip(frames, postures, strict=True):
+        T[:] = posture.transforms
+    return minimise_energies(
+        robot, frames, mismatch=np.array([p.mismatch for p in postures])
+    )
+
+
+def _point(posture: Posture | None, reason: str, energies: Energies, at: int) -> dict:
     """Everything at one posture; a point that fails says so and stops nothing."""
     row: dict = dict.fromkeys(_POINT, np.nan)
     row |= {"platform_screw": np.full(6, np.nan), "status": "ok", "reason": ""}
@@ -129,17 +145,16 @@ def _point(posture: Posture | None, reason: str) -> dict:
         for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
             margin = zone_margin(posture, compliant).margin
             row[key] = np.inf if margin is None else margin
-        answer = solve_assembly(posture)
-    except CannotAssemble as error:
-        return row | {"status": "cannot assemble", "reason": str(error)}
     except SolverFailed as error:
         return row | {"status": "solver failed", "reason": str(error)}
+    if energies.status[at] != "ok":
+        return row | {"status": energies.status[at], "reason": energies.reason[at]}
     return row | {
-        "energy": answer.energy,
-        "platform_screw": answer.platform_screw,
-        "closure_residual": answer.closure_residual(),
-        "clearance_excess": answer.clearance_excess(),
-        "duality_gap": answer.duality_gap(),
+        "energy": energies.energy[at],
+        "platform_screw": energies.platform_screw[at],
+        "closure_residual": energies.closure_residual[at],
+        "clearance_excess": energies.clearance_excess[at],
+        "duality_gap": energies.gap[at],
     }
 
 

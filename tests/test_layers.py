@@ -16,7 +16,14 @@ OWNERS = {
     "clarabel": ("assembly/conic.py",),
     "cvxpy": ("assembly/reference.py",),
     "exudyn": ("validation/multibody.py",),
-    "numba": ("assembly/interior.py", "assembly/continuation.py"),
+    "numba": (
+        "assembly/interior.py",
+        "assembly/continuation.py",
+        "assembly/dual_newton.py",
+        "assembly/compiled_assembly.py",
+        "assembly/compiled_reduction.py",
+        "assembly/householder.py",
+    ),
     "xarray": ("assembly/sweep.py", "stiffness/library.py"),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
