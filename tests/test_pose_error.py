@@ -40,7 +40,7 @@ def bounds(robot, reading="frozen", **options):
     return bound_pose_error(answer, reading, **tight | options)
 
 
-def contains(bracket, value, tolerance):
+def assert_holds(bracket, value, tolerance):
     """The bracket is as narrow as asked and holds the value."""
     low, high = bracket
     assert high - low <= tolerance
@@ -55,23 +55,23 @@ def test_one_joint_gives_its_own_cones():
     """
     play = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
     found = bounds(serial(play))
-    contains(found.rotation_error, 5e-4, 1e-9)
+    assert_holds(found.rotation_error, 5e-4, 1e-9)
     # x: r cos a; y: r sin a + 0.3 spin; z: axial + 0.3 tilt
     a = np.linspace(0, 2 * np.pi, 2_000_001)
     sizes = np.hypot(2e-5 * np.cos(a), 2e-5 * np.sin(a) + 0.3 * 3e-4)
     expected = np.hypot(sizes.max(), 1e-5 + 0.3 * 4e-4)
-    contains(found.translation_error, expected, 1e-9)
+    assert_holds(found.translation_error, expected, 1e-9)
 
 
 def test_play_of_parallel_joints_adds_up_along_a_serial_chain():
     found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
-    contains(found.translation_error, 3e-5, 1e-9)
-    contains(found.rotation_error, 0.0, 1e-9)
+    assert_holds(found.translation_error, 3e-5, 1e-9)
+    assert_holds(found.rotation_error, 0.0, 1e-9)
 
 
 def test_any_point_of_the_platform_can_be_asked_about():
     found = bounds(serial(Clearance(tilt=1e-3)), offset=[0.2, 0, 0])
-    contains(found.translation_error, 0.5e-3, 1e-9)
+    assert_holds(found.translation_error, 0.5e-3, 1e-9)
 
 
 def test_a_platform_that_moves_freely_has_no_bound():
@@ -85,8 +85,8 @@ def test_a_platform_that_moves_freely_has_no_bound():
         Frame("tip", "hinge", [0.5, 0, 0]),
     ))  # fmt: skip
     found = bounds(limited)
-    contains(found.rotation_error, 0.01, 1e-9)
-    contains(found.translation_error, 0.005, 1e-9)
+    assert_holds(found.rotation_error, 0.01, 1e-9)
+    assert_holds(found.translation_error, 0.005, 1e-9)
 
 
 def test_planar_loop_by_vertex_enumeration():
@@ -110,7 +110,7 @@ def test_planar_loop_by_vertex_enumeration():
         ]
     robot = Robot("table", "ae", tuple(frames), (("ae", "be"),))
     found = bounds(robot)
-    contains(found.translation_error, np.sqrt(10) * 1e-5, 1e-9)
+    assert_holds(found.translation_error, np.sqrt(10) * 1e-5, 1e-9)
     assert np.abs(np.abs(found.translation_screw[3:5]) - [3e-5, 1e-5]).max() < 1e-9
 
 
@@ -122,8 +122,8 @@ def test_budget_around_two_springs_is_a_ball_known_in_closed_form(eta):
     least = k1 * k2 / (k1 + k2) * gap**2 / 2
     radius = np.sqrt(2 * eta * least / (k1 + k2))
     found = bounds(robot, "budget", energy_budget=eta)
-    contains(found.translation_error, gap * k2 / (k1 + k2) + radius, 1e-9)
-    contains(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
+    assert_holds(found.translation_error, gap * k2 / (k1 + k2) + radius, 1e-9)
+    assert_holds(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
 
 
 def test_frozen_deformations_leave_a_loaded_joint_no_play():
@@ -135,7 +135,7 @@ def test_frozen_deformations_leave_a_loaded_joint_no_play():
     # the loaded disc is held; the unloaded interval along z plays, but the springs
     # that would have to follow it are frozen
     size = float(np.linalg.norm(answer.platform_screw[3:]))
-    contains(found.translation_error, size, 1e-9)
+    assert_holds(found.translation_error, size, 1e-9)
 
 
 def test_reading_must_be_known_and_budget_needs_no_load():

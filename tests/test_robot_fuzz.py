@@ -217,7 +217,7 @@ def mangled_text(draw):
     return content
 
 
-def works_or_says_why(path):
+def assert_works_or_says_why(path):
     """Read and place; the only way out is one line that names the file."""
     try:
         home_posture(read_robot(path))
@@ -234,7 +234,7 @@ def works_or_says_why(path):
 def test_a_robot_with_odd_values_works_or_one_line_says_why(data, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(toml(data), encoding="utf-8")
-    works_or_says_why(path)
+    assert_works_or_says_why(path)
 
 
 @settings(LIGHT, max_examples=80)
@@ -242,7 +242,7 @@ def test_a_robot_with_odd_values_works_or_one_line_says_why(data, tmp_path):
 def test_a_robot_with_other_numbers_is_placed_or_one_line_says_why(data, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(toml(data), encoding="utf-8")
-    works_or_says_why(path)
+    assert_works_or_says_why(path)
     with suppress(BadInput):  # that of the file again, or out of reach
         place_robot(read_robot(path), pose={"tx": 0.4, "rz": 0.1})
 
@@ -252,7 +252,7 @@ def test_a_robot_with_other_numbers_is_placed_or_one_line_says_why(data, tmp_pat
 def test_a_robot_with_exchanged_parents_works_or_one_line_says_why(data, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(toml(data), encoding="utf-8")
-    works_or_says_why(path)
+    assert_works_or_says_why(path)
 
 
 @LIGHT
@@ -260,7 +260,7 @@ def test_a_robot_with_exchanged_parents_works_or_one_line_says_why(data, tmp_pat
 def test_a_file_with_garbled_bytes_works_or_one_line_says_why(content, tmp_path):
     path = tmp_path / "robot.toml"
     path.write_bytes(content)
-    works_or_says_why(path)
+    assert_works_or_says_why(path)
 
 
 @pytest.mark.parametrize("data", SEEDS, ids=lambda d: d["name"])

@@ -1,8 +1,6 @@
 """One self-contained page of a study, and its results for machines."""
 
-import base64
 import html
-import io
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,22 +11,14 @@ from numpy.typing import NDArray
 from stiffness.reading import BadInput
 from stiffness.screws import SCREW
 from stiffness.writing import write_json
+from validation.html import (
+    html_figure,
+    html_image,
+    html_page,
+    html_table,
+    png_bytes,
+)
 from validation.study import StudyResults
-
-_STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
-       padding: 0 1rem; color: #222; }
-h1 { font-size: 1.7rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem;
-     border-bottom: 1px solid #ddd; }
-table { border-collapse: collapse; font-size: .85rem; margin: .8rem 0; }
-td, th { border: 1px solid #ddd; padding: .2rem .55rem; text-align: right; }
-th { background: #f5f5f5; } td:first-child, th:first-child { text-align: left; }
-.verdict { font-size: 1.1rem; padding: .7rem 1rem; border-left: .4rem solid; }
-.good { border-color: #2a7; background: #f0faf5; }
-.bad { border-color: #c33; background: #fdf1f1; }
-figure { margin: 1rem 0; } img { max-width: 100%; }
-figcaption, .note { color: #555; font-size: .85rem; }
-"""
 
 
 def write_study(results: StudyResults) -> Path:
@@ -116,13 +106,7 @@ def report_page(results: StudyResults) -> str:
     if results.crosscheck is not None or results.crosscheck_failure:
         parts.append(_crosscheck(results))
     parts.append(_left_out())
-    body = "\n".join(parts)
-    return (
-        "<!doctype html><html lang=en><head><meta charset=utf-8>"
-        "<meta name=viewport content='width=device-width'>"
-        f"<title>{html.escape(study.title)}</title><style>{_STYLE}</style></head>"
-        f"<body>{body}</body></html>\n"
-    )
+    return html_page(study.title, "\n".join(parts))
 
 
 def _verdict(results: StudyResults) -> str:
@@ -180,7 +164,7 @@ def _solution(results: StudyResults) -> str:
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {key}", f"{value:.2e}"])
         rows += _linearisation_rows(solution["linearisation_error"])
-    parts.append(_table(["quantity", "value"], rows))
+    parts.append(html_table(["quantity", "value"], rows))
     if solution["status"] == "ok":
         parts.append(_wrenches(results))
     if results.error:
@@ -217,7 +201,7 @@ def _pose_error(results: StudyResults) -> str:
         "<p>Largest error of the platform's pose, problem (27), between certified "
         "bounds. Frozen: deformations stay as they are. Free: compliant joints also "
         "turn about their own axis. Budget: all that closes with 5 % more energy.</p>"
-        + _table(head, rows)
+        + html_table(head, rows)
     )
 
 
@@ -232,7 +216,7 @@ def _wrenches(results: StudyResults) -> str:
     head = ["link", "MX", "MY", "MZ [N m]", "FX", "FY", "FZ [N]"]
     return (
         "<p>Wrench each elastic link transmits, at its tip in its own axes:</p>"
-        + _table(head, rows)
+        + html_table(head, rows)
     )
 
 
@@ -250,7 +234,7 @@ def _reference(results: StudyResults) -> str:
         "<h2>The same problems as printed, in cvxpy</h2>"
         "<p>Every screw of every frame a variable, every constraint an equation of the "
         f"paper; differences must stay below {reference['tolerance']:g}.</p>"
-        + _table(["", "reduced problem", "cvxpy", "relative difference"], rows)
+        + html_table(["", "reduced problem", "cvxpy", "relative difference"], rows)
     )
 
 
@@ -274,12 +258,12 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
         "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
         "shear (Euler-Bernoulli) is stiffer than one with it: a few per cent between "
         "the columns are physics, not an error.</p>"
-        + _table(
+        + html_table(
             ["entry [N m/rad .. N/m]", "Euler-Bernoulli", "Timoshenko",
              "finite elements", "to Timoshenko"],
             rows,
         )
-        + _figure(
+        + html_figure(
             stiffness_figure(timoshenko, fea),
             "Finite elements minus Timoshenko beam, entry by entry.",
         )
@@ -307,11 +291,11 @@ def _maps(results: StudyResults) -> str:
     axes = [d for d in results.maps.dims if d != "screw" and results.maps.sizes[d] > 1]
     picture = ""
     if len(axes) == 2:
-        picture = _figure(map_figure(results.maps), "Maps over the grid.")
+        picture = html_figure(map_figure(results.maps), "Maps over the grid.")
     return (
         f"<h2>Over the workspace</h2><p>{html.escape(said)}. Assembles rigidly with "
         f"compliant joints free at {share:.1f} % of the points.</p>"
-        + _table(["", "least", "median", "largest"], rows)
+        + html_table(["", "least", "median", "largest"], rows)
         + picture
     )
 
@@ -325,7 +309,7 @@ def _picture(results: StudyResults) -> str:
     pixels = plotter.screenshot(return_img=True)
     plotter.close()
     caption = "Nominal (grey) and forced robot; the exaggeration is on the picture."
-    return "<h2>The forced robot</h2>" + _image(_png(pixels), caption)
+    return "<h2>The forced robot</h2>" + html_image(png_bytes(pixels), caption)
 
 
 def _crosscheck(results: StudyResults) -> str:
@@ -339,14 +323,16 @@ def _crosscheck(results: StudyResults) -> str:
     closing = ""
     if results.closing is not None:
         drawn = closing_figure(check.posture, results.closing)
-        closing = _figure(drawn, "The simulation pulls the open robot shut by force.")
+        closing = html_figure(
+            drawn, "The simulation pulls the open robot shut by force."
+        )
     return (
         head + "The same forced assembly, without "
         "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
         "A linearised model must differ from it by the square of the errors' size: "
         f"slope 2. Measured: {check.slope:.3f}.</p>"
-        + _table(check.header(), check.rows())
-        + _figure(slope_figure(check), "Difference of the platform's pose.")
+        + html_table(check.header(), check.rows())
+        + html_figure(slope_figure(check), "Difference of the platform's pose.")
         + closing
     )
 
@@ -361,41 +347,6 @@ def _left_out() -> str:
     )
 
 
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    """An HTML table."""
-    top = "".join(f"<th>{html.escape(h)}</th>" for h in head)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in row) + "</tr>"
-        for row in rows
-    )
-    return f"<table><tr>{top}</tr>{body}</table>"
-
-
 def _number(value: float | None, digits: int = 6) -> str:
     """A number, or that there is none."""
     return "none" if value is None else f"{value:.{digits}g}"
-
-
-def _figure(figure: Any, caption: str) -> str:
-    """A matplotlib figure as an image of the page."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return _image(buffer.getvalue(), caption)
-
-
-def _png(pixels: NDArray) -> bytes:
-    """PNG of an RGB picture."""
-    from matplotlib.image import imsave
-
-    buffer = io.BytesIO()
-    imsave(buffer, pixels, format="png")
-    return buffer.getvalue()
-
-
-def _image(png: bytes, caption: str) -> str:
-    """A picture inside the page."""
-    data = base64.b64encode(png).decode()
-    return (
-        f"<figure><img alt='{html.escape(caption)}' src='data:image/png;base64,{data}'>"
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-    )
