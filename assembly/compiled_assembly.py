@@ -37,7 +37,7 @@ _NOISE = 1e-12
 _LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
 _NEAR = 1e-4  # relative gap from which Newton's method finishes what remains
-_STEPS_ALONE, _STEPS = 6, 20  # of Newton's method
+_STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _SHARP = 1e6  # its first sigma after an interior point, see dual_newton
 
 
@@ -263,10 +263,13 @@ def _small_answer(
     G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
     d, H = np.zeros(len(u)), np.zeros((0, len(u)))
     near = _NEAR * _NEAR * 0.5 * np.sum(h * h)
-    for stop, most in ((_NEAR, near), (relative, absolute)):
+    # at a zone's edge the interior point breaks down early; Newton then takes longer
+    for stop, most, steps in (
+        (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
+    ):  # fmt: skip
         u[:] = interior_point(G, h, d, H, none, starts, most, stop)[0]
         _into_cones(starts, u)
-        if dual_newton(Gt, h, starts, relative, absolute, _STEPS, _SHARP, u, y) >= 0:
+        if dual_newton(Gt, h, starts, relative, absolute, steps, _SHARP, u, y) >= 0:
             break
     return INTERIOR
 

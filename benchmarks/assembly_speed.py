@@ -1,0 +1,266 @@
+"""Prints how fast problems (22) and (21) are solved, beside other ways, on one core.
+
+Run ``python benchmarks/assembly_speed.py``; about ten seconds.  The robot is the
+paper's with the errors of the first draw in ``tests/irsbot2_numbers.json``, on a 25 mm
+grid of its workspace.  Printed, in this order:
+
+- microseconds of processor time a point for the energy (22), at the errors times 1 and
+  times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
+  DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
+  reduced by ``assembly.reduction`` (reduction counted), ``solve_assembly`` and
+  ``minimise_energies`` (linearisation, reduction and certificate counted), with the
+  ratio of cvxpy's DPP to each;
+- the same for the margin (21), both readings;
+- the share of the grid's points with a certified energy at six multiples of the errors,
+  and how many of them the slower road had to solve.
+
+The slow ways see a sample of the grid, ours all of it; nothing is run twice to choose
+the better time but ours, whose first run compiles.
+"""
+
+# ruff: noqa: E402  one thread must be asked for before numpy is imported
+import json
+import os
+
+for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
+    os.environ[f"{name}_NUM_THREADS"] = "1"
+
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import cvxpy as cp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
+
+from assembly import conic, reference
+from assembly.batch import minimise_energies
+from assembly.closure import linearise, virtual_joints
+from assembly.energy import solve_assembly
+from assembly.posture import Posture, place_many
+from assembly.reduction import reduce_problem
+from assembly.robot import Robot
+from assembly.robots.irsbot2 import NAMES, irsbot2
+from assembly.zone import zone_margin
+
+NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
+SAMPLE = 24  # points of the slow ways
+READINGS = ("rigid", "free")
+
+
+def paper_robot() -> Robot:
+    """The paper's robot with the errors of the first draw."""
+    robot = irsbot2()
+    case = json.loads(NUMBERS.read_text())["cases"][0]
+    errors = np.zeros((len(robot.frames), 6))
+    for key, value in case["dl"].items():
+        leg, index = key.split("_frame")
+        errors[robot.index(f"{leg}.{NAMES[int(index) - 1]}")] = value
+    return robot.with_errors(errors)
+
+
+def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
+    """Postures on a grid, below the base."""
+    x, z = np.meshgrid(np.arange(-0.65, 0.651, step), np.arange(-0.75, 0.001, step))
+    poses = np.full((x.size, 6), np.nan)
+    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
+    return [posture for posture in place_many(robot, poses)[0] if posture is not None]
+
+
+def timed(solve: Callable[..., object], postures: Iterable) -> float:
+    """Processor time a point [us], failures included; those are counted."""
+    failed = count = 0
+    start = time.process_time()
+    for one in postures:
+        count += 1
+        try:
+            solve(one)
+        except RuntimeError:
+            failed += 1
+    taken = (time.process_time() - start) / count * 1e6
+    if failed:
+        print(f"  ({failed} of {count} failed in the next row)")
+    return taken
+
+
+def closure_matrices(
+    posture: Posture, compliant: str = "elastic"
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Columns of free motions, clearances, springs, and the misfit, scaled to 1."""
+    lin, joints = linearise(posture), virtual_joints(posture.robot, compliant)
+    small = np.abs(lin.rows @ joints.cones).max()
+    elastic = lin.rows @ joints.elastic
+    soft = np.abs(elastic).max(initial=0.0) or 1.0
+    return (
+        lin.rows @ joints.free, lin.rows @ joints.cones / small, elastic / soft,
+        lin.misfit / small,
+    )  # fmt: skip
+
+
+class Dpp:
+    """One of the two problems with parameters, canonicalised once.
+
+    Entries that are zero at every posture are no parameters: cvxpy would hand them to
+    the solver as explicit zeros, at twice the time.
+    """
+
+    def __init__(
+        self, robot: Robot, compliant: str, margin: bool, data: list[tuple]
+    ) -> None:
+        joints = virtual_joints(robot, compliant)
+        self.entries = [
+            np.nonzero(sum(map(np.abs, parts))) for parts in zip(*data, strict=True)
+        ]
+        self.parameters = [
+            cp.Parameter(part.shape, sparsity=at) if part.size and part.ndim > 1
+            else cp.Parameter(part.shape)
+            for part, at in zip(data[0], self.entries, strict=True)
+        ]  # fmt: skip
+        q, u, y = (cp.Variable(part.shape[1]) for part in data[0][:3])
+        t = cp.Variable(nonneg=True)
+        A_q, A_u, A_y, misfit = self.parameters
+        total = A_q @ q + A_u @ u + misfit
+        if len(joints.links):
+            total = total + A_y @ y
+        limits = [total == 0]
+        for cone in range(int(joints.group.max()) + 1):
+            part = np.flatnonzero(joints.group == cone)
+            limits.append(cp.norm(u[part]) <= (t if margin else 1.0))
+        goal = t if margin else cp.sum_squares(y) / 2
+        self.problem = cp.Problem(cp.Minimize(goal), limits)
+        self(data[0])
+
+    def __call__(self, data: tuple) -> float:
+        """The least value with the closure matrices of another posture."""
+        for parameter, value, at in zip(
+            self.parameters, data, self.entries, strict=True
+        ):
+            if parameter.attributes["sparsity"]:
+                parameter.value_sparse = coo_array((value[at], at), shape=value.shape)
+            else:
+                parameter.value = value
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            self.problem.solve(solver=cp.CLARABEL)
+        return float(self.problem.value)
+
+
+def clarabel_full(posture: Posture) -> object:
+    """The full problem, scaled, by Clarabel without a modelling layer."""
+    A_q, A_u, A_y, misfit = closure_matrices(posture)
+    group = virtual_joints(posture.robot).group
+    limits, radii = conic._unit_cones(group, np.ones(len(group)))
+    others = csc_matrix((limits.shape[0], A_y.shape[1] + A_q.shape[1]))
+    A = vstack([csc_matrix(np.hstack([A_u, A_y, A_q])), hstack([limits, others])])
+    P = block_diag([
+        csc_matrix((len(group),) * 2), diags_array(np.ones(A_y.shape[1])),
+        csc_matrix((A_q.shape[1],) * 2),
+    ])  # fmt: skip
+    b = np.concatenate([-misfit, radii])
+    q = np.zeros(A.shape[1])
+    return conic._clarabel(
+        P.tocsc(), q, A.tocsc(), b, len(misfit), group, regularisation=1e-8
+    )
+
+
+def clarabel_reduced(posture: Posture) -> object:
+    """The reduced problem by Clarabel, the reduction counted."""
+    joints = virtual_joints(posture.robot)
+    small = reduce_problem(linearise(posture), joints)
+    size = max(np.linalg.norm(small.h), np.linalg.norm(small.G, axis=0).max())
+    return conic._by_clarabel(
+        1e-8, small.G / size, small.h / size, small.d, small.H, small.k, joints.group
+    )
+
+
+def cvxpy_rebuilt(posture: Posture) -> object:
+    """As printed, in SI units, built anew."""
+    reference._UNIT = 1.0
+    return reference.reference_energy(posture)
+
+
+def batched(robot: Robot, postures: list[Posture]) -> float:
+    """Processor time a point [us] of the batch, best of 3."""
+    T = np.array([p.transforms for p in postures])
+    mismatch = np.array([p.mismatch for p in postures])
+    minimise_energies(robot, T[:2], mismatch=mismatch[:2])
+    best = np.inf
+    for _ in range(3):
+        start = time.process_time()
+        minimise_energies(robot, T, mismatch=mismatch)
+        best = min(best, time.process_time() - start)
+    return best / len(T) * 1e6
+
+
+def print_table(title: str, rows: dict[str, float]) -> None:
+    """Microseconds, and how many times cvxpy's DPP takes."""
+    print(f"\n{title}\n{'':38}{'us/point':>10}{'DPP over it':>13}")
+    dpp = rows["cvxpy DPP, scaled"]
+    for name, value in rows.items():
+        print(f"{name:38}{value:10.1f}{dpp / value:13.2f}")
+
+
+def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
+    """The table of problem (22) at a multiple of the errors."""
+    scaled = robot.with_errors(kappa * robot.errors)
+    own = [replace(p, robot=scaled) for p in postures]
+    few = own[:: len(own) // SAMPLE][:SAMPLE]
+    solve_assembly(few[0])
+    data = [closure_matrices(p) for p in few]
+    rows = {
+        "cvxpy rebuilt, SI": timed(cvxpy_rebuilt, few[::3]),
+        "cvxpy DPP, scaled": timed(Dpp(robot, "elastic", False, data), data),
+        "Clarabel, full problem, scaled": timed(clarabel_full, few),
+        "Clarabel, our reduction (numpy)": timed(clarabel_reduced, few),
+        "ours, one at a time": timed(solve_assembly, few),
+        "ours, batched": batched(scaled, own),
+    }
+    print_table(f"energy (22), errors times {kappa:g}", rows)
+
+
+def print_margins(postures: list[Posture]) -> None:
+    """The table of problem (21), both readings."""
+    few = postures[:: len(postures) // SAMPLE][:SAMPLE]
+    for reading in READINGS:
+        ours = partial(zone_margin, compliant=reading)
+        ours(few[0])
+        data = [closure_matrices(p, reading) for p in few]
+        rows = {
+            "cvxpy DPP, scaled": timed(Dpp(few[0].robot, reading, True, data), data),
+            "ours, one at a time": timed(ours, few),
+        }
+        print_table(f"margin (21), compliant {reading}", rows)
+
+
+def print_certified(robot: Robot, postures: list[Posture]) -> None:
+    """Shares of certified points, and fallbacks."""
+    T = np.array([p.transforms for p in postures])
+    mismatch = np.array([p.mismatch for p in postures])
+    print(f"\ncertified energies of {len(T)} points")
+    for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
+        answers = minimise_energies(robot, T, kappa * robot.errors, mismatch)
+        share, slow = answers.certified.mean() * 100, answers.fallbacks()
+        newton = np.mean(answers.road == 0) * 100
+        print(
+            f"errors times {kappa:<5g} {share:6.2f} %   slower road: {slow or 'none'}; "
+            f"Newton alone {newton:.0f} %"
+        )
+
+
+def main() -> None:
+    """Print everything."""
+    robot = paper_robot()
+    postures = workspace(robot)
+    print(f"{robot.name}, {len(postures)} points, one core")
+    for kappa in (1.0, 0.2):
+        print_energies(robot, postures, kappa)
+    print_margins(postures)
+    print_certified(robot, postures)
+
+
+if __name__ == "__main__":
+    main()
