@@ -237,20 +237,28 @@ def sweep(
         str, typer.Option(help="Such as tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
+    reading: Annotated[
+        str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
+    ] = "frozen",
     figure: Annotated[
         Path | None, typer.Option(help="Also draw the maps, as PNG, SVG or PDF.")
     ] = None,
 ) -> None:
     """Margins, energy and platform error over a grid of platform poses."""
     from assembly.plot import map_figure
+    from assembly.pose_error import READINGS
     from assembly.robots import load_robot
     from assembly.sweep import parse_grid, save_dataset, sweep_poses
 
     machine, axes = load_robot(robot), parse_grid(grid)
+    if reading not in (*READINGS, "none"):
+        hint = nearest(reading, [*READINGS, "none"])
+        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
+    wanted = None if reading == "none" else reading
     for path in filter(None, (output, figure)):
         check_writable(path)
     with progress_bars() as update:
-        data = sweep_poses(machine, axes, lambda d, n: update("postures", d, n))
+        data = sweep_poses(machine, axes, lambda d, n: update("postures", d, n), wanted)
     save_dataset(data, output)
     if figure is not None:
         map_figure(data).savefig(figure, dpi=150)

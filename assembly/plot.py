@@ -22,8 +22,8 @@ _MAPS = (
     ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
     ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r"),
     ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
-    ("translation", 1e3, "platform position error [mm]", "viridis"),
     ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
+    ("translation", 1e3, "platform position error [mm]", "viridis"),
 )
 
 
@@ -43,7 +43,7 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
     """
     from matplotlib.figure import Figure
 
-    names = [d for d in data.dims if d != "screw" and data.sizes[d] > 1]
+    names = [d for d in data["energy"].dims if data.sizes[d] > 1]
     if len(names) != 2:
         raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
     x, y = (str(name) for name in names)
@@ -64,10 +64,12 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
 
 
 def _quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A variable of the data set, or the size of half the platform screw."""
+    """A variable; for pose errors the upper bound, or else half the platform screw."""
     halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
     if key not in halves:
         return data[key]
+    if f"{key}_error" in data:
+        return data[f"{key}_error"].sel(bound="upper", drop=True)
     part = data["platform_screw"].isel(screw=halves[key])
     return np.sqrt((part**2).sum("screw", skipna=False))
 

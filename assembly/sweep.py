@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from assembly.batch import Energies, minimise_energies
 from assembly.conic import SolverFailed
+from assembly.energy import solve_assembly
+from assembly.pose_error import bound_pose_error
 from assembly.posture import POSE, Posture, place_many
 from assembly.robot import Robot
 from assembly.robot_file import frame_table
@@ -34,6 +36,8 @@ _MEANING = {
     "margin_free": "the same, compliant joints free about their own axis",
     "energy": "least elastic energy that closes it, eq. (22)",
     "platform_screw": "pose error at the platform's origin, base axes",
+    "rotation_error": "certified bounds of the largest rotation error, eq. (27)",
+    "translation_error": "certified bounds of the largest translation error, eq. (27)",
     "status": "ok, out of reach, cannot assemble, or solver failed",
 }
 
@@ -91,17 +95,21 @@ def sweep_poses(
     robot: Robot,
     axes: Mapping[str, NDArray],
     progress: Callable[[int, int], None] = lambda done, total: None,
+    reading: str | None = None,
 ) -> "xarray.Dataset":
-    """Solve (21) and (22) at every pose of a grid.
+    """Solve (21) and (22), and if asked (27), at every pose of a grid.
 
     Args:
         robot: with its errors, clearances and stiffnesses.
         axes: values [m or rad] by pose component; components not named are free.
+        reading: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None leaves
+            the bounds of the pose error out, which take most of the time.
         progress: called after each point with the number done and the total.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
-        ``platform_screw``, certificates and ``status``; NaN where there is no answer,
+        ``platform_screw``, with a reading ``rotation_error`` and ``translation_error``
+        (lower and upper), certificates and ``status``; NaN where there is no answer,
         and the status then says why.
 
     Raises:
@@ -119,10 +127,32 @@ def sweep_poses(
         reached = [posture for posture in some if posture is not None]
         energies, at = _energies(robot, reached), 0
         for posture, reason in zip(some, reasons[first:], strict=False):
-            rows.append(_point(posture, reason, energies, at))
+            row = _point(posture, reason, energies, at)
+            if reading is not None:
+                row |= _pose_error(posture, reading, row)
+            rows.append(row)
             at += posture is not None
             progress(len(rows), len(poses))
     return _dataset(robot, axes, shape, rows)
+
+
+def _pose_error(posture: Posture | None, reading: str, row: dict) -> dict:
+    """Bounds of (27) where (22) has an answer."""
+    unknown = np.full(2, np.nan)
+    row = {
+        "rotation_error": unknown, "translation_error": unknown,
+        "status": row["status"], "reason": row["reason"],
+    }  # fmt: skip
+    if posture is None or row["status"] != "ok":
+        return row
+    try:
+        found = bound_pose_error(solve_assembly(posture), reading)
+    except SolverFailed as error:
+        return row | {"status": "solver failed", "reason": str(error)}
+    return row | {
+        "rotation_error": np.array(found.rotation_error),
+        "translation_error": np.array(found.translation_error),
+    }
 
 
 def _energies(robot: Robot, postures: list[Posture]) -> Energies:
@@ -172,18 +202,26 @@ def _dataset(
     }
     screws = np.array([r["platform_screw"] for r in rows]).reshape(*shape, 6)
     data["platform_screw"] = ((*dims, "screw"), screws, {"units": "rad, m"})
+    bounds = {"rotation_error": "rad", "translation_error": "m"}
+    for key, unit in bounds.items():
+        if key in rows[0]:
+            values = np.array([r[key] for r in rows]).reshape(*shape, 2)
+            data[key] = ((*dims, "bound"), values, {"units": unit})
     for key in ("status", "reason"):
         text = np.array([r[key] for r in rows], dtype=object).reshape(shape)
         data[key] = (dims, text, {})
-    for key, meaning in _MEANING.items():
-        data[key][2]["long_name"] = meaning
+    for key in _MEANING.keys() & data.keys():
+        data[key][2]["long_name"] = _MEANING[key]
     coordinates = {k: (k, v, {"units": units[k]}) for k, v in axes.items()}
     attributes = {
         "robot": robot.name,
         "robot_sha256": robot_hash(robot),
         "program": f"forcefit {version('forcefit')}",
     }
-    return xarray.Dataset(data, {**coordinates, "screw": list(SCREW)}, attributes)
+    labels = {"screw": list(SCREW)}
+    if "rotation_error" in data:
+        labels["bound"] = ["lower", "upper"]
+    return xarray.Dataset(data, {**coordinates, **labels}, attributes)
 
 
 def robot_hash(robot: Robot) -> str:

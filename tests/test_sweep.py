@@ -120,6 +120,26 @@ def test_maps_show_each_quantity_of_the_grid(data):
     assert np.nanmax(shown) == pytest.approx(float(data.energy.max()))
 
 
+def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
+                       reading="frozen")  # fmt: skip
+    assert data.rotation_error.dims == ("tx", "tz", "bound")
+    assert data.bound.values.tolist() == ["lower", "upper"]
+    assert data.translation_error.attrs["units"] == "m"
+    point = NUMBERS["cases"][0]["points"][1]
+    there = data.sel(tx=0.2, tz=-0.45, method="nearest")
+    low, high = there.rotation_error.values
+    assert low <= point["full_rigid_R"][1] + 1e-7
+    assert high >= point["full_rigid_R"][0] - 1e-7
+    assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
+    figure = map_figure(data)
+    panel = next(a for a in figure.axes if "orientation" in a.get_title())
+    shown = np.ma.filled(panel.collections[0].get_array(), np.nan)
+    highest = float(data.rotation_error.sel(bound="upper").max())
+    assert np.nanmax(shown) == pytest.approx(1e3 * highest)
+
+
 def test_maps_need_two_axes(data):
     with pytest.raises(ValueError, match="two axes, this one has 1"):
         map_figure(data.isel(tx=[0]))

@@ -288,7 +288,7 @@ def _maps(results: StudyResults) -> str:
     ]
     said = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
     share = 100 * summary["share_assemblable_free"]
-    axes = [d for d in results.maps.dims if d != "screw" and results.maps.sizes[d] > 1]
+    axes = [d for d in results.maps["energy"].dims if results.maps.sizes[d] > 1]
     picture = ""
     if len(axes) == 2:
         picture = html_figure(map_figure(results.maps), "Maps over the grid.")

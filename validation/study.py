@@ -280,7 +280,9 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         reference = _compare_reference(posture, answer, solution["zone"], progress)
     maps = None
     if "maps" in wanted:
-        maps = sweep_poses(robot, study.grid, lambda d, n: progress("maps", d, n))
+        maps = sweep_poses(
+            robot, study.grid, lambda d, n: progress("maps", d, n), "frozen"
+        )
     check, failure, closing = None, {"reason": ""}, None
     if "crosscheck" in wanted and solved:
         progress("cross-check", 0, 1)
