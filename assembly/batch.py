@@ -19,6 +19,7 @@ from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
+from assembly.zone import zone_margin
 
 if TYPE_CHECKING:
     from assembly.compiled_reduction import Structure
@@ -190,12 +191,76 @@ def _best_bound(one: Assembly) -> tuple[float, float]:
     return max((one.bound, 1.0), (scaled, factor))
 
 
-@lru_cache(maxsize=16)
-def _structure(robot: Robot) -> tuple[VirtualJoints, "Structure"]:
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Zone margins of k points, each with its certificate.
+
+    Attributes:
+        margin: (k,) factor on all clearances at which it just assembles; inf where
+            none does, NaN where the solver failed.
+        bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
+            road answered.
+        slower: (k,) bool, solved by :func:`assembly.zone.zone_margin`.
+        reason: (k,) what was said where the solver failed, else empty.
+    """
+
+    margin: NDArray
+    bound: NDArray
+    slower: NDArray
+    reason: NDArray
+
+
+def zone_margins(
+    robot: Robot, transforms: ArrayLike, compliant: str = "rigid",
+    mismatch: ArrayLike = 0.0,
+) -> Margins:  # fmt: skip
+    """Margins of problem (21) at many postures.
+
+    Args:
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.zone`.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+
+    Returns:
+        The margins, in the order given.
+
+    Raises:
+        ValueError: ``compliant`` is something else.
+    """
+    from assembly.compiled_zone import all_margins
+
+    if compliant not in {"rigid", "free"}:
+        raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
+    T = np.require(transforms, dtype=float, requirements=["C", "W"])
+    count, n = len(T), len(robot.frames)
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
+    joints, structure = _structure(robot, compliant)
+    margin, bound = np.full(count, np.nan), np.full(count, np.nan)
+    road, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
+    if joints.scaled.all() and len(joints.scaled):
+        all_margins(structure, T, robot.errors.copy(), off, margin, bound, road)
+    for i in np.flatnonzero(road).tolist():
+        posture = Posture(robot, np.full(n, np.nan), T[i], float(off[i]))
+        margin[i] = bound[i] = np.nan
+        try:
+            zone = zone_margin(posture, compliant)
+        except SolverFailed as error:
+            reason[i] = str(error)
+            continue
+        margin[i] = np.inf if zone.margin is None else zone.margin
+        bound[i] = np.inf if zone.bound is None else zone.bound
+    return Margins(margin, bound, road > 0, reason)
+
+
+@lru_cache(maxsize=32)
+def _structure(
+    robot: Robot, compliant: str = "elastic"
+) -> tuple[VirtualJoints, "Structure"]:
     """The robot as the compiled road reads it."""
     from assembly.compiled_reduction import Structure
 
-    joints = virtual_joints(robot)
+    joints = virtual_joints(robot, compliant)
     on_path = robot.on_path[robot.index(robot.platform)]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
@@ -208,7 +273,7 @@ def _structure(robot: Robot) -> tuple[VirtualJoints, "Structure"]:
     keys, starts = np.unique(key[order], return_index=True)
     cone_frame, cones = _own_columns(joints.cones)
     free_frame, free = _own_columns(joints.free)
-    bounds = clearance_bounds(robot)[:, [0, 0, 1, 2, 2, 3]]
+    bounds = clearance_bounds(robot, compliant)[:, [0, 0, 1, 2, 2, 3]]
     free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     limit = bounds[free_frame, free_axis]

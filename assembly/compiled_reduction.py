@@ -226,31 +226,39 @@ def rigid_rows(
     tolerance: float,
 ) -> bool:  # fmt: skip
     """Whether clearances or errors enter where no spring answers."""
-    largest, worst = 0.0, 0.0
-    for c in range(len(s.cone_frame)):
+    count, cones = len(Z) - rank, len(s.cone_frame)
+    parts, most = np.empty((len(s.patterns), count, 6)), np.zeros(len(s.patterns))
+    entering = np.zeros(len(s.patterns))
+    for g in range(len(s.patterns)):
+        entering[g] = np.max(np.abs(s.patterns[g])) if s.patterns.shape[1] else 0.0
+        for i in range(count):
+            pattern_part(Z, rank + i, s.patterns[g], parts[g, i])
+            for a in range(6):
+                most[g] = max(most[g], abs(parts[g, i, a]))
+    sizes, largest, worst = np.zeros(cones), 0.0, 0.0
+    for c in range(cones):
         j = s.cone_frame[c]
-        pattern = s.patterns[s.pattern_of[j]]
-        entering = False
-        for k in range(len(pattern)):
-            entering = entering or pattern[k] != 0.0
-        if not entering:
-            continue
-        column = P[j, s.cone_axis[c]]
         for a in range(6):
-            largest = max(largest, abs(column[a] * s.cone_size[c]))
-        for i in range(rank, len(Z)):
+            sizes[c] = max(sizes[c], abs(P[j, s.cone_axis[c], a]) * s.cone_size[c])
+        largest = max(largest, sizes[c] * entering[s.pattern_of[j]])
+    for c in range(cones):
+        j = s.cone_frame[c]
+        g = s.pattern_of[j]
+        if 6.0 * sizes[c] * most[g] <= _NOISE * largest / _CLEAR:
+            continue  # as nearly all are
+        for i in range(count):
             total = 0.0
-            for k in range(len(pattern)):
-                for a in range(6):
-                    total += pattern[k] * Z[i, 6 * k + a] * column[a]
+            for a in range(6):
+                total += parts[g, i, a] * P[j, s.cone_axis[c], a]
             worst = max(worst, abs(total * s.cone_size[c]))
     if worst > _NOISE * largest / _CLEAR:
         return True
     size = 0.0
     for j in range(len(P)):
         for axis in range(6):
-            for a in range(6):
-                size = max(size, abs(P[j, axis, a] * errors[j, axis]))
+            if errors[j, axis] != 0.0:
+                for a in range(6):
+                    size = max(size, abs(P[j, axis, a] * errors[j, axis]))
     for i in range(rank, len(Z)):
         total = 0.0
         for a in range(len(known)):

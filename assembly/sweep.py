@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch import Energies, minimise_energies
+from assembly.batch import minimise_energies, zone_margins
 from assembly.conic import SolverFailed
 from assembly.energy import solve_assembly
 from assembly.pose_error import bound_pose_error
 from assembly.posture import POSE, Posture, place_many
 from assembly.robot import Robot
 from assembly.robot_file import frame_table
-from assembly.zone import ASSEMBLABLE, zone_margin
+from assembly.zone import ASSEMBLABLE
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import SCREW
 
@@ -125,13 +125,13 @@ def sweep_poses(
     for first in range(0, len(poses), _CHUNK):
         some = postures[first : first + _CHUNK]
         reached = [posture for posture in some if posture is not None]
-        energies, at = _energies(robot, reached), 0
+        solved = iter(_solve(robot, reached))
         for posture, reason in zip(some, reasons[first:], strict=False):
-            row = _point(posture, reason, energies, at)
+            unreached = {"status": "out of reach", "reason": reason}
+            row = _row(unreached if posture is None else next(solved))
             if reading is not None:
                 row |= _pose_error(posture, reading, row)
             rows.append(row)
-            at += posture is not None
             progress(len(rows), len(poses))
     return _dataset(robot, axes, shape, rows)
 
@@ -155,37 +155,42 @@ def _pose_error(posture: Posture | None, reading: str, row: dict) -> dict:
     }
 
 
-def _energies(robot: Robot, postures: list[Posture]) -> Energies:
-    """Least energies of some postures of one robot."""
+def _solve(robot: Robot, postures: list[Posture]) -> list[dict]:
+    """What there is to say of each posture; one that fails stops nothing."""
     frames = np.zeros((len(postures), len(robot.frames), 4, 4))
     for T, posture in zip(frames, postures, strict=True):
         T[:] = posture.transforms
-    return minimise_energies(
-        robot, frames, mismatch=np.array([p.mismatch for p in postures])
-    )
+    off = np.array([posture.mismatch for posture in postures])
+    margins = {
+        key: zone_margins(robot, frames, reading, off)
+        for key, reading in (("margin", "rigid"), ("margin_free", "free"))
+    }
+    energies = minimise_energies(robot, frames, mismatch=off)
+    found = []
+    for i in range(len(postures)):
+        row: dict = {key: each.margin[i] for key, each in margins.items()}
+        failed = [each.reason[i] for each in margins.values() if each.reason[i]]
+        if failed:
+            row |= {"status": "solver failed", "reason": failed[0]}
+        elif energies.status[i] != "ok":
+            row |= {"status": energies.status[i], "reason": energies.reason[i]}
+        else:
+            row |= {
+                "energy": energies.energy[i],
+                "platform_screw": energies.platform_screw[i],
+                "closure_residual": energies.closure_residual[i],
+                "clearance_excess": energies.clearance_excess[i],
+                "duality_gap": energies.gap[i],
+            }
+        found.append(row)
+    return found
 
 
-def _point(posture: Posture | None, reason: str, energies: Energies, at: int) -> dict:
-    """Everything at one posture; a point that fails says so and stops nothing."""
+def _row(found: dict) -> dict:
+    """A row of the data set, NaN where nothing was found."""
     row: dict = dict.fromkeys(_POINT, np.nan)
     row |= {"platform_screw": np.full(6, np.nan), "status": "ok", "reason": ""}
-    if posture is None:
-        return row | {"status": "out of reach", "reason": reason}
-    try:
-        for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
-            margin = zone_margin(posture, compliant).margin
-            row[key] = np.inf if margin is None else margin
-    except SolverFailed as error:
-        return row | {"status": "solver failed", "reason": str(error)}
-    if energies.status[at] != "ok":
-        return row | {"status": energies.status[at], "reason": energies.reason[at]}
-    return row | {
-        "energy": energies.energy[at],
-        "platform_screw": energies.platform_screw[at],
-        "closure_residual": energies.closure_residual[at],
-        "clearance_excess": energies.clearance_excess[at],
-        "duality_gap": energies.gap[at],
-    }
+    return row | found
 
 
 def _dataset(

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch import minimise_energies
+from assembly.batch import minimise_energies, zone_margins
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import Posture, home_posture, place_many
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.zone import zone_margin
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -322,3 +323,53 @@ def test_postures_are_made_for_the_slower_road_only(grid):
     robot, postures = grid
     bare = Posture(robot, np.full(42, np.nan), postures[0].transforms, 0.0)
     assert solve_assembly(bare).energy == solve_assembly(postures[0]).energy
+
+
+def assert_same_margin(batch, i, zone):
+    """Both margins lie within 1e-8 of their common certified bounds."""
+    expected = np.inf if zone.margin is None else zone.margin
+    assert batch.margin[i] == pytest.approx(expected, rel=1e-7, abs=1e-10)
+    assert batch.bound[i] <= batch.margin[i] * (1 + 1e-11) + 1e-15
+    assert batch.bound[i] <= expected * (1 + 1e-9) + 1e-10
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_equal_one_at_a_time(grid, compliant):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = zone_margins(robot, T, compliant, mismatch)
+    assert not batch.slower.any()
+    for i in range(0, len(postures), 5):
+        assert_same_margin(batch, i, zone_margin(postures[i], compliant))
+    assert np.all(batch.bound >= batch.margin * (1 - 1e-8))
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rng):
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(80):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    compiled = 0
+    for home in homes:
+        errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
+        robot = home.robot.with_errors(errors)
+        batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
+        compiled += not batch.slower[0]
+        assert_same_margin(batch, 0, zone_margin(replace(home, robot=robot), compliant))
+    assert compiled > 15
+
+
+def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
+    """5e-5 m across, 2e-5 m of play: 2.5, by hand."""
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
+    batch = zone_margins(robot, home_posture(robot).transforms[None])
+    assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
+    assert not batch.slower[0]
+
+
+def test_a_margin_has_two_readings():
+    robot = coaxial_beams(np.zeros(6))
+    with pytest.raises(ValueError, match="compliant is 'soft'"):
+        zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")

@@ -22,6 +22,7 @@ OWNERS = {
         "assembly/dual_newton.py",
         "assembly/compiled_assembly.py",
         "assembly/compiled_reduction.py",
+        "assembly/compiled_zone.py",
         "assembly/householder.py",
     ),
     "xarray": ("assembly/sweep.py", "stiffness/library.py"),

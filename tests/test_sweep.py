@@ -150,3 +150,24 @@ def test_progress_counts_every_point():
     robot = coaxial_beams(np.zeros(6))
     sweep_poses(robot, {"tx": np.array([0.5, 0.6])}, lambda d, n: seen.append((d, n)))
     assert seen == [(1, 2), (2, 2)]
+
+
+def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
+    """The solver gives up on one reading of one point: its neighbour is not touched."""
+    from assembly import sweep
+
+    solve = sweep.zone_margins
+
+    def spoilt(robot, frames, reading, off):
+        found = solve(robot, frames, reading, off)
+        if reading == "free":
+            found.margin[0], found.reason[0] = np.nan, "zone margin: gave up"
+        return found
+
+    monkeypatch.setattr(sweep, "zone_margins", spoilt)
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    data = sweep_poses(robot, {"tx": np.array([0.0, 0.1]), "tz": np.array([-0.4])})
+    assert data.status.values.ravel().tolist() == ["solver failed", "ok"]
+    assert data.reason.values.ravel().tolist() == ["zone margin: gave up", ""]
+    assert np.isnan(data.energy.values[0, 0])
+    assert np.isfinite(data.energy.values[1, 0])
