@@ -36,7 +36,8 @@ _RANK = 1e-10  # as in assembly.reduction, and so is the noise floor
 _NOISE = 1e-12
 _LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
-_NEAR = 1e-4  # relative gap from which Newton's method finishes what remains
+# gap from which Newton's method finishes: of the energy, of that without play
+_NEAR, _NEAR_WITHOUT_PLAY = 1e-7, 1e-8
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _SHARP = 1e6  # its first sigma after an interior point, see dual_newton
 
@@ -262,7 +263,7 @@ def _small_answer(
         return NEWTON
     G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
     d, H = np.zeros(len(u)), np.zeros((0, len(u)))
-    near = _NEAR * _NEAR * 0.5 * np.sum(h * h)
+    near = _NEAR_WITHOUT_PLAY * 0.5 * np.sum(h * h)
     # at a zone's edge the interior point breaks down early; Newton then takes longer
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
