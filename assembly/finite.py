@@ -73,7 +73,7 @@ class FiniteRobot:
         """(n, 6, N) every column, by frame and component."""
         j = self.joints
         every = np.hstack([j.elastic, j.cones, j.free])
-        return every.reshape(len(self.posture.robot.frames), 6, -1)
+        return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
 
     @cached_property
     def frame(self) -> NDArray:
@@ -335,7 +335,8 @@ class Placement:
         V = self.moves
         difference = first[:, None] * V - (back @ V) * second[:, None]
         rows = np.linalg.solve(left_jacobian(self._open_screws), difference)
-        return (rows * self.model.scale[:, None]).reshape(-1, V.shape[1])
+        rows = rows * self.model.scale[:, None]
+        return rows.reshape(rows.shape[0] * rows.shape[1], V.shape[1])
 
     @cached_property
     def _at_origin(self) -> NDArray:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from assembly.energy import solve_assembly
+from assembly.exact import solve_exact
 from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import irsbot2
 from assembly.zone import zone_margin
-from stiffness.screws import rotation_matrix
+from stiffness.screws import rotation_matrix, rotation_vector, transform
 from tests.robots_for_tests import planar_four_bar, random_robot
 
 ROD = BeamLink({"radius": 0.01}, 70e9, 0.33)
@@ -147,3 +148,22 @@ def test_reciprocity_two_loads_do_each_others_work(rng):
         one, other = (solve_assembly(posture, w) for w in (first, second))
         work = float(second @ one.platform_screw)
         assert float(first @ other.platform_screw) == pytest.approx(work, rel=1e-8)
+
+
+def test_a_rigid_serial_robot_stands_exactly_where_its_errors_put_it():
+    """Nothing can move, nothing is solved: the product of the transforms by hand."""
+    error = np.array([0.02, -0.01, 0.03, 1e-3, 2e-3, -3e-3])
+    frames = (
+        Frame("a", translation=[0.1, 0.2, 0.3], rotation=[0.3, 0.1, -0.2],
+              geometric_error=error),
+        Frame("b", "a", [0.4, 0, 0], [0, 0.7, 0], geometric_error=-error),
+    )  # fmt: skip
+    posture = home_posture(Robot("arm", "b", frames))
+    found = solve_exact(posture).platform_screw
+    small = [transform(s * error[3:], rotation_matrix(s * error[:3])) for s in (1, -1)]
+    a, b = posture.robot.fixed_transforms
+    actual = a @ small[0] @ b @ small[1]
+    nominal = posture.transforms[1]
+    turn = rotation_vector(actual[:3, :3] @ nominal[:3, :3].T)
+    expected = np.concatenate([turn, actual[:3, 3] - nominal[:3, 3]])
+    assert np.allclose(found, expected, rtol=0, atol=1e-14)
