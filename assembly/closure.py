@@ -41,7 +41,6 @@ class VirtualJoints:
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
         group: (nu,) which cone a column belongs to: two columns for a disc.
-        frame_of: (nu,) row of the frame the cone belongs to.
         scaled: (nu,) bool, whether the margin's factor scales the cone.
         free: (6n, nq) unit columns of unbounded motions.
         bounded_motion: whether bounds of passive joints' own motion are kept.
@@ -52,7 +51,6 @@ class VirtualJoints:
     links: NDArray
     cones: NDArray
     group: NDArray
-    frame_of: NDArray
     scaled: NDArray
     free: NDArray
     bounded_motion: bool
@@ -108,16 +106,15 @@ def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDAr
     return np.hstack(columns), np.array(is_link, dtype=bool)
 
 
-def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Columns of the bounded clearances, their group, frame and whether they scale."""
-    rows, sizes, group, frame_of, scaled = [], [], [], [], []
+def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Columns of the bounded clearances, their group and whether they scale."""
+    rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
         for row in CONES[cone]:
             rows.append(6 * i + row)
             sizes.append(bounds[i, cone])
             group.append(count)
-            frame_of.append(i)
             scaled.append(play[i, cone])
         count += 1
     columns = np.zeros((6 * len(bounds), len(rows)))
@@ -125,7 +122,6 @@ def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray, N
     return (
         columns,
         np.array(group, dtype=int),
-        np.array(frame_of, dtype=int),
         np.array(scaled, dtype=bool),
     )
 
@@ -159,11 +155,6 @@ class Linearisation:
     def misfit(self) -> NDArray:
         """(6 closures,) what the geometric errors leave open, scaled."""
         return self.rows @ self.posture.robot.errors.ravel()
-
-    @cached_property
-    def error_screw(self) -> NDArray:
-        """(6,) platform screw of the geometric errors alone."""
-        return self.platform @ self.posture.robot.errors.ravel()
 
 
 def linearise(posture: Posture) -> Linearisation:

@@ -97,7 +97,7 @@ def minimise_energy(
             )
         if u is None or rigid is None:
             continue
-        answer = _certify(*scaled, _into_cones(u, group), rigid)
+        answer = _certify(*scaled, into_cones(u, group), rigid)
         if best is None or answer.gap < best.gap:
             best = answer
         if best.gap <= _ACCEPTED * abs(best.value) + 1e-12 * float(
@@ -244,10 +244,9 @@ def least_factor(
     return max(0.0, float(x[-1] * size)), x[:nu] * size, -z[:m] / rows
 
 
-def _into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Cones' vectors shortened to length 1 where rounding made them longer."""
-    sizes = cone_sizes(u, group)
-    return u / np.maximum(1.0, sizes)[group]
+def into_cones(u: NDArray, group: NDArray) -> NDArray:
+    """Cones' vectors shortened to length 1 where they are longer."""
+    return u / np.maximum(1.0, cone_sizes(u, group))[group]
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:

@@ -11,7 +11,7 @@ from assembly.robot import (
     Robot,
     beam_axis,
 )
-from stiffness.beam import Section, beam_compliance, rectangular_section, round_section
+from stiffness.beam import beam_compliance, declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:
@@ -37,7 +37,7 @@ def link_compliance(frame: Frame) -> NDArray:
         return np.linalg.inv(link.stiffness)
     if isinstance(link, BeamLink):
         length, axis = beam_axis(frame)
-        section = beam_section(link)
+        section = declared_section(link.section, link.poisson)
         return beam_compliance(
             length, section, link.young, link.poisson,
             theory=link.theory, axis=axis, up=link.up,
@@ -49,17 +49,6 @@ def link_compliance(frame: Frame) -> NDArray:
     from assembly.mesh_link import mesh_compliance
 
     return mesh_compliance(frame)
-
-
-def beam_section(link: BeamLink) -> Section:
-    """The section of a beam from its declared numbers."""
-    given = link.section
-    if "radius" in given:
-        inner = given.get("inner_radius", 0.0)
-        return round_section(given["radius"], link.poisson, inner)
-    if "width" in given:
-        return rectangular_section(given["width"], given["height"], link.poisson)
-    return Section(**given)
 
 
 def joint_compliances(robot: Robot) -> NDArray:

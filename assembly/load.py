@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.links import beam_section
 from assembly.posture import Posture
 from assembly.robot import BeamLink, beam_axis
+from stiffness.beam import declared_section
 from stiffness.screws import screw_map
 
 
@@ -102,7 +102,8 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
         link = frame.link
         if isinstance(link, BeamLink) and link.density is not None:
             length, axis = beam_axis(frame)
-            W = link.density * beam_section(link).area * length * g
+            section = declared_section(link.section, link.poisson)
+            W = link.density * section.area * length * g
             clamp = np.cross(R @ (length * axis), W) / 12
             bodies[i] += _wrench(W / 2, -clamp)
             parent = robot.parents[i]

@@ -30,7 +30,7 @@ from scipy.linalg import svd
 
 from assembly.clearance import has_bounded_motion
 from assembly.closure import VirtualJoints, virtual_joints
-from assembly.conic import cone_sizes, minimise_energy
+from assembly.conic import cone_sizes, into_cones, minimise_energy
 from assembly.energy import Assembly, solve_with
 from assembly.majorant import majorant_bound
 from assembly.polytope import Polytope
@@ -279,7 +279,7 @@ class _Moving:
         screws = self.answer.clearance_screws.ravel()
         size = (self.joints.cones**2).sum(axis=0)
         u = self.joints.cones.T @ screws / size
-        return u / np.maximum(1.0, cone_sizes(u, self.joints.group))[self.joints.group]
+        return into_cones(u, self.joints.group)
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:

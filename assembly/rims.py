@@ -72,11 +72,6 @@ def rim_forces(u: NDArray, pull: NDArray, group: NDArray) -> NDArray:
     return np.where(cone_sizes(u, group) >= 1.0 - _AT_RIM, np.maximum(force, 0.0), 0.0)
 
 
-def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Cones' vectors shortened to length 1 where they are longer."""
-    return u / np.maximum(1.0, cone_sizes(u, group))[group]
-
-
 def across_rims(u: NDArray, rim: NDArray, group: NDArray) -> NDArray:
     """(nu, rims) directions across the rims of the cones marked."""
     return np.where(group[:, None] == np.flatnonzero(rim), u[:, None], 0.0)

@@ -12,6 +12,7 @@ C         tip compliance, ``screw = C @ wrench``                  SI
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -137,6 +138,24 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
         shear_y=shear,
         shear_z=shear,
     )
+
+
+def declared_section(given: Mapping[str, float], nu: float) -> Section:
+    """The section of a beam from the numbers a robot file declares.
+
+    Args:
+        given: ``radius`` and perhaps ``inner_radius``, or ``width`` and ``height``, or
+            the attributes of a :class:`Section` [m, m^2, m^4].
+        nu: [-] Poisson's ratio.
+
+    Returns:
+        The section.
+    """
+    if "radius" in given:
+        return round_section(given["radius"], nu, given.get("inner_radius", 0.0))
+    if "width" in given:
+        return rectangular_section(given["width"], given["height"], nu)
+    return Section(**given)
 
 
 def _rectangle_torsion(width: float, height: float) -> float:

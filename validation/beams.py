@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.robot import BeamLink, Frame
-from stiffness.beam import Section, rectangular_section, round_section
+from stiffness.beam import declared_section
 from validation.motion import turned
 
 
@@ -45,7 +45,7 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
     Returns:
         (6, 6) diagonal [N, N m^2].
     """
-    section = section_of(link)
+    section = declared_section(link.section, link.poisson)
     E, G = link.young, link.young / (2 * (1 + link.poisson))
     bending = E * np.array([section.I_y, section.I_z])
     shear = step**2 / (12 * bending[::-1])  # a force along y bends about z
@@ -53,14 +53,3 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
         shares = np.array([section.shear_y, section.shear_z])
         shear = shear + 1 / (G * section.area * shares)
     return np.diag([E * section.area, *(1 / shear), G * section.J, *bending])
-
-
-def section_of(link: BeamLink) -> Section:
-    """The section of a beam from its declared numbers."""
-    given = link.section
-    if "radius" in given:
-        inner = given.get("inner_radius", 0.0)
-        return round_section(given["radius"], link.poisson, inner)
-    if "width" in given:
-        return rectangular_section(given["width"], given["height"], link.poisson)
-    return Section(**given)

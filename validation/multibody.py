@@ -28,8 +28,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
+from stiffness.beam import declared_section
 from stiffness.reading import BadInput
-from validation.beams import beam_axes, beam_span, element_stiffness, section_of
+from validation.beams import beam_axes, beam_span, element_stiffness
 from validation.contact import joint_play
 from validation.exudyn_model import (
     CLOSING,
@@ -392,7 +393,8 @@ def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
         part = tree.links[frame.name]
         nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
         step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
-        weight = link.density * section_of(link).area * length * gravity
+        section = declared_section(link.section, link.poisson)
+        weight = link.density * section.area * length * gravity
         weight = weight / (len(nodes) - 1)
         moment = np.cross(step, weight) / 12
         for k, node in enumerate(nodes):

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.closure import linearise
-from assembly.conic import cone_sizes
+from assembly.conic import into_cones
 from assembly.energy import solve_assembly
 from assembly.links import link_compliance
 from assembly.posture import Posture
@@ -201,7 +201,7 @@ def optimality_gap(pair: Pair) -> float:
     cones = best.joints.cones
     # a column of cones has one entry, its bound
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
-    u = u / np.maximum(1.0, cone_sizes(u, best.joints.group))[best.joints.group]
+    u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h
     cost = (strain @ strain - least @ least) / 2 - small.d @ (u - best.clearances)
     return float(cost / max(small.energy_without_play, 1e-300))
