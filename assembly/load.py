@@ -30,8 +30,8 @@ class Forces:
     """Loads as they act on the small screws of every frame, in its axes.
 
     Attributes:
-        body: (6n,) [N m, N] on errors and deformations of bodies.
-        joint: (6n,) [N m, N] on play, springs and motion of joints.
+        body: (..., 6n) [N m, N] on errors and deformations of bodies.
+        joint: (..., 6n) [N m, N] on play, springs and motion of joints.
     """
 
     body: NDArray
@@ -50,7 +50,8 @@ def forces_on(
     """Forces on all small screws of a robot.
 
     Args:
-        posture: where it stands, of n frames.
+        posture: where it stands, of n frames; or many postures, its transforms (..., n,
+            4, 4), and then all shapes here have the same leading dimensions.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
         carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
@@ -58,25 +59,25 @@ def forces_on(
     Returns:
         The forces; all zero where nothing is given.
     """
-    robot = posture.robot
-    on_body, after = np.zeros((2, len(robot.frames), 6))
+    robot, T = posture.robot, posture.transforms
+    on_body, after = np.zeros((2, *T.shape[:-2], 6))
     if bodies is not None:
         on_body += np.asarray(bodies, dtype=float)
     if carried is not None:
         after += np.asarray(carried, dtype=float)
     if load is not None:
-        on_body[robot.index(robot.platform)] += np.asarray(load, dtype=float)
+        on_body[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
     # all read at the platform's origin, then summed over what each frame carries
-    read = screw_map(posture.platform[:3, 3] - posture.transforms[:, :3, 3])
-    read = np.swapaxes(read, 1, 2)
-    own = np.einsum("nij,nj->ni", read, on_body)
-    after = np.einsum("nij,nj->ni", read, after)
-    below = (robot.on_path & ~np.eye(len(own), dtype=bool)).T
+    read = screw_map(posture.platform[..., None, :3, 3] - T[..., :3, 3])
+    own = np.einsum("...ij,...i->...j", read, on_body)
+    after = np.einsum("...ij,...i->...j", read, after)
+    below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
     joint = below @ (own + after) + after
     paths = posture.paths
+    flat = (*T.shape[:-3], 6 * len(robot.frames))
     return Forces(
-        np.einsum("nji,nj->ni", paths, joint + own).ravel(),
-        np.einsum("nji,nj->ni", paths, joint).ravel(),
+        np.einsum("...ji,...j->...i", paths, joint + own).reshape(flat),
+        np.einsum("...ji,...j->...i", paths, joint).reshape(flat),
     )
 
 
@@ -84,36 +85,37 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     """Weight of all links with a density and of all bodies with a mass.
 
     Args:
-        posture: where the robot stands, of n frames.
-        gravity: (3,) [m/s^2] base axes, such as (0, 0, -9.81).
+        posture: where the robot stands, of n frames; or many postures, as above.
+        gravity: (..., 3) [m/s^2] base axes, such as (0, 0, -9.81).
 
     Returns:
-        ``bodies`` (n, 6) and ``carried`` (n, 6) of :func:`forces_on` [N m, N].  Links
+        ``bodies`` and ``carried`` (..., n, 6) of :func:`forces_on` [N m, N].  Links
         given by a matrix, a mesh or a library have no weight of their own here.
     """
-    g = np.asarray(gravity, dtype=float)
     robot, T = posture.robot, posture.transforms
-    bodies, carried = np.zeros((2, len(robot.frames), 6))
+    g = np.broadcast_to(np.asarray(gravity, dtype=float), (*T.shape[:-3], 3))
+    bodies, carried = np.zeros((2, *T.shape[:-2], 6))
     for i, frame in enumerate(robot.frames):
-        R = T[i, :3, :3]
+        R = T[..., i, :3, :3]
         if frame.mass:
-            arm = R @ frame.centre_of_mass
-            bodies[i] += _wrench(frame.mass * g, np.cross(arm, frame.mass * g))
+            bodies[..., i, :] += _at(R @ frame.centre_of_mass, frame.mass * g)
         link = frame.link
         if isinstance(link, BeamLink) and link.density is not None:
             length, axis = beam_axis(frame)
             section = declared_section(link.section, link.poisson)
             W = link.density * section.area * length * g
-            clamp = np.cross(R @ (length * axis), W) / 12
-            bodies[i] += _wrench(W / 2, -clamp)
+            clamp = np.zeros((*W.shape[:-1], 6))
+            clamp[..., :3] = np.cross(R @ (length * axis), W) / 12
+            bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
             parent = robot.parents[i]
             if parent >= 0:  # else the base carries it
                 # the beam starts where it starts, be that the parent's origin or not
-                arm = T[i, :3, 3] - R @ (length * axis) - T[parent, :3, 3]
-                carried[parent] += _wrench(W / 2, clamp + np.cross(arm, W / 2))
+                start = T[..., i, :3, 3] - R @ (length * axis)
+                arm = start - T[..., parent, :3, 3]
+                carried[..., parent, :] += _at(arm, W / 2) + clamp
     return bodies, carried
 
 
-def _wrench(force: NDArray, moment: NDArray) -> NDArray:
-    """``[m f]``."""
-    return np.concatenate([moment, force])
+def _at(arm: NDArray, force: NDArray) -> NDArray:
+    """(..., 6) ``[arm x f, f]`` of a force (..., 3) that acts at (..., 3)."""
+    return np.concatenate([np.cross(arm, force), force], axis=-1)

@@ -47,14 +47,14 @@ class Posture:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(4, 4) nominal platform pose seen from the base."""
-        return self.transforms[self.robot.index(self.robot.platform)]
+        """(..., 4, 4) nominal platform pose seen from the base."""
+        return self.transforms[..., self.robot.index(self.robot.platform), :, :]
 
     @cached_property
     def paths(self) -> NDArray:
-        """(n, 6, 6) maps from screws at each frame to the platform, in base axes."""
-        offsets = self.transforms[:, :3, 3] - self.platform[:3, 3]
-        return screw_map(offsets, self.transforms[:, :3, :3])
+        """(..., n, 6, 6) maps from screws at each frame to the platform, base axes."""
+        offsets = self.transforms[..., :3, 3] - self.platform[..., None, :3, 3]
+        return screw_map(offsets, self.transforms[..., :3, :3])
 
     def pose(self) -> dict[str, float]:
         """Nominal platform pose by component, rotation vector in base axes."""
