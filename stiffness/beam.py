@@ -141,11 +141,12 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """The section of a beam from the numbers a robot file declares.
+    """The section of a beam from the numbers that declare it.
 
     Args:
-        given: ``radius`` and perhaps ``inner_radius``, or ``width`` and ``height``, or
-            the attributes of a :class:`Section` [m, m^2, m^4].
+        given: ``radius`` and perhaps ``inner_radius``; or ``width`` and ``height`` and
+            perhaps ``wall`` (a box) or ``web`` and ``flange`` (an I); or the attributes
+            of a :class:`Section` [m, m^2, m^4].
         nu: [-] Poisson's ratio.
 
     Returns:
@@ -153,6 +154,14 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
     """
     if "radius" in given:
         return round_section(given["radius"], nu, given.get("inner_radius", 0.0))
+    from stiffness.sections import box_section, i_section  # which needs Section
+
+    if "wall" in given:
+        return box_section(given["width"], given["height"], given["wall"], nu)
+    if "web" in given:
+        return i_section(
+            given["width"], given["height"], given["web"], given["flange"], nu
+        )
     if "width" in given:
         return rectangular_section(given["width"], given["height"], nu)
     return Section(**given)
