@@ -100,7 +100,7 @@ def peak_beam_stress(
 
 
 def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
-    """(n, p) sigma [Pa] and 3 tau^2 [Pa^2] at each fibre of (n, 6) loads of a section."""
+    """(n, p) sigma [Pa] and 3 tau^2 [Pa^2] at each fibre, of (n, 6) section loads."""
     sigma, tau_y, tau_z = (forces @ influence[:, k].T for k in range(3))
     return sigma, 3 * (tau_y**2 + tau_z**2)
 

@@ -140,37 +140,3 @@ def _nodal_stresses(level: Level) -> NDArray:
         )
         np.add.at(total, nodes, stress)
     return total / np.maximum(count, 1)[:, None, None]
-
-
-def round_beam_peak(
-    radius: float, wrench: ArrayLike, distance: float, inner_radius: float = 0.0
-) -> float:
-    """Largest von Mises stress of a round beam along z, some way from its tip.
-
-    The outer fibre of bending and torsion, and the neutral fibre of shear and torsion,
-    are compared; shear is 4/3 of its mean in a solid bar, up to 2 in a thin tube.
-
-    Args:
-        radius: [m] outer.
-        wrench: (6,) [N m, N] at the tip, z from base to tip.
-        distance: [m] from the tip to the section.
-        inner_radius: [m] of the hole.
-
-    Returns:
-        [Pa].
-
-    Sources:
-        Timoshenko & Gere, *Mechanics of Materials*: bending, torsion, shear of a tube
-        4/3 (r^2 + r ri + ri^2) / (r^2 + ri^2).
-    """
-    m, f = np.asarray(wrench, dtype=float)[:3], np.asarray(wrench, dtype=float)[3:]
-    q2 = inner_radius**2
-    area = np.pi * (radius**2 - q2)
-    second = np.pi / 4 * (radius**4 - q2**2)
-    # the tip is at +distance along z from the section: arm x force adds to the moment
-    bending = np.hypot(m[0] - distance * f[1], m[1] + distance * f[0])
-    shape = 4 / 3 * (radius**2 + radius * inner_radius + q2) / (radius**2 + q2)
-    twist = abs(m[2]) * radius / (2 * second)
-    outer = np.hypot(abs(f[2]) / area + bending * radius / second, np.sqrt(3) * twist)
-    across = shape * np.hypot(f[0], f[1]) / area + twist
-    return float(max(outer, np.hypot(f[2] / area, np.sqrt(3) * across)))
