@@ -1,0 +1,66 @@
+"""Effects that a declared model may lack; each in a file of its own.
+
+Applied in the order of :data:`LIBRARY`: friction acts on a joint's spring, so drives
+become elastic first; the foundation adds a frame, so it comes last.
+"""
+
+from assembly.conditions import Conditions
+from assembly.effects.base_compliance import BASE_COMPLIANCE
+from assembly.effects.contact_stiffening import CONTACT_STIFFENING
+from assembly.effects.drift import DRIFT
+from assembly.effects.drive_compliance import DRIVE_COMPLIANCE
+from assembly.effects.effect import Effect, Values
+from assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
+from assembly.effects.encoder_offset import ENCODER_OFFSET
+from assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
+from assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
+from assembly.effects.joint_clearance import JOINT_CLEARANCE
+from assembly.effects.link_length import LINK_LENGTH
+from assembly.effects.load_gain import LOAD_GAIN
+from assembly.effects.modulus_scale import MODULUS_SCALE
+from assembly.effects.registration import REGISTRATION
+from assembly.effects.self_weight import SELF_WEIGHT
+from assembly.effects.thermal_expansion import THERMAL_EXPANSION
+
+LIBRARY: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        SELF_WEIGHT,
+        THERMAL_EXPANSION,
+        DRIVE_COMPLIANCE,
+        ENCODER_OFFSET,
+        ENCODER_ECCENTRICITY,
+        LINK_LENGTH,
+        REGISTRATION,
+        MODULUS_SCALE,
+        JOINT_CLEARANCE,
+        FRICTION_HYSTERESIS,
+        CONTACT_STIFFENING,
+        LOAD_GAIN,
+        GEOMETRIC_STIFFENING,
+        DRIFT,
+        BASE_COMPLIANCE,
+    )
+}
+
+
+def apply_effects(here: Conditions, effects: dict[str, Values]) -> Conditions:
+    """Conditions with effects added.
+
+    Args:
+        here: without them.
+        effects: parameters by their public names, by effect.
+
+    Returns:
+        Conditions with all of them.
+
+    Raises:
+        KeyError: an effect that the library does not have.
+    """
+    unknown = set(effects) - set(LIBRARY)
+    if unknown:
+        raise KeyError(f"no effect {sorted(unknown)}; there are {sorted(LIBRARY)}")
+    for name, effect in LIBRARY.items():
+        if name in effects:
+            here = effect.apply(here, effects[name])
+    return here

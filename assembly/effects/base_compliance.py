@@ -1,0 +1,71 @@
+"""The foundation is elastic: at the base's origin, diagonal in the base's axes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.robot import BASE, Frame, Robot
+from stiffness.screws import SCREW
+
+FOUNDATION = "foundation"
+_AXES = tuple(axis.lower() for axis in SCREW)
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    robot = with_foundation(here.robot, values)
+    still = np.broadcast_to(np.eye(4), (len(here), 1, 4, 4))
+    zero = np.zeros((len(here), 1, 6))
+    return replace(
+        here, robot=robot,
+        coordinates=np.concatenate([zero[:, :, 0], here.coordinates], axis=1),
+        transforms=np.concatenate([still, here.transforms], axis=1),
+        errors=np.concatenate([zero, here.errors], axis=1),
+    )  # fmt: skip
+
+
+def with_foundation(robot: Robot, values: Values) -> Robot:
+    """A robot whose base stands on springs: one more frame, between it and the ground.
+
+    Args:
+        robot: any.
+        values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; rigid if absent.
+
+    Returns:
+        The robot on its foundation.
+    """
+    K = np.diag([values.get(f"stiffness.{axis}", np.inf) for axis in _AXES])
+    taken = {f.name for f in robot.frames}
+    name = FOUNDATION
+    while name in taken:
+        name += "_"
+    stand = Frame(name, joint_stiffness=K)
+    moved = (replace(f, parent=name) if f.parent == BASE else f for f in robot.frames)
+    return replace(robot, frames=(stand, *moved))
+
+
+def _public(robot: Robot, values: Values) -> dict[str, float]:
+    """Stiffnesses from compliances."""
+    return {
+        f"stiffness.{name.removeprefix('compliance.')}": 1 / c
+        for name, c in values.items()
+        if c > 0
+    }
+
+
+def _unit(robot: Robot, name: str) -> str:
+    return "N m/rad" if name.startswith("stiffness.r") else "N/m"
+
+
+BASE_COMPLIANCE = Effect(
+    name="base_compliance",
+    summary="the foundation yields",
+    apply=_apply,
+    unit=_unit,
+    frames=None,
+    unknowns=lambda robot: tuple(
+        Unknown(f"compliance.{axis}", 1e-6, 0.0, 1.0) for axis in _AXES
+    ),
+    public=_public,
+)

@@ -1,0 +1,57 @@
+"""Contacts in a joint stiffen under load: load = coefficient |deflection|^exponent.
+
+Sources:
+    Johnson, Contact Mechanics, section 4.2 (Hertz: exponent 1.5 for spheres).
+"""
+
+from dataclasses import replace
+
+from assembly.conditions import Conditions, ContactLaw
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.places import drives, own_unit
+from assembly.robot import Robot
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    laws = tuple(
+        ContactLaw(
+            key.removesuffix(".coefficient"), coefficient,
+            values.get(key.removesuffix("coefficient") + "exponent", 1.5),
+        )
+        for key, coefficient in values.items()
+        if key.endswith(".coefficient")
+    )  # fmt: skip
+    return replace(here, laws=here.laws + laws)
+
+
+def _public(robot: Robot, values: Values) -> dict[str, float]:
+    """Coefficient from the deflection under a unit load, coefficient^(-1/exponent)."""
+    found: dict[str, float] = {}
+    for key, give in values.items():
+        name, _, kind = key.rpartition(".")
+        exponent = values.get(f"{name}.exponent", 1.5)
+        if kind == "give" and give > 0:
+            found[f"{name}.coefficient"] = give**-exponent
+            found[f"{name}.exponent"] = exponent
+    return found
+
+
+def _unit(robot: Robot, name: str) -> str:
+    frame, _, kind = name.rpartition(".")
+    if kind == "exponent":
+        return "1"
+    return "N m/rad^n" if own_unit(robot, frame) == "rad" else "N/m^n"
+
+
+CONTACT_STIFFENING = Effect(
+    name="contact_stiffening",
+    summary="joints yield less and less as the load grows",
+    apply=_apply,
+    unit=_unit,
+    frames=drives,
+    unknowns=lambda robot: (
+        Unknown("give", 1e-6, 0.0, 1.0), Unknown("exponent", 0.5, 1.05, 6.0, 1.5),
+    ),
+    public=_public,
+    linear=False,
+)  # fmt: skip

@@ -1,0 +1,39 @@
+"""The reading drifts: amplitude (1 - exp(-time / time constant))."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.robot import Robot
+from stiffness.screws import SCREW
+
+_AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
+    part = 1.0 - np.exp(-here.time / values["time_constant"])
+    return replace(here, reading=here.reading + part[:, None] * amplitude)
+
+
+def _unit(robot: Robot, name: str) -> str:
+    if name == "time_constant":
+        return "s"
+    return "rad" if name.startswith("amplitude.r") else "m"
+
+
+DRIFT = Effect(
+    name="drift",
+    summary="what is read drifts with time and settles",
+    apply=_apply,
+    unit=_unit,
+    frames=None,
+    unknowns=lambda robot: (
+        *(Unknown(name, 1e-5) for name in _AMPLITUDE),
+        Unknown("time_constant", 1000.0, 1.0, 1e9, 1000.0),
+    ),
+    needs=("time",),
+    linear=False,
+)

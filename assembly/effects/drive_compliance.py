@@ -1,0 +1,41 @@
+"""Actuated joints are elastic, in series with any stiffness declared."""
+
+from dataclasses import replace
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.places import drives, in_series, own_unit, with_frame
+from assembly.robot import Robot
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    for name, stiffness in values.items():
+        here = with_frame(
+            here, name,
+            lambda f, k=stiffness: replace(
+                f, joint_stiffness=in_series(f.joint_stiffness, f.own_axis, 1 / k)
+            ),
+        )  # fmt: skip
+    return here
+
+
+def _unit(robot: Robot, name: str) -> str:
+    return "N m/rad" if own_unit(robot, name) == "rad" else "N/m"
+
+
+def _public(robot: Robot, values: Values) -> dict[str, float]:
+    """Stiffnesses from compliances; a rigid drive is none of the effect's."""
+    ends = len(".compliance")
+    return {name[:-ends]: 1 / c for name, c in values.items() if c > 0}
+
+
+DRIVE_COMPLIANCE = Effect(
+    name="drive_compliance",
+    summary="actuated joints yield",
+    apply=_apply,
+    unit=_unit,
+    frames=drives,
+    unknowns=lambda robot: (Unknown("compliance", 1e-6, 0.0, 1.0),),
+    public=_public,
+    linear=False,
+)

@@ -1,0 +1,69 @@
+"""What an effect is: something a declared model lacks, as a change to conditions."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from assembly.conditions import Conditions
+from assembly.robot import Robot
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that a fit looks for, in a form in which the model is nearly linear.
+
+    Attributes:
+        name: of a parameter, or of a part of one: below a frame's name where an effect
+            acts at frames (``""`` if the frame's name says it all).
+        scale: plausible size, in the unit of the parameter or of the part.
+        lower: bound below which it makes no sense.
+        upper: bound above which it makes no sense.
+        start: where a fit begins and its first derivative is taken.
+    """
+
+    name: str
+    scale: float
+    lower: float = float("-inf")
+    upper: float = float("inf")
+    start: float = 0.0
+
+
+def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
+    """Unknowns that are the parameters themselves."""
+    return dict(values)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect of the library.
+
+    Attributes:
+        name: as in the public format.
+        summary: one line for people.
+        apply: conditions with the effect, from those without and the parameters by
+            their public names (``<frame>``, ``<frame>.<component>`` or plain).
+        unit: of a parameter: of the robot and the parameter's public name.
+        frames: frames of a robot at which it can act; None if it acts at none.
+        unknowns: what is to be fitted: at each frame, or in all.
+        public: parameters by their public names, from unknowns by theirs (a frame's
+            name, a dot, the unknown's name).
+        needs: covariates without which it cannot be told or applied.
+        linear: whether the platform's deviation is linear in the unknowns, to first
+            order in all small motions.
+    """
+
+    name: str
+    summary: str
+    apply: Callable[[Conditions, Values], Conditions]
+    unit: Callable[[Robot, str], str]
+    frames: Callable[[Robot], tuple[str, ...]] | None
+    unknowns: Callable[[Robot], tuple[Unknown, ...]]
+    public: Callable[[Robot, Values], dict[str, float]] = _as_they_are
+    needs: tuple[str, ...] = ()
+    linear: bool = True
+
+
+def at(frame: str, kind: str) -> str:
+    """Name of an unknown or parameter that belongs to a frame."""
+    return f"{frame}.{kind}" if kind else frame

@@ -1,0 +1,56 @@
+"""Play at joints declared tight, taken up by the load."""
+
+from dataclasses import replace
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.places import with_frame
+from assembly.robot import Clearance, Frame, Robot
+
+_KINDS = ("radial", "axial", "tilt")
+
+
+def moving_joints(robot: Robot) -> tuple[str, ...]:
+    """Joints that move and are declared tight."""
+    return tuple(
+        f.name for f in robot.frames if f.joint != "fixed" and _tight(f.clearance)
+    )
+
+
+def _tight(play: Clearance | None) -> bool:
+    return play is None or not any(getattr(play, kind) for kind in _KINDS)
+
+
+def _with_play(frame: Frame, bound: dict[str, float]) -> Frame:
+    play = frame.clearance or Clearance()
+    more = {kind: (getattr(play, kind) or 0.0) + size for kind, size in bound.items()}
+    return replace(frame, clearance=replace(play, **more))
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    for key, size in values.items():
+        name, _, kind = key.rpartition(".")
+        if size > 0:
+            here = with_frame(
+                here, name, lambda f, k=kind, s=size: _with_play(f, {k: s})
+            )
+    return here
+
+
+def _unit(robot: Robot, name: str) -> str:
+    return "rad" if name.endswith(".tilt") else "m"
+
+
+JOINT_CLEARANCE = Effect(
+    name="joint_clearance",
+    summary="joints declared tight have play",
+    apply=_apply,
+    unit=_unit,
+    frames=moving_joints,
+    unknowns=lambda robot: (
+        Unknown("radial", 2e-5, 0.0, 1e-2, 2e-5),
+        Unknown("axial", 2e-5, 0.0, 1e-2, 2e-5),
+        Unknown("tilt", 2e-4, 0.0, 0.2, 2e-4),
+    ),
+    linear=False,
+)  # fmt: skip

@@ -1,0 +1,35 @@
+"""The load applied is a multiple of the one recorded, plus a constant."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.robot import Robot
+from stiffness.screws import WRENCH
+
+_OFFSET = tuple(f"offset.{axis.lower()}" for axis in WRENCH)
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    offset = np.array([values.get(name, 0.0) for name in _OFFSET])
+    return replace(here, load=values.get("factor", 1.0) * here.load + offset)
+
+
+def _unit(robot: Robot, name: str) -> str:
+    if name == "factor":
+        return "1"
+    return "N m" if name.startswith("offset.m") else "N"
+
+
+LOAD_GAIN = Effect(
+    name="load_gain",
+    summary="the load applied is not the load recorded",
+    apply=_apply,
+    unit=_unit,
+    frames=None,
+    unknowns=lambda robot: (
+        Unknown("factor", 0.1, 0.0, 10.0, 1.0), *(Unknown(n, 1.0) for n in _OFFSET),
+    ),
+)  # fmt: skip

@@ -1,0 +1,46 @@
+"""Young's modulus of a link is a multiple of the one declared."""
+
+from dataclasses import replace
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.places import with_frame
+from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+
+
+def links(robot: Robot) -> tuple[str, ...]:
+    """Frames whose body is elastic and carries its own numbers."""
+    own = BeamLink | MeshLink | MatrixLink
+    return tuple(f.name for f in robot.frames if isinstance(f.link, own))
+
+
+def _scaled(frame: Frame, factor: float) -> Frame:
+    link = frame.link
+    if isinstance(link, BeamLink | MeshLink):
+        return replace(frame, link=replace(link, young=link.young * factor))
+    assert isinstance(link, MatrixLink)
+    return replace(frame, link=MatrixLink(link.stiffness * factor))
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    for name, factor in values.items():
+        here = with_frame(here, name, lambda f, s=factor: _scaled(f, s))
+    return here
+
+
+def _public(robot: Robot, values: Values) -> dict[str, float]:
+    """Factors on the modulus from relative softness, 1 / factor - 1."""
+    ends = len(".softer")
+    return {name[:-ends]: 1 / (1 + s) for name, s in values.items()}
+
+
+MODULUS_SCALE = Effect(
+    name="modulus_scale",
+    summary="links are softer or stiffer than declared",
+    apply=_apply,
+    unit=lambda robot, name: "1",
+    frames=links,
+    unknowns=lambda robot: (Unknown("softer", 0.1, -0.9, 20.0),),
+    public=_public,
+    linear=False,
+)

@@ -1,0 +1,91 @@
+"""Where effects act: drives, springs and beams of a robot, and changes made there."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.conditions import Conditions
+from assembly.robot import BeamLink, Frame, Robot, beam_axis
+
+
+def drives(robot: Robot) -> tuple[str, ...]:
+    """Actuated joints."""
+    return tuple(f.name for f in robot.frames if f.actuated)
+
+
+def turning_drives(robot: Robot) -> tuple[str, ...]:
+    """Actuated joints that turn."""
+    return tuple(f.name for f in robot.frames if f.actuated and f.joint == "revolute")
+
+
+def beams(robot: Robot) -> tuple[str, ...]:
+    """Frames whose body is a beam, which has an axis along which it lengthens."""
+    return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
+
+
+def with_screws(here: Conditions, frame: str, screws: NDArray) -> Conditions:
+    """Conditions with more stress-free screws at a frame.
+
+    Args:
+        here: conditions of R rows.
+        frame: where.
+        screws: (R, 6) or (6,) [rad, m] in the frame's axes.
+
+    Returns:
+        The conditions changed.
+    """
+    errors = here.errors.copy()
+    errors[:, here.robot.index(frame)] += screws
+    return replace(here, errors=errors)
+
+
+def with_frame(
+    here: Conditions, frame: str, change: Callable[[Frame], Frame]
+) -> Conditions:
+    """Conditions of a robot with one frame changed."""
+    row = here.robot.index(frame)
+    frames = list(here.robot.frames)
+    frames[row] = change(frames[row])
+    return replace(here, robot=replace(here.robot, frames=tuple(frames)))
+
+
+def own_screw(frame: Frame) -> NDArray:
+    """(6,) unit screw of a joint's own motion."""
+    return np.eye(6)[frame.own_axis]
+
+
+def lengthening(frame: Frame) -> NDArray:
+    """(6,) screw of a beam that is longer by 1 m, in the frame's axes."""
+    return np.concatenate([np.zeros(3), beam_axis(frame)[1]])
+
+
+def own_unit(robot: Robot, parameter: str) -> str:
+    """``rad`` or ``m``, as the joint moves whose name begins a parameter's."""
+    frame = next(f for f in robot.frames if f.name == parameter)
+    return "m" if frame.joint == "prismatic" else "rad"
+
+
+def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
+    """K_B with a spring put in series in one direction of its own axes.
+
+    Args:
+        stiffness: (6, 6) declared, None if rigid.
+        row: which direction.
+        compliance: [rad/(N m) or m/N] of the spring added.
+
+    Returns:
+        (6, 6) with ``inf`` on the diagonal where rigid.
+    """
+    K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
+    soft = np.isfinite(np.diag(K))
+    C = np.zeros((6, 6))
+    if soft.any():
+        C[np.ix_(soft, soft)] = np.linalg.inv(K[np.ix_(soft, soft)])
+    C[row, row] += compliance
+    soft = np.diag(C) > 0
+    K = np.diag(np.full(6, np.inf))
+    if soft.any():
+        K[np.ix_(soft, soft)] = np.linalg.inv(C[np.ix_(soft, soft)])
+    return K

@@ -1,0 +1,25 @@
+"""Links and bodies have weight: gravity acts, which the model does not declare."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.conditions import Conditions
+from assembly.effects.effect import Effect, Unknown, Values
+
+_AXES = ("g.x", "g.y", "g.z")
+
+
+def _apply(here: Conditions, values: Values) -> Conditions:
+    g = np.array([values.get(axis, 0.0) for axis in _AXES])
+    return replace(here, gravity=here.gravity + g)
+
+
+SELF_WEIGHT = Effect(
+    name="self_weight",
+    summary="links (density) and bodies (mass) sag under their weight",
+    apply=_apply,
+    unit=lambda robot, name: "m/s^2",
+    frames=None,
+    unknowns=lambda robot: tuple(Unknown(a, 9.81, -20.0, 20.0) for a in _AXES),
+)

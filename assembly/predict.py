@@ -1,0 +1,234 @@
+"""What a measuring device reads: the platform's deviation, row by row of conditions.
+
+Robots without play are solved together (:mod:`assembly.flexibility`); rows with play,
+finite motions, or closures whose rank is in doubt go through :mod:`assembly.energy` and
+:mod:`assembly.exact` one by one.
+
+Sources:
+    Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
+    the reference point's position, base axes.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.closure import virtual_joints
+from assembly.conditions import Conditions, ContactLaw
+from assembly.conic import SolverFailed
+from assembly.effects.places import in_series, own_screw
+from assembly.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.exact import ExactAssembly, solve_exact
+from assembly.flexibility import flexibility
+from assembly.load import Forces, forces_on, weights
+from assembly.posture import Posture
+from assembly.reduction import FreeMotion
+from stiffness.screws import rotation_matrix, rotation_vector
+
+_STEPS = 100
+_SETTLED = 1e-11  # relative change of a contact's deflection
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What R measurements should read.
+
+    Attributes:
+        deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without an answer.
+        reason: (R,) why there is none, else empty.
+    """
+
+    deviation: NDArray
+    reason: NDArray
+
+
+def predict(here: Conditions) -> Prediction:
+    """The platform's deviation from its nominal pose at the reference point.
+
+    Args:
+        here: R situations of a robot.
+
+    Returns:
+        What is read in each.
+    """
+    screws = np.full((len(here), 6), np.nan)
+    reason = np.full(len(here), "", dtype=object)
+    left = np.ones(len(here), dtype=bool)
+    if not here.exact and not virtual_joints(here.robot).cones.shape[1]:
+        screws, solved = _without_play(here)
+        left = ~solved
+    for row in np.flatnonzero(left).tolist():
+        try:
+            screws[row] = assemble_row(here, row).platform_screw
+        except (CannotAssemble, FreeMotion, SolverFailed) as error:
+            screws[row], reason[row] = np.nan, str(error)
+    return Prediction(read(here, screws), reason)
+
+
+def read(here: Conditions, screws: NDArray) -> NDArray:
+    """What the device makes of platform screws.
+
+    Args:
+        here: R situations.
+        screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the
+            platform's origin, base axes.
+
+    Returns:
+        (R, 6) [rad, m] the deviation read at the reference point.
+    """
+    platform = here.postures.platform
+    R, p = platform[:, :3, :3], platform[:, :3, 3]
+    turn = rotation_matrix(screws[:, :3])
+    arm = R @ here.point
+    seen = np.einsum("rij,rj->ri", turn, R @ (here.point + here.tool))
+    shift = screws[:, 3:] + seen - arm
+    base = rotation_matrix(here.base[:3])
+    where = (p + arm + shift) @ base.T + here.base[3:] - (p + arm)
+    turned = rotation_vector(base @ turn) if here.base[:3].any() else screws[:, :3]
+    return np.concatenate([turned, where], axis=1) + here.reading
+
+
+def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
+    """One situation in full: every screw and wrench of the robot.
+
+    Args:
+        here: situations.
+        row: which.
+
+    Returns:
+        The linear or the exact assembly, as the conditions ask.
+
+    Raises:
+        CannotAssemble, FreeMotion, SolverFailed: there is none.
+    """
+    posture = here.posture(row)
+    load = here.load_at_origin()[row]
+    gravity = here.gravity[row] if here.gravity[row].any() else None
+    give = np.zeros(len(here.laws))
+    for _ in range(_STEPS):
+        answer = _solve(_softened(posture, here.laws, give), load, gravity, here.exact)
+        before, give = give, _secants(answer, here.laws)
+        if np.all(np.abs(give - before) <= _SETTLED * give):
+            return answer
+    raise SolverFailed("contact", f"deflections that do not settle in {_STEPS} steps")
+
+
+def _solve(
+    posture: Posture, load: NDArray, gravity: NDArray | None, exact: bool
+) -> Assembly | ExactAssembly:
+    """The linear or the exact answer."""
+    if not exact:
+        return solve_assembly(posture, load, gravity=gravity)
+    if gravity is not None:
+        raise SolverFailed("exact equilibrium", "weight, which it does not know")
+    return solve_exact(posture, load)
+
+
+def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> Posture:
+    """The posture with linear springs of the laws' secant compliance in series."""
+    if not give.any():
+        return posture
+    frames = list(posture.robot.frames)
+    for law, compliance in zip(laws, give, strict=True):
+        i = posture.robot.index(law.frame)
+        f = frames[i]
+        K = in_series(f.joint_stiffness, f.own_axis, float(compliance))
+        frames[i] = replace(f, joint_stiffness=K)
+    return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+
+
+def _secants(answer: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]) -> NDArray:
+    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
+    robot = answer.posture.robot
+    through = answer.joint_wrenches if isinstance(answer, Assembly) else answer.wrenches
+    give = []
+    for law in laws:
+        i = robot.index(law.frame)
+        load = abs(through[i] @ own_screw(robot.frames[i]))
+        give.append(load ** (1 / law.exponent - 1) * law.coefficient ** (-1 / law.exponent)
+                    if load > 1e-300 else 0.0)  # fmt: skip
+    return np.array(give)
+
+
+def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
+    """(R, 6) platform screws of a robot without play, and (R,) where they are solved."""
+    _, first, which = np.unique(
+        here.transforms.reshape(len(here), -1), axis=0,
+        return_index=True, return_inverse=True,
+    )  # fmt: skip
+    postures = here.postures
+    distinct = replace(
+        postures,
+        coordinates=postures.coordinates[first],
+        transforms=postures.transforms[first],
+    )
+    flexible = flexibility(distinct)
+    forces = row_forces(here)
+    errors = here.errors.reshape(len(here), -1)
+    answer = flexible.solve(which, errors, forces)
+    screws = answer.platform_screw
+    if here.laws:
+        columns = _law_columns(here)
+        w = answer.joint_wrenches @ columns
+        A = flexible.self_stress(columns)[which]
+        give, settled = _deflections(here.laws, w, A)
+        reach = flexible.platform_of(columns)[which]
+        screws = screws + np.einsum("rij,rj->ri", reach, give)
+        return screws, answer.solved & settled
+    return screws, answer.solved
+
+
+def row_forces(here: Conditions) -> Forces:
+    """Forces of load and weight on every small screw, (R, 6n)."""
+    postures = here.postures
+    bodies = carried = None
+    if here.gravity.any():
+        bodies, carried = weights(postures, here.gravity)
+    return forces_on(postures, here.load_at_origin(), bodies, carried)
+
+
+def _law_columns(here: Conditions) -> NDArray:
+    """(6n, s) unit screws of the joints with a contact law."""
+    columns = np.zeros((6 * len(here.robot.frames), len(here.laws)))
+    for k, law in enumerate(here.laws):
+        i = here.robot.index(law.frame)
+        columns[6 * i : 6 * i + 6, k] = own_screw(here.robot.frames[i])
+    return columns
+
+
+def _deflections(
+    laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
+) -> tuple[NDArray, NDArray]:
+    """(R, s) deflections d with c |d|^n sign(d) = w + A d, and (R,) whether settled.
+
+    Least of a strictly convex function (A is negative semidefinite): Newton's method,
+    each step halved until the gradient shrinks.
+    """
+    c = np.array([law.coefficient for law in laws])
+    n = np.array([law.exponent for law in laws])
+    scale = np.abs(w).max(axis=1, keepdims=True) + 1e-300
+
+    def gradient(d: NDArray) -> NDArray:
+        own = c * np.abs(d) ** n * np.sign(d)
+        return (own - w - np.einsum("rij,rj->ri", A, d)) / scale
+
+    d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
+    left = gradient(d)
+    tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
+    for _ in range(_STEPS):
+        norm = np.linalg.norm(left, axis=1)
+        if np.all(norm <= _SETTLED):
+            break
+        slope = c * n * np.abs(d) ** (n - 1) + tiny
+        H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
+        step = -np.linalg.solve(H, (left * scale)[..., None])[..., 0]
+        length = np.where(norm <= _SETTLED, 0.0, 1.0)
+        for _ in range(30):
+            there = gradient(d + length[:, None] * step)
+            worse = (np.linalg.norm(there, axis=1) > norm) & (length > 0)
+            if not worse.any():
+                break
+            length = np.where(worse, length / 2, length)
+        d, left = d + length[:, None] * step, there
+    return d, np.linalg.norm(left, axis=1) <= 1e-8
