@@ -110,10 +110,13 @@ class Flexibility:
         )
 
     def self_stress(self, columns: NDArray) -> NDArray:
-        """(c, s, s) generalised forces, per unit of stress-free screws, on themselves.
+        """Forces that stress-free screws meet from the structure they are built into.
 
         Args:
             columns: (6n, s) screws at the frames.
+
+        Returns:
+            (c, s, s) generalised force on each per unit of each; negative semidefinite.
         """
         through = np.einsum("cki,is->cks", self.rows, columns)
         count = self.rows.shape[1]
@@ -121,7 +124,14 @@ class Flexibility:
         return -np.einsum("cks,ckl,clt->cst", through, inner, through)
 
     def platform_of(self, columns: NDArray) -> NDArray:
-        """(c, 6, s) platform screws per unit of stress-free screws at the frames."""
+        """Where stress-free screws at the frames take the platform.
+
+        Args:
+            columns: (6n, s) screws at the frames.
+
+        Returns:
+            (c, 6, s) [rad, m] platform screw per unit of each.
+        """
         through = np.einsum("cki,is->cks", self.rows, columns)
         count = self.rows.shape[1]
         x = -np.einsum("ckl,cls->cks", self.inverse[:, :, :count], through)

@@ -100,7 +100,9 @@ def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
         The linear or the exact assembly, as the conditions ask.
 
     Raises:
-        CannotAssemble, FreeMotion, SolverFailed: there is none.
+        CannotAssemble: a closure is open that nothing can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the solver gave up.
     """
     posture = here.posture(row)
     load = here.load_at_origin()[row]
@@ -146,13 +148,17 @@ def _secants(answer: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]) -> 
     for law in laws:
         i = robot.index(law.frame)
         load = abs(through[i] @ own_screw(robot.frames[i]))
-        give.append(load ** (1 / law.exponent - 1) * law.coefficient ** (-1 / law.exponent)
-                    if load > 1e-300 else 0.0)  # fmt: skip
+        give.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
     return np.array(give)
 
 
+def _deflection(law: ContactLaw, load: float) -> float:
+    """[rad or m] under a load >= 0."""
+    return float((load / law.coefficient) ** (1 / law.exponent))
+
+
 def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws of a robot without play, and (R,) where they are solved."""
+    """(R, 6) platform screws of a robot without play, (R,) where they are solved."""
     _, first, which = np.unique(
         here.transforms.reshape(len(here), -1), axis=0,
         return_index=True, return_inverse=True,
@@ -200,10 +206,13 @@ def _law_columns(here: Conditions) -> NDArray:
 def _deflections(
     laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """(R, s) deflections d with c |d|^n sign(d) = w + A d, and (R,) whether settled.
+    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
 
     Least of a strictly convex function (A is negative semidefinite): Newton's method,
     each step halved until the gradient shrinks.
+
+    Returns:
+        (R, s) deflections, and (R,) whether they were found.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

@@ -1,21 +1,22 @@
 """Actuated joints are elastic, in series with any stiffness declared."""
 
 from dataclasses import replace
+from functools import partial
 
 from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import drives, in_series, own_unit, with_frame
-from assembly.robot import Robot
+from assembly.robot import Frame, Robot
+
+
+def _softer(frame: Frame, stiffness: float) -> Frame:
+    K = in_series(frame.joint_stiffness, frame.own_axis, 1 / stiffness)
+    return replace(frame, joint_stiffness=K)
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:
     for name, stiffness in values.items():
-        here = with_frame(
-            here, name,
-            lambda f, k=stiffness: replace(
-                f, joint_stiffness=in_series(f.joint_stiffness, f.own_axis, 1 / k)
-            ),
-        )  # fmt: skip
+        here = with_frame(here, name, partial(_softer, stiffness=stiffness))
     return here
 
 

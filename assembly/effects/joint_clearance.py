@@ -1,6 +1,7 @@
 """Play at joints declared tight, taken up by the load."""
 
 from dataclasses import replace
+from functools import partial
 
 from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
@@ -31,9 +32,7 @@ def _apply(here: Conditions, values: Values) -> Conditions:
     for key, size in values.items():
         name, _, kind = key.rpartition(".")
         if size > 0:
-            here = with_frame(
-                here, name, lambda f, k=kind, s=size: _with_play(f, {k: s})
-            )
+            here = with_frame(here, name, partial(_with_play, bound={kind: size}))
     return here
 
 

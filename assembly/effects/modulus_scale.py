@@ -1,6 +1,7 @@
 """Young's modulus of a link is a multiple of the one declared."""
 
 from dataclasses import replace
+from functools import partial
 
 from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
@@ -24,7 +25,7 @@ def _scaled(frame: Frame, factor: float) -> Frame:
 
 def _apply(here: Conditions, values: Values) -> Conditions:
     for name, factor in values.items():
-        here = with_frame(here, name, lambda f, s=factor: _scaled(f, s))
+        here = with_frame(here, name, partial(_scaled, factor=factor))
     return here
 
 

@@ -9,10 +9,8 @@ from assembly.robot import beam_axis
 def _apply(here: Conditions, values: Values) -> Conditions:
     for name, coefficient in values.items():
         frame = here.robot.frame(name)
-        strain = coefficient * here.temperature[:, None]
-        here = with_screws(
-            here, name, strain * beam_axis(frame)[0] * lengthening(frame)
-        )
+        longer = coefficient * beam_axis(frame)[0] * here.temperature
+        here = with_screws(here, name, longer[:, None] * lengthening(frame))
     return here
 
 
