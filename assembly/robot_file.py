@@ -45,8 +45,43 @@ def read_robot(path: Path | str) -> Robot:
     Raises:
         BadInput: the file breaks a rule of the format, or a closure does not hold.
     """
-    root = read_toml(Path(path))
-    name = root.text("name", Path(path).stem, longest=_LONGEST_NAME)
+    return robot_of(read_toml(Path(path)), Path(path).stem)
+
+
+def robot_of(root: Table, name: str) -> Robot:
+    """Robot of a robot file's root table.
+
+    Args:
+        root: the table; paths in it lead from the folder of ``root.file``.
+        name: of the robot if the table has none.
+
+    Returns:
+        The robot; its nominal closures hold in its home pose.
+
+    Raises:
+        BadInput: the table breaks a rule of the format, or a closure does not hold.
+    """
+    robot = declared_robot(root, name)
+    try:
+        return with_spans(robot, home_posture(robot).coordinates)
+    except BadInput as error:
+        raise BadInput(f"{root.file}: {error}") from None
+
+
+def declared_robot(root: Table, name: str) -> Robot:
+    """Robot of a root table as it is written: whether it closes is not looked at.
+
+    Args:
+        root: of a robot file.
+        name: of the robot if the table has none.
+
+    Returns:
+        The robot; lengths of its beams may still be unknown.
+
+    Raises:
+        BadInput: the table breaks a rule of the format.
+    """
+    name = root.text("name", name, longest=_LONGEST_NAME)
     description = root.get("description", "")
     if not isinstance(description, str):
         found = describe(description)
@@ -64,9 +99,9 @@ def read_robot(path: Path | str) -> Robot:
     try:
         robot = Robot(name, platform, frames, closures, description)
         _check_meeting_frames(robot)
-        return with_spans(robot, home_posture(robot).coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
+    return robot
 
 
 def _frame(table: Table) -> Frame:
@@ -183,16 +218,34 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    lines = [f"name = {_toml(robot.name)}"]
-    if robot.description:
-        lines.append(f"description = {_toml(robot.description)}")
-    lines.append(f"platform = {_toml(robot.platform)}")
-    for frame in robot.frames:
-        table = frame_table(frame, Path(path).parent)
-        lines += ["", "[[frame]]", *(f"{k} = {_toml(v)}" for k, v in table.items())]
-    for pair in robot.closures:
-        lines += ["", "[[closure]]", f"frames = {_toml(list(pair))}"]
+    table = robot_table(robot, Path(path).parent)
+    frames, closures = table.pop("frame"), table.pop("closure", [])
+    lines = [f"{k} = {_toml(v)}" for k, v in table.items()]
+    for kind, tables in (("frame", frames), ("closure", closures)):
+        for inner in tables:
+            said = (f"{k} = {_toml(v)}" for k, v in inner.items())
+            lines += ["", f"[[{kind}]]", *said]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
+    """What a robot file says of a robot.
+
+    Args:
+        robot: any.
+        folder: of the file to be written, from which paths then lead.
+
+    Returns:
+        Plain values; :func:`robot_of` reads them back to the same robot.
+    """
+    table: dict[str, Any] = {"name": robot.name}
+    if robot.description:
+        table["description"] = robot.description
+    table["platform"] = robot.platform
+    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    if robot.closures:
+        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    return table
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
