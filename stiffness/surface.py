@@ -91,8 +91,9 @@ def read_surface(path: Path, unit: str = "m") -> Surface:
     """Read a surface and refuse what bounds no solid.
 
     Args:
-        path: STL, OBJ, PLY, VTK, VTP, MSH (or STEP, where gmsh is installed).
-        unit: of the file's coordinates: m, cm, mm, um or inch.
+        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed.
+        unit: of the file's coordinates: m, cm, mm, um or inch; a STEP file states its
+            own, which counts.
 
     Returns:
         The surface in metres, closed and outward.
@@ -103,7 +104,10 @@ def read_surface(path: Path, unit: str = "m") -> Surface:
     """
     if unit not in UNITS:
         raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
-    points, triangles = _read_triangles(Path(path))
+    path = Path(path)
+    points, triangles = _read_triangles(path)
+    if path.suffix.lower() in {".step", ".stp"}:
+        unit = "m"
     return check_surface(points * UNITS[unit], triangles, str(path), unit)
 
 

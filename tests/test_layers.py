@@ -13,6 +13,8 @@ BELOW["validation"] = ("stiffness", "assembly")
 OWNERS = {
     "pytetwild": ("stiffness/mesh.py", "stiffness/mesh_worker.py"),
     "skfem": ("stiffness/elements.py",),
+    "meshio": ("stiffness/surface_files.py",),
+    "gmsh": ("stiffness/surface_files.py",),
     "clarabel": ("assembly/conic.py",),
     "cvxpy": ("assembly/reference.py",),
     "exudyn": ("validation/multibody.py",),
