@@ -212,15 +212,16 @@ class Margins:
 
 def zone_margins(
     robot: Robot, transforms: ArrayLike, compliant: str = "rigid",
-    mismatch: ArrayLike = 0.0,
+    mismatch: ArrayLike = 0.0, errors: ArrayLike | None = None,
 ) -> Margins:  # fmt: skip
-    """Margins of problem (21) at many postures.
+    """Margins of problem (21) at many postures, or for many errors.
 
     Args:
         robot: of n frames.
         transforms: (k, n, 4, 4) frames seen from the base.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.zone`.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        errors: (k, n, 6) [rad, m] geometric errors; the robot's if absent.
 
     Returns:
         The margins, in the order given.
@@ -238,10 +239,18 @@ def zone_margins(
     joints, structure = _structure(robot, compliant)
     margin, bound = np.full(count, np.nan), np.full(count, np.nan)
     road, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
+    own = None if errors is None else np.array(errors, dtype=float)
     if joints.scaled.all() and len(joints.scaled):
-        all_margins(structure, T, robot.errors.copy(), off, margin, bound, road)
+        if own is None:
+            all_margins(structure, T, robot.errors.copy(), off, margin, bound, road)
+        else:
+            for i in range(count):
+                one = slice(i, i + 1)
+                all_margins(structure, T[one], own[i], off[one], margin[one],
+                            bound[one], road[one])  # fmt: skip
     for i in np.flatnonzero(road).tolist():
-        posture = Posture(robot, np.full(n, np.nan), T[i], float(off[i]))
+        here = robot if own is None else robot.with_errors(own[i])
+        posture = Posture(here, np.full(n, np.nan), T[i], float(off[i]))
         margin[i] = bound[i] = np.nan
         try:
             zone = zone_margin(posture, compliant)
