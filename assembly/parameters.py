@@ -1,0 +1,204 @@
+"""Design parameters: any number of a robot file, addressed by its path.
+
+A path is the frame's name and the keys that lead to the number, such as
+``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
+without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
+six are rx .. tz, and so are the rows of six by six (``stiffness.rx.ty`` sets both
+places of a symmetric matrix).
+"""
+
+import copy
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from assembly.robot import Robot
+from assembly.robot_file import declared_robot, robot_of, robot_table
+from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
+
+_AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
+_ABSENT: dict[str, Any] = {  # what a frame says that does not mention it
+    "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
+}  # fmt: skip
+_PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
+_UNITS = {
+    "translation": "m", "rotation": "rad", "theta": "rad", "d": "m", "a": "m",
+    "alpha": "rad", "radial": "m", "axial": "m", "tilt": "rad", "spin": "rad",
+    "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
+    "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
+    "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
+    "centre_of_mass": "m", "position": "rad or m",
+}  # fmt: skip
+
+Setter = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A robot as its file says it, ready to have numbers changed.
+
+    Attributes:
+        content: the root table, plain values.
+        file: name of the file, for messages; paths in the table lead from its folder.
+        name: of the robot if the table has none.
+    """
+
+    content: dict[str, Any]
+    file: str
+    name: str
+
+    @cached_property
+    def paths(self) -> list[str]:
+        """Full paths of all numbers."""
+        return [path for path, _ in _numbers(copy.deepcopy(self.content))]
+
+    def find(self, path: str) -> list[str]:
+        """Full paths that a path stands for.
+
+        Args:
+            path: full, or with the frame's name without its leg.
+
+        Returns:
+            One path, or one for each leg.
+
+        Raises:
+            BadInput: the robot has no such number; the nearest is named.
+        """
+        known = self.paths
+        found = [p for p in known if p == path] or [
+            p for p in known if p.partition(".")[2] == path
+        ]
+        if not found:
+            hint = nearest(path, known) if known else ""
+            raise BadInput(f"{self.file}: no number {quoted(path)}{hint}")
+        return found
+
+    def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """The root table with other numbers.
+
+        Args:
+            values: by path.
+
+        Returns:
+            A new table.
+
+        Raises:
+            BadInput: a path leads to no number.
+        """
+        content = copy.deepcopy(self.content)
+        setters = dict(_numbers(content))
+        for path, value in values.items():
+            for full in self.find(path):
+                setters[full](float(value))
+        return content
+
+    def robot(self, values: Mapping[str, float]) -> Robot:
+        """The robot with other numbers.
+
+        Args:
+            values: by path.
+
+        Returns:
+            The robot, checked as if its file had been written so.
+
+        Raises:
+            BadInput: a path leads to no number, a value breaks a rule of the format,
+                or the closures no longer hold.
+        """
+        return robot_of(Table(self.changed(values), self.file, ""), self.name)
+
+    def check(self, values: Mapping[str, float]) -> None:
+        """Refuse numbers that break a rule of the format.
+
+        Args:
+            values: by path.
+
+        Raises:
+            BadInput: they do; whether the closures still hold is not looked at.
+        """
+        declared_robot(Table(self.changed(values), self.file, ""), self.name)
+
+
+def design_of(robot: Robot) -> Design:
+    """A robot in memory as the file it could be written to."""
+    return Design(robot_table(robot), robot.name, robot.name)
+
+
+def load_design(name: str | Path) -> Design:
+    """A built-in robot, or a robot file, with the numbers it is written in.
+
+    Args:
+        name: such as ``"irsbot2"``, or the path of a robot file.
+
+    Returns:
+        The design.
+
+    Raises:
+        BadInput: neither a built-in name nor a file.
+    """
+    from assembly.robots import BUILT_IN, load_robot
+
+    if str(name) in BUILT_IN:
+        return design_of(load_robot(name))
+    robot = load_robot(name)  # a file with mistakes is refused before numbers change
+    return Design(read_toml(Path(name)).content, str(name), robot.name)
+
+
+def unit_of(path: str) -> str:
+    """Unit of the number a path leads to; ``"SI"`` where it depends on more."""
+    for key in reversed(path.split(".")):
+        if key in _UNITS:
+            return _UNITS[key]
+        if key == "geometric_error":
+            return "rad" if path[-2] == "r" else "m"
+    return "SI"
+
+
+def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
+    """Path and setter of every number; absent ones that mean zero are put there."""
+    for frame in content.get("frame", ()):
+        given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
+        if frame.get("joint", "fixed") != "fixed":
+            given["position"] = 0.0
+        for key, value in given.items():
+            frame.setdefault(key, copy.copy(value))
+        yield from _inside(frame["name"], frame)
+
+
+def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
+    """Numbers of a table."""
+    for key, value in table.items():
+        here = f"{path}.{key}"
+        if _is_number(value):
+            yield here, _setter(table, key)
+        elif isinstance(value, dict):
+            yield from _inside(here, value)
+        elif isinstance(value, list) and len(value) in _AXES:
+            axes = _AXES[len(value)]
+            for i, name in enumerate(axes):
+                if _is_number(value[i]):
+                    yield f"{here}.{name}", _setter(value, i)
+                elif isinstance(value[i], list) and len(value[i]) == len(axes):
+                    for j, other in enumerate(axes):
+                        yield f"{here}.{name}.{other}", _setter_of_two(value, i, j)
+
+
+def _is_number(value: object) -> bool:
+    """Whether a plain value is a number; true and false are not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _setter(place: Any, key: Any) -> Setter:
+    """What writes a number to its place."""
+    return lambda number: place.__setitem__(key, number)
+
+
+def _setter_of_two(rows: list[list[float]], i: int, j: int) -> Setter:
+    """The same for both places of a symmetric matrix."""
+
+    def write(number: float) -> None:
+        rows[i][j] = rows[j][i] = number
+
+    return write

@@ -1,0 +1,233 @@
+"""Where a sweep goes: a grid of poses or joint coordinates, or a list of them.
+
+A grid has an axis for each component named; a list has one axis, ``posture``.  Names
+are ``tx ty tz rx ry rz`` for the platform's pose, ``q.<frame>`` for the coordinate of
+an actuated joint, never both; a list may also write ``pose.tx``, as campaigns do.
+"""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.posture import POSE
+from assembly.robot import Robot
+from stiffness.reading import BadInput, nearest, quoted, read_text
+
+LARGEST_GRID = 10_000_000  # points; more is a slip of the step
+_JOINT = "q."
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Poses or joint coordinates, on the axes of a grid or one after the other.
+
+    Attributes:
+        names: of the components, ``tx`` .. or ``q.<frame>``.
+        values: for a grid the values on each component's axis, for a list those of
+            each posture [m or rad].
+        labels: of the postures of a list; None for a grid.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[NDArray, ...]
+    labels: tuple[str, ...] | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of postures along each axis."""
+        if self.labels is not None:
+            return (len(self.labels),)
+        return tuple(len(v) for v in self.values)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the axes."""
+        return self.names if self.labels is None else ("posture",)
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether joint coordinates are meant, not poses."""
+        return any(name.startswith(_JOINT) for name in self.names)
+
+    def at(self, numbers: NDArray) -> NDArray:
+        """(k, components) values of some postures, counted along the axes in order."""
+        if self.labels is not None:
+            return np.stack([v[numbers] for v in self.values], axis=1)
+        places = np.unravel_index(numbers, self.shape)
+        pairs = zip(self.values, places, strict=True)
+        return np.stack([v[i] for v, i in pairs], axis=1)
+
+    def goals(self, robot: Robot, rows: NDArray) -> NDArray:
+        """What :mod:`assembly.posture` is asked for.
+
+        Args:
+            robot: of n frames.
+            rows: (k, components) of :meth:`at`.
+
+        Returns:
+            (k, 6) poses, NaN where free; or (k, n) coordinates, NaN where passive.
+        """
+        if not self.of_joints:
+            goals = np.full((len(rows), len(POSE)), np.nan)
+            goals[:, [POSE.index(name) for name in self.names]] = rows
+            return goals
+        driven = [f.actuated for f in robot.frames]
+        goals = np.tile(np.where(driven, robot.positions, np.nan), (len(rows), 1))
+        named = [robot.index(name.removeprefix(_JOINT)) for name in self.names]
+        goals[:, named] = rows
+        return goals
+
+
+def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
+    """All combinations of the values on each axis."""
+    return Targets(tuple(axes), tuple(np.asarray(v, float) for v in axes.values()))
+
+
+def unit_of_target(name: str, robot: Robot) -> str:
+    """``"m"`` or ``"rad"``."""
+    if name.startswith(_JOINT):
+        frame = robot.frame(name.removeprefix(_JOINT))
+        return "m" if frame.joint == "prismatic" else "rad"
+    return "m" if name.startswith("t") else "rad"
+
+
+def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
+    """Axes of a grid from text such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+
+    Args:
+        text: for each component ``start:stop:step`` [m or rad], or one number.
+            Both ends count when (stop - start)/step is whole within 1e-9.
+        robot: whose actuated joints may be named, as ``q.<frame>``; none without one.
+
+    Returns:
+        Values by component, in the order given.
+
+    Raises:
+        BadInput: not of that form, or far too many points.
+    """
+    axes: dict[str, NDArray] = {}
+    for part in text.split(","):
+        name, _, spec = (piece.strip() for piece in part.partition("="))
+        _check_name("grid", "pose component", name, robot)
+        if name in axes:
+            raise BadInput(f'grid: "{name}" is given twice')
+        axes[name] = parse_values(f"grid {name}", spec)
+    _check_kind("grid", axes)
+    if np.prod([float(len(v)) for v in axes.values()]) > LARGEST_GRID:
+        raise BadInput(f"grid: more than {LARGEST_GRID} points; is a step too small?")
+    return axes
+
+
+def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
+    """Refuse a component that no posture has."""
+    frames = robot.frames if robot is not None else ()
+    valid = [*POSE, *(_JOINT + f.name for f in frames if f.actuated)]
+    if name not in valid:
+        hint = nearest(name, valid)
+        raise BadInput(f'{whose}: unknown {what} "{name[:60]}"{hint}')
+
+
+def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
+    """Refuse poses beside joints."""
+    joints = [name for name in names if name.startswith(_JOINT)]
+    if joints and len(joints) < len(names):
+        other = next(name for name in names if not name.startswith(_JOINT))
+        raise BadInput(
+            f'{whose}: found "{other}" and "{joints[0]}"; expected a pose or joints'
+        )
+
+
+def parse_values(whose: str, spec: str) -> NDArray:
+    """Values written ``start:stop:step``, or as one number.
+
+    Args:
+        whose: they are, for messages.
+        spec: the text.
+
+    Returns:
+        The values; both ends where the step fits within 1e-9.
+
+    Raises:
+        BadInput: not of that form, or far too many.
+    """
+    expected = "expected START:STOP:STEP or one number"
+    try:
+        numbers = [float(piece) for piece in spec.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in {1, 3} or not np.isfinite(numbers).all():
+        raise BadInput(f'{whose}: found "{spec[:60]}", {expected}')
+    if len(numbers) == 1:
+        return np.array(numbers)
+    start, stop, step = numbers
+    if step == 0 or (stop - start) / step < 0:
+        raise BadInput(f"{whose}: step {step:g} never leads from {start:g} to {stop:g}")
+    count = (stop - start) / step
+    if count > LARGEST_GRID:
+        raise BadInput(f"{whose}: {count:.3g} points; is the step too small?")
+    return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
+
+
+def read_targets(path: Path, robot: Robot) -> Targets:
+    """Postures of a table: columns ``pose.tx`` .. or ``q.<frame>``, perhaps ``id``.
+
+    Args:
+        path: CSV file with a header, one row a posture.
+        robot: whose actuated joints may be columns; those without one keep their
+            ``position``.
+
+    Returns:
+        The postures in the order of the file.
+
+    Raises:
+        BadInput: not such a table; the line and the column are named.
+    """
+    lines = read_text(path).splitlines()
+    rows = [row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))]
+    if len(rows) < 2:
+        found = "only a header" if rows else "nothing"
+        raise BadInput(f"{path}: found {found}; expected one and a row for each posture")
+    header = [cell.strip() for cell in rows[0][1]]
+    names = [cell.removeprefix("pose.") for cell in header if cell != "id"]
+    for name in names:
+        _check_name(f"{path}: line 1", "column", name, robot)
+        if names.count(name) > 1 or header.count("id") > 1:
+            raise BadInput(f"{path}: line 1: a column is given twice: {quoted(name)}")
+    if not names:
+        raise BadInput(f"{path}: line 1: found no posture; expected pose.tx, .. or q.*")
+    _check_kind(f"{path}: line 1", names)
+    values, labels = np.empty((len(rows) - 1, len(names))), []
+    for i, (line, cells) in enumerate(rows[1:]):
+        if len(cells) != len(header):
+            raise BadInput(
+                f"{path}: line {line}: found {len(cells)} cells, expected "
+                f"{len(header)} as in the header"
+            )
+        given = dict(zip(header, cells, strict=True))
+        labels.append(given.pop("id", str(i + 1)).strip())
+        for k, (column, cell) in enumerate(given.items()):
+            values[i, k] = _cell(f"{path}: line {line}, {column}", cell)
+    _check_labels(path, labels)
+    return Targets(tuple(names), tuple(values.T.copy()), tuple(labels))
+
+
+def _cell(whose: str, text: str) -> float:
+    """The number in a cell."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise BadInput(f"{whose}: found {quoted(text)}, expected a finite number")
+    return value
+
+
+def _check_labels(path: Path, labels: Sequence[str]) -> None:
+    """Refuse two rows of one id."""
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")
