@@ -205,9 +205,32 @@ def place_many(
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
     """
-    home = home_posture(robot)
-    target = Target(pose=np.asarray(poses, dtype=float))
-    track = follow(robot, home.coordinates, target)
+    return _follow_many(robot, Target(pose=np.asarray(poses, dtype=float)))
+
+
+def place_many_joints(
+    robot: Robot, coordinates: ArrayLike
+) -> tuple[list[Posture | None], list[str]]:
+    """Postures of many sets of actuated coordinates at once.
+
+    Args:
+        robot: of n frames.
+        coordinates: (k, n) [rad or m] of the joints held, NaN for those left free.
+
+    Returns:
+        As :func:`place_many`.
+
+    Raises:
+        BadInput: the robot's closures do not hold in its home pose.
+    """
+    return _follow_many(robot, Target(coordinates=np.asarray(coordinates, dtype=float)))
+
+
+def _follow_many(
+    robot: Robot, target: Target
+) -> tuple[list[Posture | None], list[str]]:
+    """For each target its posture, or None and why there is none."""
+    track = follow(robot, home_posture(robot).coordinates, target)
     postures = [
         _posture(robot, track, i) if reached else None
         for i, reached in enumerate(track.reached)

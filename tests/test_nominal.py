@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from assembly.posture import home_posture, place_many, place_robot
+from assembly.posture import (
+    home_posture,
+    place_many,
+    place_many_joints,
+    place_robot,
+)
 from assembly.robot import Frame, Robot
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, rotation_vector, transform
@@ -301,6 +306,27 @@ def test_many_poses_are_those_placed_one_by_one():
         np.testing.assert_allclose(
             postures[i].platform[:3, 3], one.platform[:3, 3], rtol=0, atol=EXACT
         )
+
+
+def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
+    """Law of cosines one way, the closure the other; flat outward the elbows are
+    0.9 m apart and two bars of 0.4 m cannot meet."""
+    robot = five_bar()
+    goals = np.full((3, 8), np.nan)
+    tips = np.array([[0.1, 0.45], [-0.05, 0.55]])
+    for side, name in ((1, "right"), (-1, "left")):
+        x, y = (tips - [side * 0.1, 0.0]).T
+        far = np.hypot(x, y)
+        inner = np.arccos((far**2 + 0.35**2 - 0.4**2) / (2 * far * 0.35))
+        drive = robot.index(f"{name}.drive")
+        goals[:2, drive] = np.arctan2(y, x) - side * inner
+        goals[2, drive] = 0.0 if side == 1 else math.pi
+    postures, reasons = place_many_joints(robot, goals)
+    assert reasons[:2] == ["", ""]
+    for posture, tip in zip(postures[:2], tips, strict=True):
+        np.testing.assert_allclose(posture.platform[:2, 3], tip, rtol=0, atol=1e-9)
+    assert postures[2] is None
+    assert "cannot be reached" in reasons[2]
 
 
 def parallelograms(digits, error=0.0):

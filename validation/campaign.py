@@ -1,0 +1,143 @@
+"""Measured deviations of a machine: one row a measurement, checked at the door."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.robot import Robot
+
+READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, as in a screw
+LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Measured deviations of a machine, in the order of the file.
+
+    R rows, one a measurement; n frames.  It exists only if every commanded
+    configuration can be reached by the nominal robot.
+
+    Attributes:
+        name: of the campaign: its folder's.
+        robot: as declared.
+        ids: R labels, unique.
+        coordinates: (R, n) [rad or m] of every joint, nominal closure solved.
+        transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
+        mismatch: (R,) [rad, m] nominal closure error left (rounded files); dropped.
+        commanded: ``"joints"`` or ``"pose"``: what the file gives.
+        loads: (R, 6) [N m, N] on the platform at the reference point, base axes.
+        measured: (R, 6) [rad, m] rx ry rz tx ty tz at the reference point, base axes;
+            NaN is not measured.
+        sigma: (R, 6) [rad, m] one standard deviation of each reading, NaN only where
+            nothing was measured and none is stated.
+        covariates: (R,) each, by name without ``cov.``.
+        reference_point: (3,) [m] the point that was measured, platform axes.
+        registration: ``"known"``, or ``"unknown"`` if the measuring device stands
+            somewhere in the room.
+        configuration: (R,) number of the commanded configuration, from 0 by first use.
+        repeat: (R,) number of the configuration under one load, from 0 by first use:
+            rows that share it were measured twice.
+    """
+
+    name: str
+    robot: Robot
+    ids: tuple[str, ...]
+    coordinates: NDArray
+    transforms: NDArray
+    mismatch: NDArray
+    commanded: str
+    loads: NDArray
+    measured: NDArray
+    sigma: NDArray
+    covariates: dict[str, NDArray]
+    reference_point: NDArray
+    registration: str
+    configuration: NDArray
+    repeat: NDArray
+
+    def __post_init__(self) -> None:
+        R, n = len(self.ids), len(self.robot.frames)
+        shapes = {
+            "coordinates": (R, n), "transforms": (R, n, 4, 4), "mismatch": (R,),
+            "loads": (R, 6), "measured": (R, 6), "sigma": (R, 6),
+            "reference_point": (3,), "configuration": (R,), "repeat": (R,),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, _locked(self, name, shape))
+        covariates = {k: _column(v, R, k) for k, v in self.covariates.items()}
+        object.__setattr__(self, "covariates", covariates)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def cells(self) -> NDArray:
+        """(R, 6) bool: what was measured."""
+        return np.isfinite(self.measured)
+
+    def take(self, rows: ArrayLike | slice) -> "Campaign":
+        """Some of the rows; ``configuration`` and ``repeat`` keep their numbers.
+
+        Args:
+            rows: their numbers, a mask (R,), or a slice.
+
+        Returns:
+            A campaign of those rows, in the order given.
+        """
+        chosen = np.arange(len(self))[rows if isinstance(rows, slice) else _index(rows)]
+        names = (
+            "coordinates", "transforms", "mismatch", "loads", "measured", "sigma",
+            "configuration", "repeat",
+        )  # fmt: skip
+        return replace(
+            self,
+            ids=tuple(self.ids[i] for i in chosen),
+            covariates={k: v[chosen] for k, v in self.covariates.items()},
+            **{name: getattr(self, name)[chosen] for name in names},
+        )
+
+
+def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
+    """Number rows so that equal ones share a number, from 0 by first use.
+
+    Args:
+        columns: (R,) or (R, k) each; NaN equals NaN.
+        step: differences below it are none.
+
+    Returns:
+        (R,) int.
+    """
+    table = np.column_stack([np.asarray(c, dtype=float) for c in columns])
+    table = np.round(table / step) + 0.0  # no negative zero
+    _, first, number = np.unique(
+        np.nan_to_num(table, nan=np.inf), axis=0, return_index=True, return_inverse=True
+    )
+    rank = np.empty(len(first), dtype=int)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[number.reshape(-1)]
+
+
+def _index(rows: ArrayLike) -> NDArray:
+    """Numbers of rows, or a mask, as an index; an empty list is no rows."""
+    index = np.asarray(rows)
+    return index.astype(int) if index.size == 0 else index
+
+
+def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
+    """A read-only copy of the right shape."""
+    array = np.array(getattr(campaign, name))
+    if array.shape != shape:
+        whose = f"campaign '{campaign.name}': {name}"
+        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
+    array.setflags(write=False)
+    return array
+
+
+def _column(values: ArrayLike, rows: int, name: str) -> NDArray:
+    """A read-only covariate."""
+    array = np.array(values, dtype=float)
+    if array.shape != (rows,) or not np.isfinite(array).all():
+        raise ValueError(f"covariate '{name}': expected {rows} finite numbers")
+    array.setflags(write=False)
+    return array

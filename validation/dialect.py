@@ -1,0 +1,85 @@
+"""How the table of a campaign is written: delimiter, decimal mark and units.
+
+All of it is declared in ``campaign.toml`` or is the default: comma, point, SI.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from stiffness.reading import Table
+
+DELIMITERS = {",": ",", ";": ";", "tab": "\t"}
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?", re.ASCII)
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_ANGLES = {
+    "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
+    "arcsec": math.pi / 648000,
+}  # fmt: skip
+UNITS = {  # key of [units]: factor to SI of each unit it may name, SI first
+    "position": _LENGTHS,
+    "rotation": _ANGLES,
+    "command_position": _LENGTHS,
+    "command_rotation": _ANGLES,
+    "force": {"N": 1.0, "kN": 1e3},
+    "moment": {"N m": 1.0, "N mm": 1e-3, "kN m": 1e3},
+    "time": {"s": 1.0, "min": 60.0, "h": 3600.0},
+}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a table is written.
+
+    Attributes:
+        delimiter: between cells.
+        decimal: the decimal mark.
+        units: unit by key, those not given are SI.
+    """
+
+    delimiter: str
+    decimal: str
+    units: dict[str, str]
+
+    def unit(self, key: str) -> str:
+        """The unit a key stands for."""
+        return self.units.get(key) or next(iter(UNITS[key]))
+
+    def factor(self, key: str) -> float:
+        """What a number in that unit is times in SI."""
+        return UNITS[key][self.unit(key)]
+
+
+def read_dialect(root: Table) -> Dialect:
+    """What ``campaign.toml`` says about the way its table is written.
+
+    Args:
+        root: of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are read.
+
+    Returns:
+        The dialect.
+
+    Raises:
+        BadInput: a value or unit that is not known.
+    """
+    delimiter, decimal, units = ",", ".", {}
+    if root.has("table"):
+        table = root.table("table")
+        delimiter = DELIMITERS[table.choice("delimiter", DELIMITERS, ",")]
+        decimal = table.choice("decimal", (".", ","), ".")
+        if decimal == delimiter:
+            message = 'found "," for both; decimal commas need delimiter = ";" or "tab"'
+            raise table.bad("decimal", message)
+        table.finish()
+    if root.has("units"):
+        table = root.table("units")
+        units = {k: table.choice(k, UNITS[k]) for k in UNITS if table.has(k)}
+        table.finish()
+    return Dialect(delimiter, decimal, units)
+
+
+def parse_number(cell: str, decimal: str) -> float:
+    """The number a cell holds; NaN if it is none ("nan" and "1_000" are none)."""
+    if decimal != ".":
+        cell = cell.replace(".", "?").replace(decimal, ".")
+    return float(cell) if _NUMBER.fullmatch(cell) else math.nan
