@@ -1,0 +1,51 @@
+"""Campaign folders the tests share."""
+
+ARM = """
+name = "arm"
+platform = "tool"
+[[frame]]
+name = "one"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "two"
+parent = "one"
+translation = [1.0, 0, 0]
+joint = "revolute"
+actuated = true
+position = 0.5
+[[frame]]
+name = "tool"
+parent = "two"
+translation = [0.8, 0, 0]
+"""
+HEAD = (
+    "id,q.one,q.two,load.fx,load.mx,meas.tx,meas.ty,meas.tz,"
+    "cov.temperature,cov.time,cov.approach"
+)
+ROWS = [
+    "m1,0.1,0.2,0,0,1e-05,2e-05,3e-05,1.5,0,1",
+    "m2,0.3,0.4,10,0,2e-05,,0,2,60,-1",
+    "m3,0.1,0.2,-0.0,0,1.1e-05,2.1e-05,3.1e-05,1,120,1",
+    "m4,0.1,0.2,10,0,1e-05,2e-05,3e-05,1,180,1",
+]
+NOISE = "[noise]\nrotation = 1e-5\nposition = 5e-6\n"
+
+
+def write_campaign(folder, head=HEAD, rows=ROWS, robot=ARM, toml=None, noise=NOISE,
+                   extra=""):  # fmt: skip
+    """A folder with campaign.toml, measurements.csv and robot.toml; returns it.
+
+    ``toml`` replaces values of the campaign's keys (None drops one), ``extra`` follows
+    the table of noise.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "robot.toml").write_text(robot)
+    lines = [] if head is None else [head]
+    (folder / "measurements.csv").write_text("".join(f"{r}\n" for r in lines + rows))
+    keys = {"robot": '"robot.toml"', "measurements": '"measurements.csv"'}
+    keys |= toml or {}
+    text = "".join(f"{k} = {v}\n" for k, v in keys.items() if v is not None)
+    (folder / "campaign.toml").write_text(text + noise + extra)
+    return folder
