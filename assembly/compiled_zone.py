@@ -70,12 +70,13 @@ def _margin(
     Z = orthogonal_rows(F, turns, free, m)
     known = misfit_of(s, P, errors)
     columns, right = small_problem(s, P, Z, len(Z), known)
-    B, w = _orthonormal(np.ascontiguousarray(columns.T), -right, _largest(s, P))
+    rows = np.ascontiguousarray(columns.T)
+    decided, B, w = orthonormal_rows(rows, -right, largest_clearance(s, P))
     size = np.sqrt(np.sum(w * w))
-    if not size > 0.0:
+    if not (decided and size > 0.0):
         return np.nan, np.nan
-    _turn_first(B, w, size)
-    u, pull = _farthest(B, s.starts)
+    turn_first(B, w, size)
+    u, pull = farthest(B, s.starts)
     reach, most = np.sum(B[0] * u), 0.0
     for c in range(len(s.starts) - 1):
         part = 0.0
@@ -96,7 +97,7 @@ def _margin(
 
 
 @njit(cache=True, error_model="numpy")
-def _largest(s: Structure, P: NDArray) -> float:
+def largest_clearance(s: Structure, P: NDArray) -> float:
     """Largest entry of the clearances' closure columns, for the noise floor."""
     largest = 0.0
     for c in range(len(s.cone_frame)):
@@ -109,15 +110,25 @@ def _largest(s: Structure, P: NDArray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _orthonormal(
+def orthonormal_rows(
     rows: NDArray, right: NDArray, largest: float
-) -> tuple[NDArray, NDArray]:
-    """Write rows u = right as B u = w with orthonormal rows; no rows if in doubt."""
+) -> tuple[bool, NDArray, NDArray]:
+    """Write rows u = right as B u = w with orthonormal rows.
+
+    Args:
+        rows: (p, nu); they are overwritten.
+        right: (p,).
+        largest: entry of the columns that the rows were projected from.
+
+    Returns:
+        Whether no rank hangs on rounding and nothing contradicts; B and w.
+    """
     p, nu = rows.shape
     turns, diagonal = np.empty(p), np.empty(p)
     order = np.empty(p, np.int64)
     rank = triangulate(rows, turns, diagonal, order, _ROWS_RANK, _NOISE * largest, -1.0)
-    rank = max(rank, 0)
+    if rank < 0:
+        return False, np.zeros((0, nu)), np.zeros(0)
     B, w = np.zeros((rank, nu)), np.zeros(rank)
     for i in range(p):
         total = right[order[i]]
@@ -126,15 +137,15 @@ def _orthonormal(
         if i < rank:
             w[i] = total / diagonal[i]
         elif not abs(total) <= _LEFT:
-            return np.zeros((0, nu)), np.zeros(0)
+            return False, B, w
     for i in range(rank):
         B[i, i] = 1.0
         turn(rows, turns, rank, B[i])
-    return B, w
+    return True, B, w
 
 
 @njit(cache=True, error_model="numpy")
-def _turn_first(B: NDArray, w: NDArray, size: float) -> None:
+def turn_first(B: NDArray, w: NDArray, size: float) -> None:
     """Combine the rows of B so that the first is along w and the others across it."""
     v = w / size
     sign = 1.0 if v[0] <= 0.0 else -1.0
@@ -150,7 +161,7 @@ def _turn_first(B: NDArray, w: NDArray, size: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _farthest(B: NDArray, starts: NDArray) -> tuple[NDArray, NDArray]:
+def farthest(B: NDArray, starts: NDArray) -> tuple[NDArray, NDArray]:
     """Find u within the cones with the most B[0].u and no B[1:] u; the pull on each."""
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])

@@ -13,21 +13,21 @@ the bound usually closes at once: a disc's or an ellipsoid's always does.
 
 Sources:
     Conn, Gould, Toint (2000), Trust-Region Methods, section 7.3, for the largest value
-    of a quadratic on a sphere.
+    of a quadratic on a sphere; Golub, Van Loan, Matrix Computations, 4th ed., section
+    8.5 (Jacobi's method).
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import brentq
-
-from assembly.conic import cone_sizes
 
 _LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
+_SWEEPS, _STEPS = 12, 60
 
 
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def majorant_bound(
-    centre: NDArray, X: NDArray, H: NDArray, start: NDArray, group: NDArray, w: NDArray
+    centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray, w: NDArray
 ) -> float:
     """Upper bound of |centre + X (v - start)| over unit cones with H (v - start) = 0.
 
@@ -36,34 +36,91 @@ def majorant_bound(
         X: (3, nv).
         H: (p, nv) orthonormal rows.
         start: (nv,).
-        group: (nv,) cone of each column.
+        starts: (cones + 1,) first column of each cone, and nv.
         w: (nv,) pulls X^T d - H^T n at some direction d.
 
     Returns:
-        The bound; infinite where nothing pulls.
+        The bound; infinite where nothing pulls, or where rounding spoils it.
     """
-    sizes = cone_sizes(w, group)
-    if sizes.max(initial=0.0) < 1e-150:
+    p, nv = H.shape
+    sizes, largest, total = np.empty(nv), 0.0, 0.0
+    for c in range(len(starts) - 1):
+        size = 0.0
+        for j in range(starts[c], starts[c + 1]):
+            size += w[j] * w[j]
+        sizes[starts[c]] = np.sqrt(size)
+        largest = max(largest, np.sqrt(size))
+    if not largest > 1e-150:
         return np.inf  # nothing pulls in this direction: it says nothing of others
-    sizes = np.maximum(sizes, _LEAST_SIZE * sizes.max())
-    inverse = 1.0 / sizes[group]
-    # n minimises w.w/(2s) - w.start:  H (w/s - start) = 0
-    S = cho_factor((H * inverse) @ H.T) if len(H) else None
-
-    def solve(right: NDArray) -> NDArray:
-        return right if S is None else cho_solve(S, right)
-
-    N = solve((H * inverse) @ X.T)
-    offset = solve(H @ start)
-    A = X.T - H.T @ N  # w = A d + H^T offset, the minimiser's
-    fixed = H.T @ offset
-    Q = (A * inverse[:, None]).T @ A
-    linear = centre + (A * inverse[:, None]).T @ fixed - A.T @ start
-    constant = sizes.sum() / 2 + float(fixed @ (inverse * fixed)) / 2
-    constant -= float(fixed @ start)
+    for c in range(len(starts) - 1):
+        size = max(sizes[starts[c]], _LEAST_SIZE * largest)
+        total += size
+        for j in range(starts[c], starts[c + 1]):
+            sizes[j] = size
+    # n minimises w.w/(2s) - w.start:  H (w/s - start) = 0, w = A d + fixed
+    A, fixed = np.empty((nv, 3)), np.zeros(nv)
+    for j in range(nv):
+        for a in range(3):
+            A[j, a] = X[a, j]
+    if p and not _follow_rows(H, X, start, sizes, A, fixed):
+        return np.inf
+    Q, linear, constant = np.zeros((3, 3)), centre.copy(), total / 2
+    for j in range(nv):
+        pull = fixed[j] / sizes[j] - start[j]
+        constant += fixed[j] * (fixed[j] / (2 * sizes[j]) - start[j])
+        for a in range(3):
+            linear[a] += A[j, a] * pull
+            for b in range(3):
+                Q[a, b] += A[j, a] * A[j, b] / sizes[j]
     return constant + largest_on_sphere(Q, linear)
 
 
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+def _follow_rows(
+    H: NDArray, X: NDArray, start: NDArray, sizes: NDArray, A: NDArray, fixed: NDArray
+) -> bool:
+    """Subtract from A and fixed what the best n answers; whether that succeeded."""
+    p, nv = H.shape
+    S, right = np.zeros((p, p)), np.zeros((p, 4))
+    scaled = np.empty(nv)
+    for i in range(p):
+        for j in range(nv):
+            scaled[j] = H[i, j] / sizes[j]
+            right[i, 3] += H[i, j] * start[j]
+        for l in range(i + 1):
+            for j in range(nv):
+                S[i, l] += scaled[j] * H[l, j]
+        for a in range(3):
+            for j in range(nv):
+                right[i, a] += scaled[j] * X[a, j]
+    for i in range(p):
+        for l in range(i + 1):
+            for j in range(l):
+                S[i, l] -= S[i, j] * S[l, j]
+            if l < i:
+                S[i, l] /= S[l, l]
+            elif S[i, i] > 0.0:
+                S[i, i] = np.sqrt(S[i, i])
+            else:
+                return False
+    for a in range(4):
+        for i in range(p):
+            for j in range(i):
+                right[i, a] -= S[i, j] * right[j, a]
+            right[i, a] /= S[i, i]
+        for i in range(p - 1, -1, -1):
+            for j in range(i + 1, p):
+                right[i, a] -= S[j, i] * right[j, a]
+            right[i, a] /= S[i, i]
+    for i in range(p):
+        for j in range(nv):
+            fixed[j] += H[i, j] * right[i, 3]
+            for a in range(3):
+                A[j, a] -= H[i, j] * right[i, a]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
     """Largest value of d.Q d/2 + g.d over unit vectors d.
 
@@ -74,19 +131,66 @@ def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
     Returns:
         The value, from above by at most rounding.
     """
-    values, vectors = np.linalg.eigh(Q)
-    g = vectors.T @ g
-    top = values[-1]
-    size = max(float(np.linalg.norm(g)), float(np.abs(values).max()), 1e-300)
-
-    def excess(shift: float) -> float:
-        return float(np.sum((g / (top + shift - values)) ** 2)) - 1.0
-
-    # any multiplier m >= top gives an upper bound, m/2 + sum g_i^2 / (2 (m - q_i))
-    low, high = 1e-15 * size, float(np.linalg.norm(g)) + 1e-15 * size
-    if high <= low * (1 + 1e-9) or excess(low) <= 0:
-        shift = low
-    else:
-        shift = brentq(excess, low, high, xtol=1e-300, rtol=1e-14)
+    values, vectors = eigenvectors(Q)
+    along, length = np.zeros(3), 0.0
+    for i in range(3):
+        for a in range(3):
+            along[i] += vectors[a, i] * g[a]
+        length += g[i] * g[i]
+    top, length = values.max(), np.sqrt(length)
+    size = max(length, np.abs(values).max(), 1e-300)
+    # any multiplier m > top gives an upper bound, m/2 + sum g_i^2 / (2 (m - q_i)); the
+    # least of them has |g / (m - q)| = 1, or m = top
+    low, high = 1e-15 * size, length + 1e-15 * size
+    shift = low
+    for _ in range(_STEPS):
+        first, second = 0.0, 0.0
+        for i in range(3):
+            part = along[i] / (top + shift - values[i])
+            first += part * part
+            second += part * part / (top + shift - values[i])
+        first = np.sqrt(first)
+        if not first > 1.0 + 1e-14:
+            break
+        # Newton's method on 1/|.|, concave: it comes from the left and stays there
+        shift = min(high, shift + first * first / second * (first - 1.0))
     m = top + shift
-    return float(m / 2 + np.sum(g**2 / (m - values)) / 2)
+    total = m / 2
+    for i in range(3):
+        total += along[i] * along[i] / (2 * (m - values[i]))
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def eigenvectors(Q: NDArray) -> tuple[NDArray, NDArray]:
+    """Eigenvalues (3,) of a symmetric matrix, and vectors as columns (3, 3)."""
+    D, V = Q.copy(), np.eye(3)
+    for _ in range(_SWEEPS):
+        off = D[0, 1] ** 2 + D[0, 2] ** 2 + D[1, 2] ** 2
+        if off <= 1e-34 * (D[0, 0] ** 2 + D[1, 1] ** 2 + D[2, 2] ** 2):
+            break
+        for a in range(2):
+            for b in range(a + 1, 3):
+                if D[a, b] == 0.0:
+                    continue
+                theta = (D[b, b] - D[a, a]) / (2.0 * D[a, b])
+                sign = 1.0 if theta >= 0.0 else -1.0
+                t = sign / (abs(theta) + np.sqrt(theta * theta + 1.0))
+                c = 1.0 / np.sqrt(t * t + 1.0)
+                s = t * c
+                for i in range(3):
+                    D[i, a], D[i, b] = (
+                        c * D[i, a] - s * D[i, b],
+                        s * D[i, a] + c * D[i, b],
+                    )
+                for i in range(3):
+                    D[a, i], D[b, i] = (
+                        c * D[a, i] - s * D[b, i],
+                        s * D[a, i] + c * D[b, i],
+                    )
+                for i in range(3):
+                    V[i, a], V[i, b] = (
+                        c * V[i, a] - s * V[i, b],
+                        s * V[i, a] + c * V[i, b],
+                    )
+    return np.array([D[0, 0], D[1, 1], D[2, 2]]), V

@@ -1,58 +1,128 @@
-"""A convex body in three dimensions, cut plane by plane: its corners at all times."""
+"""A convex body in three dimensions, cut plane by plane: its corners at all times.
+
+A cut drops the corners above the plane and puts new ones where it meets an edge; an
+edge is two corners with two planes in common.  Every corner has three planes: one that
+a plane touches by accident counts as below it, so that where more than three meet,
+corners lie together and nothing else changes.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+_MOST = 4096  # corners; 400 planes make 800
 
-class Polytope:
-    """The points of a box below a growing number of planes.
 
-    A cut drops the corners above the plane and puts new ones where it meets an edge;
-    an edge is two corners with two planes in common.  Nearly parallel cuts, which a
-    thin body gets, only add corners that lie together.
+class Polytope(NamedTuple):
+    """The points below a growing number of planes.
 
     Attributes:
-        corners: (k, 3) all corners; some may be there more than once.
-        cuts: planes so far, the box's six among them.
+        corners: (4096, 3) the first ``count[0]`` are the body's; some may lie together.
+        planes: (4096, 3) the planes through each.
+        count: (2,) corners, and planes so far.
     """
 
-    def __init__(self, low: NDArray, high: NDArray) -> None:
-        """Begin with the box from ``low`` (3,) to ``high`` (3,)."""
-        signs = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-        self.corners = np.where(signs == 1, high, low)
-        # planes through each corner, as bits
-        self._planes = [
-            sum(1 << (2 * axis + sign) for axis, sign in enumerate(row))
-            for row in signs.tolist()
-        ]
-        self.cuts = 6
+    corners: NDArray
+    planes: NDArray
+    count: NDArray
 
-    def cut(self, normal: NDArray, height: float) -> None:
-        """Keep the points x with normal . x <= height.
 
-        Args:
-            normal: (3,) unit vector.
-            height: of the plane along it.
-        """
-        above = self.corners @ normal - height
-        out = above > 1e-14 * np.abs(self.corners).max()
-        bit = 1 << self.cuts
-        self.cuts += 1
-        if not out.any():
-            return
-        inside = np.flatnonzero(~out)
-        points, planes = list(self.corners[inside]), [self._planes[i] for i in inside]
-        for i in np.flatnonzero(out):
-            for j in inside:
-                common = self._planes[i] & self._planes[j]
-                if common.bit_count() >= 2:
-                    share = above[i] / (above[i] - above[j])
-                    edge = self.corners[j] - self.corners[i]
-                    points.append(self.corners[i] + share * edge)
-                    planes.append(common | bit)
-        if points:
-            self.corners, self._planes = np.array(points), planes
+@njit(cache=True)
+def empty_polytope() -> Polytope:
+    """Room for a body."""
+    return Polytope(
+        np.empty((_MOST, 3)), np.empty((_MOST, 3), np.int64), np.zeros(2, np.int64)
+    )
 
-    def farthest(self) -> NDArray:
-        """(3,) the corner farthest from the origin."""
-        return self.corners[np.argmax(np.linalg.norm(self.corners, axis=1))]
+
+@njit(cache=True)
+def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> None:
+    """Make the body a box.
+
+    Args:
+        body: leaves holding it.
+        axes: (3, 3) orthonormal rows, the box's directions.
+        low: (3,) least component along each.
+        high: (3,) largest.
+    """
+    for i in range(8):
+        body.corners[i] = 0.0
+        for axis in range(3):
+            side = (i >> axis) & 1
+            height = high[axis] if side else low[axis]
+            for a in range(3):
+                body.corners[i, a] += height * axes[axis, a]
+            body.planes[i, axis] = 2 * axis + side
+    body.count[0], body.count[1] = 8, 6
+
+
+@njit(cache=True)
+def cut(body: Polytope, normal: NDArray, height: float) -> bool:
+    """Keep the points x with normal . x <= height.
+
+    Args:
+        body: leaves holding what is left.
+        normal: (3,) unit vector.
+        height: of the plane along it.
+
+    Returns:
+        Whether there was room for the new corners; if not, the body is as it was.
+    """
+    corners, planes = body.corners, body.planes
+    count, plane = body.count[0], body.count[1]
+    body.count[1] += 1
+    above, size = np.empty(count), 0.0
+    for i in range(count):
+        above[i] = -height
+        for a in range(3):
+            above[i] += corners[i, a] * normal[a]
+            size = max(size, abs(corners[i, a]))
+    limit = 1e-14 * size
+    new = count
+    for i in range(count):
+        if above[i] <= limit:
+            continue
+        for j in range(count):
+            if above[j] > limit:
+                continue
+            # the planes in common
+            shared, first, second = 0, -1, -1
+            for a in range(3):
+                one = planes[i, a]
+                if one == planes[j, 0] or one == planes[j, 1] or one == planes[j, 2]:
+                    shared += 1
+                    first, second = second, one
+            if shared < 2:
+                continue
+            if new == _MOST:
+                return False
+            # an inner corner above the plane by rounding is itself the new one
+            share = min(1.0, above[i] / (above[i] - above[j]))
+            for a in range(3):
+                edge = corners[j, a] - corners[i, a]
+                corners[new, a] = corners[i, a] + share * edge
+            planes[new, 0], planes[new, 1], planes[new, 2] = first, second, plane
+            new += 1
+    kept = 0
+    for i in range(new):
+        if i >= count or above[i] <= limit:
+            if kept != i:
+                corners[kept], planes[kept] = corners[i], planes[i]
+            kept += 1
+    body.count[0] = kept
+    return True
+
+
+@njit(cache=True)
+def farthest_corner(body: Polytope) -> NDArray:
+    """(3,) the corner farthest from the origin."""
+    best, at = -1.0, 0
+    for i in range(body.count[0]):
+        size = 0.0
+        for a in range(3):
+            size += body.corners[i, a] ** 2
+        if size > best:
+            best, at = size, i
+    return body.corners[at].copy()

@@ -10,19 +10,14 @@ free     compliant joints also turn about their own axis: play inside zones
 budget   everything that closes with at most (1 + eta) times the least energy
 ======== =================================================================
 
-The set of platform screws is convex, so the farthest one is bracketed by outer
-approximation of its three-dimensional projection, rotation or translation: a support
-function (a cone programme, its dual value certified) gives a cut and a point; the
-farthest vertex of the cuts is the next direction to look in.  Round bodies, which take
-many cuts, have a second bound (:mod:`assembly.majorant`).
-
-Sources:
-    Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
-    maximisation).
+The set of platform screws is convex; its farthest one is bracketed by
+:mod:`assembly.farthest`, compiled.  What that solver cannot certify is asked of
+Clarabel.  :func:`assembly.batch.bound_pose_errors` does many postures at once.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,14 +27,15 @@ from assembly.clearance import has_bounded_motion
 from assembly.closure import VirtualJoints, virtual_joints
 from assembly.conic import cone_sizes, into_cones, minimise_energy
 from assembly.energy import Assembly, solve_with
-from assembly.majorant import majorant_bound
-from assembly.polytope import Polytope
 from assembly.reduction import NOISE, complement
 from stiffness.screws import skew
 
+if TYPE_CHECKING:
+    from assembly.support import Body
+
 READINGS = ("frozen", "free", "budget")
 _RANK = 1e-10
-_MOST_CUTS = 400
+_MOST_SUPPORTS = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +117,15 @@ class Reach:
         pulls = pull + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, pulls)
 
-    def upper_bound(self, part: slice, pulls: NDArray) -> float:
-        """Upper bound of the size of half a screw, from a support's pulls."""
-        return majorant_bound(
-            self.centre[part], self.map[part], self.rows, self.start, self.group, pulls
-        )
+    @property
+    def body(self) -> "Body":
+        """The set as the compiled search reads it."""
+        from assembly.support import Body
+
+        starts = np.searchsorted(self.group, np.arange(self.group.max(initial=-1) + 2))
+        arrays = (self.centre, self.map, self.rows, self.start)
+        own = (np.require(a, requirements=["C", "W"]) for a in arrays)
+        return Body(*own, starts)
 
     def _feasible(self, v: NDArray) -> NDArray:
         """A nearby v that satisfies rows and cones to rounding."""
@@ -178,7 +178,7 @@ def bound_pose_error(
         offset: (3,) [m] from the platform's origin to the point asked about.
 
     Returns:
-        Bounds; wider than asked only if 400 cuts did not suffice, infinite if the
+        Bounds; wider than asked only if 400 supports did not suffice, infinite if the
         platform can move without bound.
 
     Raises:
@@ -186,8 +186,8 @@ def bound_pose_error(
         SolverFailed: the cone solver gave up.
     """
     reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
-    rotation = _farthest(reach, slice(0, 3), tolerance_rotation)
-    translation = _farthest(reach, slice(3, 6), tolerance_translation)
+    rotation = _farthest(reach, 0, tolerance_rotation)
+    translation = _farthest(reach, 3, tolerance_translation)
     return PoseError(
         reading,
         rotation[0], translation[0], rotation[1], translation[1],
@@ -315,32 +315,19 @@ def _without_own_springs(answer: Assembly) -> Assembly:
 
 
 def _farthest(
-    reach: Reach, part: slice, tolerance: float
+    reach: Reach, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
-    """Bounds of the largest size of half a screw, a screw, and the cuts it took."""
+    """Bounds of the largest size of half a screw, a screw, and the supports it took."""
+    from assembly.farthest import NEEDED, advance, begin, choose, learn
+    from assembly.polytope import empty_polytope
+
     if reach.unbounded:
         return (np.inf, np.inf), reach.centre, 0
-    if reach.map.shape[1] == 0:
-        size = float(np.linalg.norm(reach.centre[part]))
-        return (size, size), reach.centre, 0
-    weights = np.eye(6)[part]
-    found = [reach.support(d @ weights) for d in (*np.eye(3), *-np.eye(3))]
-    heights = np.array([s.height for s in found])
-    outer = Polytope(-heights[3:], heights[:3])
-    best, upper, improved = reach.centre, np.inf, False
-    while True:
-        for one in found:
-            if np.linalg.norm(one.screw[part]) > np.linalg.norm(best[part]):
-                best, improved = one.screw, True
-            upper = min(upper, reach.upper_bound(part, one.pulls))
-        lower = float(np.linalg.norm(best[part]))
-        vertex = outer.farthest()
-        upper = max(lower, min(upper, float(np.linalg.norm(vertex))))
-        if upper - lower <= tolerance or outer.cuts > _MOST_CUTS:
-            return (lower, upper), best, outer.cuts
-        # where the last step gained, its point's own direction gains more, and is
-        # where the second bound is sharpest; else wherever the cuts leave most room
-        towards, improved = (best[part] if improved else vertex), False
-        direction = towards / np.linalg.norm(towards)
-        found = [reach.support(direction @ weights)]
-        outer.cut(direction, found[0].height)
+    body = reach.body
+    search = begin(body, part, tolerance, _MOST_SUPPORTS, empty_polytope())
+    while advance(body, search) == NEEDED:
+        found = reach.support(search.direction @ np.eye(6)[part : part + 3])
+        learn(body, search, found.height, found.screw, found.pulls)
+        choose(search)
+    low, high = search.bounds.tolist()
+    return (low, high), search.best, int(search.counts[1])

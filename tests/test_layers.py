@@ -19,20 +19,30 @@ OWNERS = {
     "cvxpy": ("assembly/reference.py",),
     "exudyn": ("validation/multibody.py",),
     "numba": (
+        "assembly/compiled_reach.py",
+        "assembly/farthest.py",
+        "assembly/majorant.py",
+        "assembly/polytope.py",
+        "assembly/support.py",
         "assembly/interior.py",
         "assembly/continuation.py",
         "assembly/dual_newton.py",
         "assembly/compiled_assembly.py",
+        "assembly/compiled_draws.py",
         "assembly/compiled_reduction.py",
         "assembly/compiled_zone.py",
         "assembly/householder.py",
     ),
-    "xarray": ("assembly/sweep.py", "stiffness/library.py"),
+    "xarray": ("assembly/dataset.py", "stiffness/library.py"),
+    "h5netcdf": ("assembly/dataset.py",),
+    "distributed": ("assembly/cluster.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # the second opinion must not share the first one's mechanics
 INDEPENDENT = (
-    "multibody.py", "exudyn_model.py", "motion.py", "contact.py", "beams.py"
+    "multibody.py", "open_robot.py", "motion.py", "contact.py", "beams.py",
+    "exudyn_parts.py", "exudyn_model.py", "exudyn_solids.py", "exudyn_solver.py",
+    "exudyn_reading.py",
 )  # fmt: skip
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial import HalfspaceIntersection
 
 from assembly.energy import solve_assembly
-from assembly.polytope import Polytope
+from assembly.majorant import eigenvectors, largest_on_sphere
+from assembly.polytope import cut, empty_polytope, farthest_corner, start_box
 from assembly.pose_error import bound_pose_error, reachable_screws
 from assembly.posture import home_posture, place_robot
 from assembly.robot import Clearance, Frame, Robot
@@ -201,18 +202,80 @@ def test_polytope_corners_equal_qhulls(seed, cuts, thin):
     rng = np.random.default_rng(seed)
     size = np.array([1.0, 1.0, 1e-3 if thin else 1.0])
     low, high = -size * rng.uniform(0.5, 1.5, 3), size * rng.uniform(0.5, 1.5, 3)
-    body = Polytope(low, high)
+    body = empty_polytope()
+    start_box(body, np.eye(3), low, high)
     planes = [np.append(e, -h) for e, h in zip(np.eye(3), high, strict=True)]
     planes += [np.append(-e, h) for e, h in zip(np.eye(3), low, strict=True)]
     for _ in range(cuts):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
         height = rng.uniform(0.3, 1.2) * np.linalg.norm(size * normal)
-        body.cut(normal, height)
+        assert cut(body, normal, height)
         planes.append(np.append(normal, -height))
-    expected = HalfspaceIntersection(np.array(planes), np.zeros(3)).intersections
+    assert_same_corners(body, np.array(planes), rng)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-13, 1e-9, 1e-3])
+def test_polytope_survives_planes_through_its_corners_and_parallel_ones(tilt, rng):
+    """An octahedron cut out of a cube: every plane through three of its corners, and
+    again with a normal off by ``tilt``.
+    """
+    body = empty_polytope()
+    start_box(body, np.eye(3), -np.ones(3), np.ones(3))
+    planes = [np.append(s * e, -1.0) for e in np.eye(3) for s in (1, -1)]
+    for signs in itertools.product((-1.0, 1.0), repeat=3):
+        for off in (0.0, tilt):
+            normal = np.array(signs) + off * rng.normal(size=3)
+            length = np.linalg.norm(normal)
+            assert cut(body, normal / length, 1.0 / length)
+            planes.append(np.append(normal / length, -1.0 / length))
+    assert_same_corners(body, np.array(planes), rng, max(1e-9, 2 * tilt))
+
+
+def assert_same_corners(body, planes, rng, tolerance=1e-9):
+    """Farthest corner, and heights in many directions, as by Qhull."""
+    expected = HalfspaceIntersection(planes, np.zeros(3)).intersections
     farthest = np.linalg.norm(expected, axis=1).max()
-    assert np.linalg.norm(body.farthest()) == pytest.approx(farthest, rel=1e-9)
+    assert np.linalg.norm(farthest_corner(body)) == pytest.approx(
+        farthest, rel=tolerance
+    )
+    corners = body.corners[: body.count[0]]
     for normal in itertools.chain(np.eye(3), rng.normal(size=(10, 3))):
-        heights = [float((p @ normal).max()) for p in (body.corners, expected)]
-        assert heights[0] == pytest.approx(heights[1], abs=1e-9)
+        heights = [float((p @ normal).max()) for p in (corners, expected)]
+        assert heights[0] == pytest.approx(heights[1], abs=tolerance)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 3), hard=st.booleans())
+def test_largest_value_of_a_quadratic_on_the_sphere(seed, rank, hard):
+    """Against a fine look at the sphere, improved by power iterations; the hard case
+    has no linear part along the largest eigenvector.
+    """
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, rank))
+    Q, g = A @ A.T, rng.normal(size=3) * 10.0 ** rng.integers(-6, 2)
+    values, vectors = np.linalg.eigh(Q)
+    if hard:
+        g -= vectors[:, 2] * (vectors[:, 2] @ g)
+    d = rng.normal(size=(3, 200))
+    for _ in range(3000):
+        # of a convex function the linear part's maximiser never goes down
+        d = Q @ d + g[:, None] + 1e-3 * values[2] * d
+        d /= np.linalg.norm(d, axis=0)
+    best = np.max(np.sum(d * (Q @ d), axis=0) / 2 + g @ d)
+    found = largest_on_sphere(Q, g)
+    assert found == pytest.approx(best, rel=1e-6)
+    assert found >= best * (1 - 1e-13)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), scale=st.integers(-20, 20))
+def test_eigenvectors_equal_lapacks(seed, scale):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, 3)) * 10.0 ** rng.integers(-8, 3, 3)
+    Q = (A + A.T) * 10.0**scale
+    values, vectors = eigenvectors(Q)
+    size = np.abs(Q).max()
+    assert np.allclose(np.sort(values), np.linalg.eigvalsh(Q), atol=1e-14 * size)
+    assert np.allclose(vectors.T @ vectors, np.eye(3), atol=1e-14)
+    assert np.allclose(Q @ vectors, vectors * values, rtol=0, atol=1e-14 * size)
