@@ -14,7 +14,7 @@ from stiffness.reading import BadInput
 from tests.solids_for_tests import box_solid
 from validation.comparison import link_models
 from validation.crosscheck import crosscheck
-from validation.exudyn_model import MeshBody, Solid
+from validation.exudyn_parts import MeshBody, Solid
 from validation.motion import placement
 from validation.multibody import simulate_assembly
 

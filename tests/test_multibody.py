@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import validation.exudyn_solver
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
-from validation.exudyn_model import Model
 from validation.motion import exponential, inverse, logarithm, placement
 from validation.multibody import (
     SimulationFailed,
@@ -478,10 +478,10 @@ def test_five_hundred_models_leave_nothing_behind(rng):
     assert resident() - before < 10
 
 
-def relax(self, start, _steps):
+def relax(model, start, _steps):
     """Instead of the static solver: 60 s of damped motion from the last state."""
-    settings = self.exu.SimulationSettings()
-    settings.linearSolver.solverType = self.exu.LinearSolverType.EigenSparse
+    settings = model.exu.SimulationSettings()
+    settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
     run = settings.timeIntegration
     run.startTime, run.endTime, run.numberOfSteps = start, start + 60.0, 600
@@ -490,8 +490,8 @@ def relax(self, start, _steps):
     run.generalizedAlpha.computeInitialAccelerations = False
     run.newton.useModifiedNewton = False
     run.newton.relativeTolerance = run.newton.absoluteTolerance = 1e-6
-    kind = self.exu.DynamicSolverType.GeneralizedAlpha
-    self.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
+    kind = model.exu.DynamicSolverType.GeneralizedAlpha
+    model.mbs.SolveDynamic(settings, solverType=kind, updateInitialValues=True)
 
 
 @pytest.mark.slow
@@ -511,7 +511,7 @@ def test_dynamic_relaxation_comes_to_rest_at_the_same_place(case, rng, monkeypat
     else:
         posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     static = simulate_assembly(posture)
-    monkeypatch.setattr(Model, "_equilibrate", relax)
+    monkeypatch.setattr(validation.exudyn_solver, "equilibrate", relax)
     relaxed = simulate_assembly(posture)
     assert relaxed.energy == pytest.approx(static.energy, rel=1e-8)
     np.testing.assert_allclose(

@@ -1,6 +1,7 @@
 """Clearances as contact: closed forms, and the linear model's cones."""
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
-from validation.contact import Cone, Play, cone_energy, cone_push, joint_play
+from validation.contact import Cone, Play, cone_energy, cone_pushes, joint_play
+from validation.exudyn_parts import OutOfTime
 from validation.multibody import simulate_assembly
 from validation.playcheck import playcheck
 
@@ -33,26 +35,61 @@ def coaxial(error, clearance, length=0.4):
     return home_posture(Robot("coaxial", "a_tip", frames, (("a_tip", "b"),)))
 
 
-def test_the_push_is_the_gradient_of_the_energy():
-    """Central differences of half a nanometre; inside, at the bound, outside."""
+def push(cone, screw, width):
+    """(6,) all that a contact pushes with."""
+    wrench = np.zeros(6)
+    for row, value in cone_pushes(cone, screw, width):
+        wrench[row] += value
+    return wrench
+
+
+@pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
+def test_the_push_is_the_gradient_of_the_energy(arm):
+    """Central differences of half a nanometre; inside, at the bound, outside.
+
+    With an arm of 40 mm a pin tilted by r / arm touches as one shifted by r does.
+    """
+    disc = replace(DISC, arm=arm)
+    unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
         for width in (3.0, 1e-2):
-            offsets = [0.6 * r, 0.8 * r]
-            for k in range(2):
-                step = 5e-10 * np.eye(2)[k]
-                more = cone_energy(DISC, list(offsets + step), width)
-                less = cone_energy(DISC, list(offsets - step), width)
-                push = cone_push(DISC, offsets, width)[k]
-                scale = DISC.stiffness * DISC.size
-                assert push == pytest.approx((more - less) / 1e-9, abs=2e-5 * scale)
+            screw = np.array([0.1, -0.2, 0.3, 0.6, 0.8, 0.4]) * r / unit
+            for k in range(6):
+                step = 5e-10 / unit[k] * np.eye(6)[k]
+                more = cone_energy(disc, screw + step, width)
+                less = cone_energy(disc, screw - step, width)
+                slope = (more - less) / (1e-9 / unit[k])
+                scale = disc.stiffness * disc.size * unit[k]
+                found = push(disc, screw, width)[k]
+                assert found == pytest.approx(slope, abs=2e-5 * scale)
 
 
 def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
     """k (r - c) at first order; c is 30 um, r - c a hundredth of it."""
-    assert cone_push(DISC, [1e-5, 0.0], 1e-4)[0] < 1e-6 * 1e12 * 3e-5
-    outside = cone_push(DISC, [0.0, 3.03e-5], 1e-4)
-    assert outside[0] == 0.0
-    assert outside[1] == pytest.approx(1e12 * 3e-7, rel=0.02)
+    assert push(DISC, [0, 0, 0, 1e-5, 0, 0], 1e-4)[3] < 1e-6 * 1e12 * 3e-5
+    outside = push(DISC, [0, 0, 0, 0, 3.03e-5, 0], 1e-4)
+    assert outside[3] == 0.0
+    assert outside[4] == pytest.approx(1e12 * 3e-7, rel=0.02)
+
+
+def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
+    """Tilted by c / h it just touches both, shifted by c too; both at once presses.
+
+    At z = h the axis is at (TX + h RY, TY - h RX).
+    """
+    play = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
+    bushes = joint_play(Frame("f", clearance=play), bushes=True)
+    assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
+        ((5,), 1e-5, 0.0), ((3, 4), 3e-5, 0.04), ((3, 4), 3e-5, -0.04)
+    ]  # fmt: skip
+    assert bushes.loose == (0, 1, 3, 4, 5)
+    _, far, near = bushes.cones
+    tilted = [0, 7.5e-4, 0, 0, 0, 0]
+    assert far.offsets(tilted) == pytest.approx([3e-5, 0])
+    assert near.offsets(tilted) == pytest.approx([-3e-5, 0])
+    both = push(far, [0, 7.5e-4, 0, 3e-5, 0, 0], 1e-4)
+    assert both[3] > 0
+    assert both[1] == pytest.approx(0.04 * both[3])
 
 
 def test_a_joints_play_follows_the_format():
@@ -85,6 +122,49 @@ def test_axial_play_is_taken_off_the_misfit(misfit):
     expected = (misfit - 3e-5) ** 2 * stiffness / 2
     allowed = 2 * 9e-9 / (misfit - 3e-5)
     assert answer.rigid_energy == pytest.approx(expected, rel=allowed)
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.05])
+def test_a_slow_simulation_ends_in_time_and_says_so(pause, monkeypatch):
+    """Slow by itself, and slow although the processor sleeps: bounded by the clock.
+
+    Unbounded, 0.05 s at each of some 3000 calls of the contact are minutes.
+    """
+    import validation.exudyn_model
+
+    def slowly(*args):
+        time.sleep(pause)
+        return cone_pushes(*args)
+
+    monkeypatch.setattr(validation.exudyn_model, "cone_pushes", slowly)
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5, radial=1e-5))
+    limit = 0.3 if pause else 0.03
+    started = time.monotonic()
+    with pytest.raises(OutOfTime, match="time limit was reached while") as error:
+        simulate_assembly(posture, clearances=True, time_limit=limit)
+    assert time.monotonic() - started < limit + 1.0
+    assert error.value.robot == "coaxial"
+
+
+def test_a_time_limit_stays_with_its_simulation():
+    """Exudyn's timer is one for all models: the next one has its own."""
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
+    with pytest.raises(OutOfTime):
+        simulate_assembly(posture, clearances=True, time_limit=1e-3)
+    assert simulate_assembly(posture, clearances=True).rigid_energy > 0
+
+
+def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
+    """Exudyn makes an error of its own of Ctrl-C; it must not be tried again."""
+    import validation.exudyn_model
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(validation.exudyn_model, "cone_pushes", interrupted)
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
+    with pytest.raises(KeyboardInterrupt):
+        simulate_assembly(posture, clearances=True)
 
 
 def test_play_swallows_a_smaller_misfit():

@@ -25,7 +25,7 @@ from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from assembly.robot import BeamLink, Clearance, Frame, Robot
 from stiffness.reading import BadInput
-from validation.exudyn_model import MeshBody
+from validation.exudyn_parts import MeshBody
 from validation.multibody import MultibodyAssembly
 from validation.solids import mesh_bodies
 

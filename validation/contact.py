@@ -8,9 +8,13 @@ RZ.  At distance r from the middle of a cone of size c,
 so the push is k P P' r / c: none inside, a stiff spring outside, smooth everywhere, at
 the middle too (smoothing r - c instead is singular there).  The width w is first three
 times c, which pulls the joint gently to its middle, and then shrinks to 3e-4.
+
+A pin in two bushes touches at two places, at +-h along z: each is a disc of its own for
+the pin's axis there, (TX + h RY, TY - h RX), and the cone for (RX, RY) is gone.
 """
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from assembly.robot import Clearance, Frame
@@ -30,11 +34,22 @@ class Cone:
         rows: of the screw, those it bounds together.
         size: [rad or m] > 0.
         stiffness: [N m/rad or N/m] of the contact.
+        arm: [m] along z from the joint's middle to where it touches; radial discs only.
     """
 
     rows: tuple[int, ...]
     size: float
     stiffness: float
+    arm: float = 0.0
+
+    def offsets(self, screw: Sequence[float]) -> list[float]:
+        """[rad or m] one or two components that it bounds, of a screw (6,)."""
+        if self.arm:
+            return [
+                screw[3] + self.arm * screw[1],
+                screw[4] - self.arm * screw[0],
+            ]
+        return [screw[row] for row in self.rows]
 
 
 @dataclass(frozen=True)
@@ -52,15 +67,19 @@ class Play:
     @property
     def loose(self) -> tuple[int, ...]:
         """Rows that are not locked."""
-        return tuple(row for cone in self.cones for row in cone.rows) + self.free
+        bounded = {row for cone in self.cones for row in cone.rows}
+        tilting = {row for cone in self.cones if cone.arm for row in (0, 1)}
+        return tuple(sorted(bounded | tilting | {*self.free}))
 
 
-def joint_play(frame: Frame, scale: float = 1.0) -> Play:
+def joint_play(frame: Frame, scale: float = 1.0, bushes: bool = False) -> Play:
     """Clearances of a frame's joint, and its own motion where no spring holds it.
 
     Args:
         frame: of a robot.
         scale: factor on the clearances.
+        bushes: whether a joint with both radial play and tilt is a pin in two bushes,
+            each with that radial play, so far apart that it can tilt as much.
 
     Returns:
         The play; without clearance and own motion, nothing is loose.
@@ -76,28 +95,40 @@ def joint_play(frame: Frame, scale: float = 1.0) -> Play:
         elif bound:
             stiffness = TURN_STIFFNESS if rows[0] < 3 else SHIFT_STIFFNESS
             cones.append(Cone(rows, scale * bound, stiffness))
+    if bushes and given.radial and given.tilt:
+        size, h = scale * given.radial, given.radial / given.tilt
+        cones = [cone for cone in cones if cone.rows not in {(0, 1), (3, 4)}]
+        cones += [Cone((3, 4), size, SHIFT_STIFFNESS, arm) for arm in (h, -h)]
     return Play(tuple(cones), tuple(free))
 
 
-def cone_push(cone: Cone, offsets: list[float], width: float) -> list[float]:
+def cone_pushes(
+    cone: Cone, screw: Sequence[float], width: float
+) -> Iterator[tuple[int, float]]:
     """What holds a joint back that has moved out of the middle of a cone.
 
     Args:
         cone: the bound.
-        offsets: [rad or m] one or two components.
+        screw: (6,) [rad, m] how the joint has moved.
         width: [-] of the smoothing, in sizes of the cone.
 
-    Returns:
-        [N m or N] as many components, along the offsets: gradient of the energy.
+    Yields:
+        Rows of the screw and the components [N m or N] of the push along them: the
+        gradient of the energy.
     """
+    offsets = cone.offsets(screw)
     P, root = _overlap(cone, offsets, width)
     factor = cone.stiffness * P * (P / root) / cone.size
-    return [factor * u for u in offsets]
+    for row, offset in zip(cone.rows, offsets, strict=True):
+        yield row, factor * offset
+    if cone.arm:
+        yield 0, -cone.arm * factor * offsets[1]
+        yield 1, cone.arm * factor * offsets[0]
 
 
-def cone_energy(cone: Cone, offsets: list[float], width: float) -> float:
-    """[J] stored where a joint presses against a cone; arguments of ``cone_push``."""
-    return cone.stiffness * _overlap(cone, offsets, width)[0] ** 2 / 2
+def cone_energy(cone: Cone, screw: Sequence[float], width: float) -> float:
+    """[J] where a joint presses against a cone; arguments of ``cone_pushes``."""
+    return cone.stiffness * _overlap(cone, cone.offsets(screw), width)[0] ** 2 / 2
 
 
 def _overlap(cone: Cone, offsets: list[float], width: float) -> tuple[float, float]:

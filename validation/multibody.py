@@ -22,50 +22,34 @@ import io
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
-from stiffness.beam import declared_section
+from assembly.robot import Robot
 from stiffness.reading import BadInput
-from validation.beams import beam_axes, beam_span, element_stiffness
-from validation.contact import joint_play
-from validation.exudyn_model import (
-    CLOSING,
-    CLOSING_CONTACTS,
-    Closure,
-    Contact,
-    Elastic,
-    MeshBody,
-    Model,
-    Place,
+from validation.exudyn_model import Model
+from validation.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
+from validation.exudyn_parts import SimulationFailed as SimulationFailed
+from validation.exudyn_reading import (
+    closure_wrench,
+    contact_energy,
+    energy,
+    pose,
+    screw_between,
+    wrench,
 )
-from validation.exudyn_model import SimulationFailed as SimulationFailed
-from validation.motion import (
-    inverse,
-    logarithm,
-    matrix,
-    placement,
-    shifted,
-    turn_of,
-)
+from validation.exudyn_solver import largest_gap, solve
+from validation.motion import turn_of
+from validation.open_robot import Case, Placed, Tree, build, link_springs
 
 LINKS = ("beam", "spring")
-_IDLE = 1e-6  # [N m/rad, N/m] holds passive joints that nothing else holds
-
-
-class Placed(Protocol):
-    """What is asked of a posture."""
-
-    @property
-    def robot(self) -> Robot:
-        """The manipulator."""
-
-    @property
-    def coordinates(self) -> NDArray:
-        """(n,) [rad or m] joint coordinates at which the nominal closures hold."""
+TIME_LIMIT = 300.0  # [s] for one simulation; the slowest measured took 26
+# [N m/rad, N/m] of the connectors that shut closures, tried in turn; beside contacts
+# they must hardly be softer than these
+_CLOSING = (1e10,)
+_CLOSING_CONTACTS = (1e12, 1e11)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +107,8 @@ def simulate_assembly(
     elements: int = 4,
     clearances: bool = False,
     meshes: Mapping[str, MeshBody] | None = None,
+    bushes: bool = False,
+    time_limit: float = TIME_LIMIT,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
 
@@ -140,6 +126,9 @@ def simulate_assembly(
         elements: beam elements per link.
         clearances: whether joints play, scaled like the errors; tight otherwise.
         meshes: by frame, links that are solids of finite elements in a floating frame.
+        bushes: whether joints with radial play and tilt are pins in two bushes each,
+            see :func:`validation.contact.joint_play`, instead of a disc and a cone.
+        time_limit: [s] after which the simulation fails.
 
     Returns:
         The assembled robot.
@@ -147,51 +136,44 @@ def simulate_assembly(
     Raises:
         BadInput: an unknown kind of link, or a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
+        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
     """
     if links not in LINKS:
         raise BadInput(f"simulate_assembly: links = {links!r}, expected one of {LINKS}")
-    started = time.perf_counter()
+    started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
     solids = dict(meshes or {})
-    springs = _link_springs(posture.robot, links, given, solids)
-    case = _Case(posture, scale, springs, elements, clearances, solids)
-    *first, last = CLOSING_CONTACTS if clearances else CLOSING
+    springs = link_springs(posture.robot, links, given, solids)
+    case = Case(
+        posture, scale, springs, solids, elements, clearances, bushes,
+        _vector(load, 6), _vector(gravity, 3),
+    )  # fmt: skip
+    *first, last = _CLOSING_CONTACTS if clearances else _CLOSING
     for closing in first:
-        with contextlib.suppress(SimulationFailed):
-            return _simulate(case, closing, load, gravity, started)
-    return _simulate(case, last, load, gravity, started)
+        try:
+            return _simulate(case, closing, started, time_limit)
+        except OutOfTime:
+            raise
+        except SimulationFailed:
+            continue
+    return _simulate(case, last, started, time_limit)
 
 
-@dataclass(frozen=True, eq=False)
-class _Case:
-    """What is to be built; see :func:`simulate_assembly`."""
-
-    posture: Placed
-    scale: float
-    springs: Mapping[str, NDArray]
-    elements: int
-    clearances: bool
-    meshes: Mapping[str, MeshBody]
+def _vector(given: ArrayLike | None, size: int) -> NDArray:
+    """(size,) what is given, or zeros."""
+    return np.zeros(size) if given is None else np.asarray(given, dtype=float)
 
 
 def _simulate(
-    case: _Case,
-    closing: float,
-    load: ArrayLike | None,
-    gravity: ArrayLike | None,
-    started: float,
+    case: Case, closing: float, started: float, limit: float
 ) -> MultibodyAssembly:
-    """Build, load, solve, read, and give the memory back."""
+    """Build, solve, read, and give the memory back."""
     robot = case.posture.robot
     model = Model(*_import_exudyn(), robot.name, closing)
+    model.deadline = started + limit
     try:
-        tree = _build(model, case)
-        if load is not None:
-            wrench = np.asarray(load, dtype=float)
-            model.add_load(tree.before[robot.platform], wrench)
-        if gravity is not None:
-            _weigh(model, robot, tree, np.asarray(gravity, dtype=float))
-        model.solve(tree.closures, narrow=bool(tree.contacts))
+        tree = build(model, case)
+        solve(model, tree.closures, narrow=bool(tree.contacts))
         return _read(model, robot, tree, started)
     finally:
         model.discard()
@@ -218,17 +200,16 @@ def closing_sequence(
         SimulationFailed: no equilibrium was found.
     """
     robot = posture.robot
-    springs = _link_springs(robot, "beam", {}, {})
-    case = _Case(posture, scale, springs, elements=4, clearances=False, meshes={})
-    model = Model(*_import_exudyn(), robot.name, CLOSING[-1])
+    springs = link_springs(robot, "beam", {}, {})
+    case = Case(
+        posture, scale, springs, {}, 4, False, False, _vector(load, 6), np.zeros(3)
+    )
+    model = Model(*_import_exudyn(), robot.name, _CLOSING[-1])
+    model.deadline = time.monotonic() + TIME_LIMIT
     try:
-        tree = _build(model, case)
-        model.steps = steps
+        tree = build(model, case)
         model.watched = [tree.before[frame.name] for frame in robot.frames]
-        if load is not None:
-            wrench = np.asarray(load, dtype=float)
-            model.add_load(tree.before[robot.platform], wrench)
-        model.solve(tree.closures)
+        solve(model, tree.closures, steps=steps)
         return np.array(model.seen)
     finally:
         model.discard()
@@ -247,164 +228,7 @@ def without_clearance(robot: Robot) -> Robot:
     return replace(robot, frames=frames)
 
 
-def _link_springs(
-    robot: Robot,
-    links: str,
-    given: Mapping[str, NDArray],
-    meshes: Mapping[str, MeshBody],
-) -> dict[str, NDArray]:
-    """Stiffness of every link that is to be neither a beam nor a mesh."""
-    springs = {}
-    for frame in robot.frames:
-        link = frame.link
-        beam = isinstance(link, BeamLink) and links == "beam"
-        if link is None or beam or frame.name in meshes:
-            continue
-        if isinstance(link, MatrixLink):
-            springs[frame.name] = given.get(frame.name, link.stiffness)
-        elif frame.name in given:
-            springs[frame.name] = given[frame.name]
-        else:
-            raise BadInput(
-                f"simulate_assembly: the link of frame '{frame.name}' is to be a "
-                "spring, expected its 6 by 6 matrix in `stiffness`"
-            )
-    return springs
-
-
-@dataclass(frozen=True, eq=False)
-class _Tree:
-    """What was built.
-
-    Attributes:
-        bodies: places of the frames on their bodies, before any play or joint spring.
-        before: places of the frames before their own motion.
-        links: elastic bodies by frame.
-        joints: joint springs by frame.
-        idle: the springs of free motions by frame.
-        contacts: joints with play by frame.
-        closures: in the robot's order.
-        platform: (4, 4) nominal platform, seen from the base.
-    """
-
-    bodies: dict[str, Place]
-    before: dict[str, Place]
-    links: dict[str, Elastic]
-    joints: dict[str, Elastic]
-    idle: dict[str, Elastic]
-    contacts: dict[str, Contact]
-    closures: list[Closure]
-    platform: NDArray
-
-
-def _build(model: Model, case: _Case) -> _Tree:
-    """The open, stress-free robot with its errors, and its closures."""
-    posture, robot = case.posture, case.posture.robot
-    bodies: dict[str, Place] = {}
-    before: dict[str, Place] = {}
-    after = {BASE: model.ground}
-    links: dict[str, Elastic] = {}
-    joints: dict[str, Elastic] = {}
-    idle: dict[str, Elastic] = {}
-    contacts: dict[str, Contact] = {}
-    for frame, q in zip(robot.frames, posture.coordinates, strict=True):
-        error = case.scale * frame.geometric_error
-        place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
-        place = place.moved(placement(error[:3], error[3:]))
-        if frame.name in case.meshes:
-            links[frame.name] = model.add_mesh(place, case.meshes[frame.name])
-            place = links[frame.name].far
-        elif frame.name in case.springs:
-            links[frame.name] = model.add_spring(place, case.springs[frame.name])
-            place = links[frame.name].far
-        elif isinstance(frame.link, BeamLink):
-            links[frame.name] = _add_beam(model, place, frame, case.elements)
-            place = links[frame.name].far
-        bodies[frame.name] = place
-        play = joint_play(frame, case.scale)
-        if case.clearances and play.cones:
-            contacts[frame.name] = model.add_contact(place, play)
-            place = contacts[frame.name].far
-        K = frame.joint_stiffness
-        if K is not None and np.isfinite(np.diag(K)).any():
-            joints[frame.name] = model.add_spring(place, K)
-            place = joints[frame.name].far
-        elif frame.passive and not frame.compliant and frame.name not in contacts:
-            axes = np.arange(6) == frame.own_axis
-            K = np.diag(np.where(axes, _IDLE, np.inf))
-            idle[frame.name] = model.add_spring(place, K)
-            place = idle[frame.name].far
-        before[frame.name] = place
-        after[frame.name] = place.moved(_own_motion(frame, q))
-    nominal = _nominal(posture)
-    closures = []
-    for a, b in robot.closures:
-        shut = inverse(nominal[a]) @ nominal[b]  # what rounded files leave is no error
-        closures.append(model.add_closure(before[a], before[b], shut))
-    platform = nominal[robot.platform]
-    return _Tree(bodies, before, links, joints, idle, contacts, closures, platform)
-
-
-def _nominal(posture: Placed) -> dict[str, NDArray]:
-    """(4, 4) of every frame without imperfections, before its own motion."""
-    T: dict[str, NDArray] = {}
-    after = {BASE: np.eye(4)}
-    for frame, q in zip(posture.robot.frames, posture.coordinates, strict=True):
-        own = placement(frame.rotation, frame.translation)
-        T[frame.name] = after[frame.parent] @ own
-        after[frame.name] = T[frame.name] @ _own_motion(frame, q)
-    return T
-
-
-def _own_motion(frame: Frame, q: float) -> NDArray:
-    """(4, 4) the joint's motion about or along z."""
-    if frame.joint == "prismatic":
-        return shifted([0.0, 0.0, q])
-    return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
-
-
-def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """A straight beam, clamped to the place's body so that it ends at the place."""
-    link = frame.link
-    assert isinstance(link, BeamLink)
-    length, x = beam_span(frame, link)
-    axes = matrix(beam_axes(x, link.up), np.zeros(3))
-    base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
-    K = element_stiffness(link, length / elements)
-    parts, nodes = model.add_beam(base, length, K, elements)
-    return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
-
-
-def _weigh(model: Model, robot: Robot, tree: _Tree, gravity: NDArray) -> None:
-    """Loads of everything that has a mass.
-
-    A beam's weight acts at its nodes, with the moments at its ends of a clamped beam
-    under uniform load: the tip of a cantilever is then exact for any number of nodes.
-    """
-    for frame in robot.frames:
-        if frame.mass:
-            centre = tree.bodies[frame.name].moved(shifted(frame.centre_of_mass))
-            model.add_load(centre, np.concatenate([np.zeros(3), frame.mass * gravity]))
-        link = frame.link
-        if not isinstance(link, BeamLink) or link.density is None:
-            continue
-        length, x = beam_span(frame, link)
-        line = x / np.linalg.norm(x) * length
-        part = tree.links[frame.name]
-        nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
-        step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
-        section = declared_section(link.section, link.poisson)
-        weight = link.density * section.area * length * gravity
-        weight = weight / (len(nodes) - 1)
-        moment = np.cross(step, weight) / 12
-        for k, node in enumerate(nodes):
-            first, last = k == 0, k == len(nodes) - 1
-            force = weight * (0.5 if first or last else 1.0)
-            couple = moment * (float(first) - float(last))
-            model.add_load(node, np.concatenate([couple, force]))
-
-
-def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyAssembly:
+def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAssembly:
     """Everything asked of the equilibrium."""
     count = len(robot.frames)
     screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "play")}
@@ -418,32 +242,29 @@ def _read(model: Model, robot: Robot, tree: _Tree, started: float) -> MultibodyA
     for kind, parts in kinds:
         for name, part in parts.items():
             row = robot.index(name)
-            relative = inverse(model.pose(part.near)) @ model.pose(part.far)
-            screws[kind][row] = logarithm(relative)
+            screws[kind][row] = screw_between(model, part)
             if kind in wrenches and isinstance(part, Elastic):
-                wrenches[kind][row] = model.wrench(part)
-    transforms = np.array([model.pose(tree.before[f.name]) for f in robot.frames])
+                wrenches[kind][row] = wrench(model, part)
+    transforms = np.array([pose(model, tree.before[f.name]) for f in robot.frames])
     T = transforms[robot.index(robot.platform)]
     turn = turn_of(T[:3, :3] @ tree.platform[:3, :3].T)
     origin = tree.platform[:3, 3]
+    closings = [closure_wrench(model, c, origin) for c in tree.closures]
+    springs = (*tree.links.values(), *tree.joints.values())
     return MultibodyAssembly(
         platform_screw=np.concatenate([turn, T[:3, 3] - origin]),
-        energy=sum(
-            model.energy(p) for p in (*tree.links.values(), *tree.joints.values())
-        ),
+        energy=sum(energy(model, part) for part in springs),
         link_screws=screws["link"],
         link_wrenches=wrenches["link"],
         joint_screws=screws["joint"],
         joint_wrenches=wrenches["joint"],
         clearance_screws=screws["play"],
-        closure_wrenches=np.reshape(
-            [model.closure_wrench(c, origin) for c in tree.closures], (-1, 6)
-        ),
+        closure_wrenches=np.reshape(closings, (-1, 6)),
         transforms=transforms,
-        gap=model.largest_gap(tree.closures),
-        idle_energy=sum(model.energy(part) for part in tree.idle.values()),
-        contact_energy=sum(map(model.contact_energy, tree.contacts.values())),
-        seconds=time.perf_counter() - started,
+        gap=largest_gap(model, tree.closures),
+        idle_energy=sum(energy(model, part) for part in tree.idle.values()),
+        contact_energy=sum(contact_energy(model, c) for c in tree.contacts.values()),
+        seconds=time.monotonic() - started,
     )
 
 
