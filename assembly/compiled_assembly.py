@@ -244,7 +244,7 @@ def _minimise(
         size = max(size, np.sqrt(here))
     G, right = Gt / size, h / size
     absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * np.sum(right * right)
-    road = _small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
+    road = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
     for i in range(r):
         v[i] = h[i]
         y[i] *= size
@@ -254,7 +254,7 @@ def _minimise(
 
 
 @njit(cache=True, error_model="numpy")
-def _small_answer(
+def small_answer(
     Gt: NDArray, h: NDArray, starts: NDArray, relative: float, absolute: float,
     u: NDArray, y: NDArray,
 ) -> int:  # fmt: skip

@@ -29,6 +29,7 @@ OWNERS = {
         "assembly/dual_newton.py",
         "assembly/compiled_assembly.py",
         "assembly/compiled_draws.py",
+        "assembly/compiled_draws.py",
         "assembly/compiled_reduction.py",
         "assembly/compiled_zone.py",
         "assembly/householder.py",
