@@ -138,7 +138,7 @@ class OnePosture:
         return answer
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
-        """(k, n, 6) [N m, N] through every frame, as :class:`~assembly.energy.Assembly`."""
+        """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
         return np.tensordot(multipliers, self.wrench, axes=(1, 2))
 
     def _solve_slowly(self, errors: NDArray, answer: Draws) -> None:
