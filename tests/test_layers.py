@@ -29,7 +29,6 @@ OWNERS = {
         "assembly/dual_newton.py",
         "assembly/compiled_assembly.py",
         "assembly/compiled_draws.py",
-        "assembly/compiled_draws.py",
         "assembly/compiled_reduction.py",
         "assembly/compiled_zone.py",
         "assembly/householder.py",
