@@ -19,8 +19,9 @@ w       ``joint_wrenches``    (R,6n)       through every joint
 ======  ====================  ===========  ===========================================
 """
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,6 +162,26 @@ class FlexibleAssembly:
     solved: NDArray
 
 
+def in_groups(postures: Posture) -> tuple[Posture, NDArray]:
+    """Distinct postures among many.
+
+    Args:
+        postures: R of them, in one.
+
+    Returns:
+        c distinct ones, and (R,) which of them each row has.
+    """
+    _, first, which = np.unique(
+        postures.coordinates, axis=0, return_index=True, return_inverse=True
+    )
+    distinct = replace(
+        postures,
+        coordinates=postures.coordinates[first],
+        transforms=postures.transforms[first],
+    )
+    return distinct, which.reshape(-1)
+
+
 def flexibility(postures: Posture) -> Flexibility:
     """Factorise the closures of a robot without play.
 
@@ -174,6 +195,34 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has play.
     """
     robot = postures.robot
+    bodies, joints = link_compliances(robot), joint_compliances(robot)
+    digest = blake2b(repr((robot.closures, robot.platform)).encode())
+    for numbers in (
+        robot.parents,
+        bodies,
+        joints,
+        clearance_bounds(robot),
+        postures.transforms,
+    ):
+        digest.update(np.ascontiguousarray(numbers))
+    return _factorise(_Case(digest.digest(), postures, bodies, joints))
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Robots that differ in errors and loads alone share one factorisation."""
+
+    digest: bytes
+    postures: Posture = field(compare=False)
+    bodies: NDArray = field(compare=False)
+    joints: NDArray = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _factorise(case: _Case) -> Flexibility:
+    """The system of every posture, and its inverse."""
+    postures, C_body, C_joint = case.postures, case.bodies, case.joints
+    robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:
         raise ValueError(f"{robot.name} has play, which is not linear")
@@ -185,7 +234,6 @@ def flexibility(postures: Posture) -> Flexibility:
     J = J.reshape(count, 6 * len(robot.closures), 6 * n)
     on_path = robot.on_path[robot.index(robot.platform)]
     P = np.einsum("n,cnij->cinj", on_path, paths).reshape(count, 6, 6 * n)
-    C_body, C_joint = link_compliances(robot), joint_compliances(robot)
     through = np.einsum("cknj,nij->ckni", J.reshape(count, -1, n, 6), C_body + C_joint)
     S = np.einsum("cki,cli->ckl", through.reshape(J.shape), J)
     softness = float(np.abs(S).max(initial=0.0)) or 1.0

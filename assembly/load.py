@@ -116,6 +116,23 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
+def row_forces(postures: Posture, load: NDArray, gravity: NDArray) -> Forces:
+    """Forces of load and weight in many situations.
+
+    Args:
+        postures: R of them, in one.
+        load: (R, 6) [N m, N] on the platform at its origin, base axes.
+        gravity: (R, 3) [m/s^2] base axes.
+
+    Returns:
+        Forces (R, 6n) on all small screws.
+    """
+    bodies = carried = None
+    if gravity.any():
+        bodies, carried = weights(postures, gravity)
+    return forces_on(postures, load, bodies, carried)
+
+
 def _at(arm: NDArray, force: NDArray) -> NDArray:
     """(..., 6) ``[arm x f, f]`` of a force (..., 3) that acts at (..., 3)."""
     return np.concatenate([np.cross(arm, force), force], axis=-1)

@@ -21,7 +21,8 @@ from assembly.effects.places import in_series, own_screw
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.flexibility import flexibility
-from assembly.load import Forces, forces_on, weights
+from assembly.load import row_forces
+from assembly.play import taken_up
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from stiffness.screws import rotation_matrix, rotation_vector
@@ -37,10 +38,12 @@ class Prediction:
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without an answer.
         reason: (R,) why there is none, else empty.
+        open: (R,) bool, play leaves the pose free: the one shown has it in the middle.
     """
 
     deviation: NDArray
     reason: NDArray
+    open: NDArray
 
 
 def predict(here: Conditions) -> Prediction:
@@ -55,7 +58,12 @@ def predict(here: Conditions) -> Prediction:
     screws = np.full((len(here), 6), np.nan)
     reason = np.full(len(here), "", dtype=object)
     left = np.ones(len(here), dtype=bool)
-    if not here.exact and not virtual_joints(here.robot).cones.shape[1]:
+    open_ = np.zeros(len(here), dtype=bool)
+    play = bool(virtual_joints(here.robot).cones.shape[1])
+    if play and not here.robot.closures and not here.exact:
+        here, open_ = taken_up(here)
+        play = False
+    if not here.exact and not play:
         screws, solved = _without_play(here)
         left = ~solved
     for row in np.flatnonzero(left).tolist():
@@ -63,7 +71,7 @@ def predict(here: Conditions) -> Prediction:
             screws[row] = assemble_row(here, row).platform_screw
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
-    return Prediction(read(here, screws), reason)
+    return Prediction(read(here, screws), reason, open_)
 
 
 def read(here: Conditions, screws: NDArray) -> NDArray:
@@ -159,18 +167,9 @@ def _deflection(law: ContactLaw, load: float) -> float:
 
 def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
     """(R, 6) platform screws of a robot without play, (R,) where they are solved."""
-    _, first, which = np.unique(
-        here.transforms.reshape(len(here), -1), axis=0,
-        return_index=True, return_inverse=True,
-    )  # fmt: skip
-    postures = here.postures
-    distinct = replace(
-        postures,
-        coordinates=postures.coordinates[first],
-        transforms=postures.transforms[first],
-    )
+    distinct, which = in_groups(here.postures)
     flexible = flexibility(distinct)
-    forces = row_forces(here)
+    forces = row_forces(here.postures, here.load_at_origin(), here.gravity)
     errors = here.errors.reshape(len(here), -1)
     answer = flexible.solve(which, errors, forces)
     screws = answer.platform_screw
@@ -183,15 +182,6 @@ def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
         screws = screws + np.einsum("rij,rj->ri", reach, give)
         return screws, answer.solved & settled
     return screws, answer.solved
-
-
-def row_forces(here: Conditions) -> Forces:
-    """Forces of load and weight on every small screw, (R, 6n)."""
-    postures = here.postures
-    bodies = carried = None
-    if here.gravity.any():
-        bodies, carried = weights(postures, here.gravity)
-    return forces_on(postures, here.load_at_origin(), bodies, carried)
 
 
 def _law_columns(here: Conditions) -> NDArray:

@@ -11,6 +11,8 @@ from stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 
+_SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)  # time constants, in durations of the campaign
+
 
 def _apply(here: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
@@ -32,7 +34,7 @@ DRIFT = Effect(
     frames=None,
     unknowns=lambda robot: (
         *(Unknown(name, 1e-5) for name in _AMPLITUDE),
-        Unknown("time_constant", 1000.0, 1.0, 1e9, 1000.0),
+        Unknown("time_constant", 1000.0, 1.0, 1e9, scan=_SCAN, scan_by="time"),
     ),
     needs=("time",),
     linear=False,

@@ -20,6 +20,8 @@ class Unknown:
         lower: bound below which it makes no sense.
         upper: bound above which it makes no sense.
         start: where a fit begins and its first derivative is taken.
+        scan: values at which a search looks first, where the model is far from linear.
+        scan_by: a covariate whose range multiplies ``scan``, if any.
     """
 
     name: str
@@ -27,6 +29,8 @@ class Unknown:
     lower: float = float("-inf")
     upper: float = float("inf")
     start: float = 0.0
+    scan: tuple[float, ...] = ()
+    scan_by: str = ""
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""From measured deviations to the effect that a declared model lacks."""

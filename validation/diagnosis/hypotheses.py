@@ -1,0 +1,172 @@
+"""Hypotheses: an effect of the library, at certain frames, with certain unknowns.
+
+An effect may act at one frame, at each frame with a number of its own, or at several
+that share one number (all of them, or those of one kind: ``leg1.rod``, ``leg2.rod``).
+Each of these is a hypothesis of its own, with as many unknowns as it has slots.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.conditions import Conditions
+from assembly.effects import LIBRARY
+from assembly.effects.effect import Effect, Unknown, at
+from assembly.robot import Robot
+
+_FEWEST_LEVELS = 2  # values of a covariate without which nothing depends on it
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One number to be fitted; several unknowns of an effect may share it.
+
+    Attributes:
+        names: of the unknowns it sets.
+        unknown: their scale and bounds.
+        start: where a fit begins.
+        shape: whether the model is far from linear in it, so that screening holds it.
+    """
+
+    names: tuple[str, ...]
+    unknown: Unknown
+    start: float
+    shape: bool = False
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect, where it acts, and the numbers that describe it.
+
+    Attributes:
+        effect: its name.
+        where: frames at which it acts, none for effects of the whole.
+        slots: what is fitted.
+    """
+
+    effect: str
+    where: tuple[str, ...]
+    slots: tuple[Slot, ...]
+
+    def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
+        """Parameters by their public names.
+
+        Args:
+            robot: that of the campaign.
+            x: a value for each slot.
+
+        Returns:
+            Values in SI units.
+        """
+        values = {
+            name: float(value)
+            for slot, value in zip(self.slots, x, strict=True)
+            for name in slot.names
+        }
+        return LIBRARY[self.effect].public(robot, values)
+
+    @property
+    def start(self) -> NDArray:
+        """(k,) where a fit begins."""
+        return np.array([slot.start for slot in self.slots])
+
+    @property
+    def bounds(self) -> tuple[NDArray, NDArray]:
+        """(k,) lower and (k,) upper bounds."""
+        return (
+            np.array([slot.unknown.lower for slot in self.slots]),
+            np.array([slot.unknown.upper for slot in self.slots]),
+        )
+
+
+def hypotheses(here: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
+    """All hypotheses that conditions can tell anything about.
+
+    Args:
+        here: the conditions of a campaign, as declared.
+        loads: components of the load that the campaign records, such as ``["fx"]``.
+
+    Returns:
+        Hypotheses, effect by effect in the library's order.
+    """
+    return [h for effect in LIBRARY.values() for h in _of(effect, here, loads)]
+
+
+def _of(effect: Effect, here: Conditions, loads: Sequence[str]) -> Iterator[Hypothesis]:
+    """Hypotheses of one effect."""
+    for covariate in effect.needs:
+        values = getattr(here, covariate)
+        if not np.isfinite(values).all() or not np.any(values):
+            return
+    unknowns = effect.unknowns(here.robot)
+    if effect.frames is None:
+        for chosen in _choices(effect, unknowns, loads):
+            yield from _scanned(effect, (), [((u.name,), u) for u in chosen], here)
+        return
+    places = effect.frames(here.robot)
+    for groups in _groupings(places):
+        slots = [
+            (tuple(at(f, u.name) for f in group), u)
+            for group in groups
+            for u in unknowns
+            if not u.scan
+        ]
+        where = tuple(f for group in groups for f in group)
+        slots += [(tuple(at(f, u.name) for f in where), u) for u in unknowns if u.scan]
+        yield from _scanned(effect, where, slots, here)
+
+
+def _choices(
+    effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
+) -> Iterator[list[Unknown]]:
+    """Subsets of the unknowns of an effect of the whole, the whole set first."""
+    if effect.name == "load_gain":
+        # an offset in a direction never loaded belongs to another story
+        kept = {"factor", *(f"offset.{name}" for name in loads)}
+        unknowns = tuple(u for u in unknowns if u.name in kept)
+    yield list(unknowns)
+    parts = {u.name.partition(".")[0] for u in unknowns}
+    if len(parts) > 1 and not any(u.scan for u in unknowns):
+        for part in sorted(parts):
+            yield [u for u in unknowns if u.name.partition(".")[0] == part]
+    if effect.name in {"base_compliance", "self_weight"}:
+        for u in unknowns:
+            yield [u]
+
+
+def _groupings(places: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], ...]]:
+    """Ways in which frames share numbers: own each, one for all, by kind, one alone."""
+    if not places:
+        return
+    kinds: dict[str, list[str]] = {}
+    for name in places:
+        kinds.setdefault(name.rpartition(".")[2], []).append(name)
+    ways: list[tuple[tuple[str, ...], ...]] = [tuple((p,) for p in places)]
+    ways.append((places,))
+    ways.append(tuple(tuple(names) for names in kinds.values()))
+    ways += [(tuple(names),) for names in kinds.values()]
+    ways += [((p,),) for p in places]
+    yield from dict.fromkeys(ways)
+
+
+def _scanned(
+    effect: Effect, where: tuple[str, ...],
+    slots: list[tuple[tuple[str, ...], Unknown]], here: Conditions,
+) -> Iterator[Hypothesis]:  # fmt: skip
+    """One hypothesis, or one for each value at which a shape is looked at."""
+    scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
+    by = next((u.scan_by for _, u in slots if u.scan_by), "")
+    size = float(np.ptp(getattr(here, by))) if by else 1.0
+    if size == 0.0:
+        return
+    for value in scan:
+        yield Hypothesis(
+            effect.name,
+            where,
+            tuple(
+                Slot(names, u, value * size if u.scan else u.start, bool(u.scan))
+                for names, u in slots
+            ),
+        )

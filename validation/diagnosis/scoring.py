@@ -1,0 +1,199 @@
+"""Which effects explain a residual: every small set of hypotheses, scored.
+
+The score of a set S of hypotheses with k unknowns is the extended Bayesian information
+criterion, in logarithms of probability,
+
+    -RSS/2 - (k/2) ln n - ln C(m, |S|) - sum of ln(ways in which each effect may act),
+
+and an effect's probability is the posterior weight of all sets that have it.  Unknowns
+stay within their bounds: a negative compliance explains nothing.
+
+Sources:
+    Chen, Chen (2008), Extended Bayesian information criteria for model selection with
+    large model spaces, Biometrika 95, 759.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.diagnosis.signatures import Signature
+
+_KEPT = 40  # sets of each size that are enlarged
+_RANK = 1e-9  # relative eigenvalue below which columns are one
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A set of hypotheses with its fit.
+
+    Attributes:
+        members: rows of the signatures, ascending.
+        values: the fitted unknowns, one after the other.
+        rss: [-] squared whitened residual left.
+        rank: number of unknowns that the readings can tell apart.
+        score: logarithm of the posterior weight, up to a constant.
+    """
+
+    members: tuple[int, ...]
+    values: NDArray
+    rss: float
+    rank: int
+    score: float
+
+
+class Screen:
+    """Signatures and residual as inner products, from which any set is fitted."""
+
+    def __init__(self, residual: NDArray, signatures: Sequence[Signature]) -> None:
+        """Take inner products.
+
+        Args:
+            residual: (N,) whitened, nuisances projected out.
+            signatures: the hypotheses, nuisances projected out.
+        """
+        self.signatures = list(signatures)
+        self.count = len(residual)
+        self._slices, blocks, at = [], [], 0
+        for s in signatures:
+            # the offset is a column that always has the factor one
+            blocks += [s.columns, s.offset[:, None]]
+            k = s.columns.shape[1]
+            self._slices.append((at, at + k))
+            at += k + 1
+        full = np.column_stack([*blocks, residual])
+        self._gram = full.T @ full
+        self._bounds = [s.hypothesis.bounds for s in signatures]
+        self.effects = [s.hypothesis.effect for s in signatures]
+        ways = Counter(self.effects)
+        self._ways = [math.log(ways[e]) for e in self.effects]
+        self._m = len(ways)
+
+    def fit(self, members: Sequence[int]) -> Scored:
+        """Fit a set of hypotheses, unknowns within their bounds.
+
+        Args:
+            members: rows of the signatures, of different effects.
+
+        Returns:
+            The set with its score.
+        """
+        members = tuple(sorted(members))
+        columns: list[int] = []
+        fixed = np.zeros(len(self._gram))
+        fixed[-1] = 1.0
+        for i in members:
+            a, b = self._slices[i]
+            columns += range(a, b)
+            fixed[b] -= 1.0
+        G = self._gram[np.ix_(columns, columns)]
+        b = self._gram[columns] @ fixed
+        rest = float(fixed @ self._gram @ fixed)
+        empty = np.zeros(0)
+        lower = np.concatenate([empty, *(self._bounds[i][0] for i in members)])
+        upper = np.concatenate([empty, *(self._bounds[i][1] for i in members)])
+        x, rank = _within(G, b, lower, upper)
+        rss = max(0.0, rest - 2 * float(b @ x) + float(x @ G @ x))
+        shapes = sum(s.shape for i in members for s in self._slots(i))
+        return Scored(
+            members, x, rss, rank + shapes, self._score(members, rss, rank + shapes)
+        )
+
+    def _slots(self, i: int) -> tuple:
+        return self.signatures[i].hypothesis.slots
+
+    def _score(self, members: tuple[int, ...], rss: float, k: int) -> float:
+        ways = sum(self._ways[i] for i in members)
+        several = math.log(math.comb(self._m, len(members)))
+        return -rss / 2 - k / 2 * math.log(self.count) - several - ways
+
+    def rescored(self, one: Scored, rss: float, values: NDArray) -> Scored:
+        """A set with the squared residual of another, better fit."""
+        score = self._score(one.members, rss, one.rank)
+        return Scored(one.members, values, rss, one.rank, score)
+
+    def search(self, largest: int = 3) -> list[Scored]:
+        """Fit the sets worth fitting.
+
+        All single hypotheses and all pairs; of larger sets, the best of each size with
+        one more member.
+
+        Args:
+            largest: number of effects in a set at most.
+
+        Returns:
+            Sets, best score first.
+        """
+        found = {(): self.fit(())}
+        for i in range(len(self.signatures)):
+            found[(i,)] = self.fit((i,))
+        for i, j in combinations(range(len(self.signatures)), 2):
+            if self.effects[i] != self.effects[j]:
+                found[(i, j)] = self.fit((i, j))
+        for size in range(3, largest + 1):
+            best = [s for s in found.values() if len(s.members) == size - 1]
+            best.sort(key=lambda s: -s.score)
+            for one in best[:_KEPT]:
+                have = {self.effects[i] for i in one.members}
+                for j in range(len(self.signatures)):
+                    members = tuple(sorted((*one.members, j)))
+                    if self.effects[j] not in have and members not in found:
+                        found[members] = self.fit(members)
+        return sorted(found.values(), key=lambda s: -s.score)
+
+
+def _within(
+    G: NDArray, b: NDArray, lower: NDArray, upper: NDArray
+) -> tuple[NDArray, int]:
+    """Least squares from normal equations; unknowns that leave their bounds are held.
+
+    Returns:
+        (k,) unknowns, and how many the equations can tell apart.
+    """
+    held: dict[int, float] = {}
+    count = len(b)
+    while True:
+        free = [i for i in range(count) if i not in held]
+        x = np.zeros(count)
+        for i, value in held.items():
+            x[i] = value
+        rank = 0
+        if free:
+            right = b[free] - G[np.ix_(free, list(held))] @ x[list(held)]
+            x[free], rank = _solve(G[np.ix_(free, free)], right)
+        out = [i for i in free if not lower[i] <= x[i] <= upper[i]]
+        if not out:
+            return x, rank + len(held)
+        for i in out:
+            held[i] = lower[i] if x[i] < lower[i] else upper[i]
+
+
+def _solve(G: NDArray, b: NDArray) -> tuple[NDArray, int]:
+    """Least norm solution of scaled normal equations, and their rank."""
+    size = np.sqrt(np.diag(G))
+    size[size == 0] = 1.0
+    values, vectors = np.linalg.eigh(G / np.outer(size, size))
+    kept = values > _RANK * max(values[-1], 1e-300)
+    y = vectors[:, kept].T @ (b / size) / values[kept]
+    return vectors[:, kept] @ y / size, int(kept.sum())
+
+
+def posterior(sets: Sequence[Scored]) -> NDArray:
+    """(len(sets),) probabilities from scores."""
+    scores = np.array([s.score for s in sets])
+    weights = np.exp(scores - scores.max())
+    return weights / weights.sum()
+
+
+def inclusion(screen: Screen, sets: Sequence[Scored]) -> dict[str, float]:
+    """Probability of every effect: the weight of all sets that have it."""
+    found = dict.fromkeys(screen.effects, 0.0)
+    for one, weight in zip(sets, posterior(sets), strict=True):
+        for i in one.members:
+            found[screen.effects[i]] += float(weight)
+    return found
