@@ -20,7 +20,7 @@ from assembly.conic import SolverFailed
 from assembly.effects.places import in_series, own_screw
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
-from assembly.flexibility import flexibility
+from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
 from assembly.play import taken_up
 from assembly.posture import Posture
