@@ -4,6 +4,8 @@ Applied in the order of :data:`LIBRARY`: friction acts on a joint's spring, so d
 become elastic first; the foundation adds a frame, so it comes last.
 """
 
+from collections.abc import Mapping
+
 from assembly.conditions import Conditions
 from assembly.effects.base_compliance import BASE_COMPLIANCE
 from assembly.effects.contact_stiffening import CONTACT_STIFFENING
@@ -44,7 +46,7 @@ LIBRARY: dict[str, Effect] = {
 }
 
 
-def apply_effects(here: Conditions, effects: dict[str, Values]) -> Conditions:
+def apply_effects(here: Conditions, effects: Mapping[str, Values]) -> Conditions:
     """Conditions with effects added.
 
     Args:

@@ -50,7 +50,8 @@ CONTACT_STIFFENING = Effect(
     unit=_unit,
     frames=drives,
     unknowns=lambda robot: (
-        Unknown("give", 1e-6, 0.0, 1.0), Unknown("exponent", 0.5, 1.05, 6.0, scan=(1.5, 2.0, 3.0)),
+        Unknown("give", 1e-6, 0.0, 1.0),
+        Unknown("exponent", 0.5, 1.05, 6.0, scan=(1.5, 2.0, 3.0)),
     ),
     public=_public,
     linear=False,

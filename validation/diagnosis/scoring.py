@@ -22,6 +22,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.signatures import Signature
 
 _KEPT = 40  # sets of each size that are enlarged
@@ -104,7 +105,7 @@ class Screen:
             members, x, rss, rank + shapes, self._score(members, rss, rank + shapes)
         )
 
-    def _slots(self, i: int) -> tuple:
+    def _slots(self, i: int) -> tuple[Slot, ...]:
         return self.signatures[i].hypothesis.slots
 
     def _score(self, members: tuple[int, ...], rss: float, k: int) -> float:
@@ -129,7 +130,7 @@ class Screen:
         Returns:
             Sets, best score first.
         """
-        found = {(): self.fit(())}
+        found: dict[tuple[int, ...], Scored] = {(): self.fit(())}
         for i in range(len(self.signatures)):
             found[(i,)] = self.fit((i,))
         for i, j in combinations(range(len(self.signatures)), 2):
