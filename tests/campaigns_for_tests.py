@@ -1,4 +1,9 @@
-"""Campaign folders the tests share."""
+"""Campaigns the tests share: folders, and readings in memory."""
+
+import numpy as np
+
+from assembly.robot import Frame, Robot
+from validation.campaign import Campaign
 
 ARM = """
 name = "arm"
@@ -49,3 +54,27 @@ def write_campaign(folder, head=HEAD, rows=ROWS, robot=ARM, toml=None, noise=NOI
     text = "".join(f"{k} = {v}\n" for k, v in keys.items() if v is not None)
     (folder / "campaign.toml").write_text(text + noise + extra)
     return folder
+
+
+def campaign_of(measured, sigma=1.0, repeat=None, loads=None, **covariates):
+    """A campaign of readings (R, 6); rows of one ``repeat`` share a configuration."""
+    rows = len(measured)
+    robot = Robot("post", "top", (Frame("top", translation=[0, 0, 1.0]),))
+    repeat = np.arange(rows) if repeat is None else np.asarray(repeat)
+    return Campaign(
+        name="made up",
+        robot=robot,
+        ids=tuple(f"m{i}" for i in range(rows)),
+        coordinates=np.zeros((rows, 1)),
+        transforms=np.broadcast_to(robot.fixed_transforms, (rows, 1, 4, 4)),
+        mismatch=np.zeros(rows),
+        commanded="joints",
+        loads=np.zeros((rows, 6)) if loads is None else loads,
+        measured=measured,
+        sigma=np.broadcast_to(sigma, (rows, 6)),
+        covariates=covariates,
+        reference_point=np.zeros(3),
+        registration="known",
+        configuration=repeat,
+        repeat=repeat,
+    )
