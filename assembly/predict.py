@@ -22,7 +22,7 @@ from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
-from assembly.play import taken_up
+from assembly.resting_play import taken_up
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from stiffness.screws import rotation_matrix, rotation_vector

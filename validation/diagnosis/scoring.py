@@ -26,6 +26,7 @@ from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.signatures import Signature
 
 _KEPT = 40  # sets of each size that are enlarged
+_APART = 1e-3  # sine of the angle between a column and those before it
 _RANK = 1e-9  # relative eigenvalue below which columns are one
 
 
@@ -178,7 +179,14 @@ def _solve(G: NDArray, b: NDArray) -> tuple[NDArray, int]:
     """Least norm solution of scaled normal equations, and their rank."""
     size = np.sqrt(np.diag(G))
     size[size == 0] = 1.0
-    values, vectors = np.linalg.eigh(G / np.outer(size, size))
+    scaled = G / np.outer(size, size)
+    try:
+        # cheap where the columns are clearly apart, which they almost always are
+        if np.diag(np.linalg.cholesky(scaled)).min() > _APART:
+            return np.linalg.solve(scaled, b / size) / size, len(b)
+    except np.linalg.LinAlgError:
+        pass
+    values, vectors = np.linalg.eigh(scaled)
     kept = values > _RANK * max(values[-1], 1e-300)
     y = vectors[:, kept].T @ (b / size) / values[kept]
     return vectors[:, kept] @ y / size, int(kept.sum())

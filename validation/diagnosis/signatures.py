@@ -9,17 +9,20 @@ o       ``offset``     (N,)       change of the model that no unknown scales
 ======  =============  =========  ================================================
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.conditions import Conditions, as_declared
-from assembly.effects import apply_effects
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.effect import Values
+from assembly.resting_play import taken_up
 from assembly.posture import Posture
 from assembly.predict import predict
 from validation.campaign import LOAD, Campaign
-from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.hypotheses import Hypothesis, Slot
 
 _STEP = 1e-3  # of an unknown's plausible size, for its first derivative
 
@@ -77,41 +80,104 @@ def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
     return deviation[cells] / campaign.sigma[cells]
 
 
-def signature(
-    campaign: Campaign, here: Conditions, declared: NDArray, hypothesis: Hypothesis,
-    x: NDArray | None = None,
-) -> Signature | None:  # fmt: skip
-    """A hypothesis to first order about some values of its unknowns.
+class Tangents:
+    """First derivatives of a campaign's readings in every unknown of every effect.
 
-    Args:
+    Attributes:
         campaign: of R rows, N measured cells.
-        here: its conditions as declared.
+        here: its conditions as declared, with the registration if that was fitted.
         declared: (N,) what they predict, whitened.
-        hypothesis: which.
-        x: (k,) where the tangent is taken; the hypothesis's start if absent.
-
-    Returns:
-        The tangent, None if the model has no answer there.
+        residual: (N,) whitened readings minus that.
     """
-    x = hypothesis.start if x is None else np.asarray(x, dtype=float)
-    robot = here.robot
 
-    def model(values: NDArray) -> NDArray:
-        effects = {hypothesis.effect: hypothesis.public(robot, values)}
-        return whiten(campaign, predict(apply_effects(here, effects)).deviation)
+    def __init__(self, campaign: Campaign, here: Conditions) -> None:
+        """Predict what the declared model reads.
 
-    middle = model(x)
-    if not np.isfinite(middle).all():
-        return None
-    columns = np.zeros((len(middle), len(x)))
-    for k, slot in enumerate(hypothesis.slots):
-        if slot.shape:
-            continue
-        step = _STEP * slot.unknown.scale
-        there = x.copy()
-        there[k] += step
-        columns[:, k] = (model(there) - middle) / step
-        if not np.isfinite(columns[:, k]).all():
-            return None
-    tangent = np.where([s.shape for s in hypothesis.slots], 0.0, x)
-    return Signature(hypothesis, middle - declared - columns @ tangent, columns)
+        Args:
+            campaign: what was measured.
+            here: under which conditions.
+        """
+        self.campaign, self.here = campaign, here
+        prediction = predict(here)
+        self.declared = whiten(campaign, prediction.deviation)
+        self.residual = whiten(campaign, campaign.measured) - self.declared
+        self._columns: dict[object, NDArray] = {}
+
+    def model(self, effects: Mapping[str, Values]) -> NDArray:
+        """What is read with effects, to first order in play.
+
+        Args:
+            effects: parameters by their public names, by effect.
+
+        Returns:
+            (N,) whitened; NaN where the model has no answer.
+        """
+        there = apply_effects(self.here, effects)
+        if "joint_clearance" in effects and not there.exact:
+            there, _ = taken_up(there)
+        return whiten(self.campaign, predict(there).deviation)
+
+    def at_start(self, hypothesis: Hypothesis) -> Signature:
+        """A hypothesis to first order where it begins to differ from what is declared.
+
+        Args:
+            hypothesis: which.
+
+        Returns:
+            The tangent; NaN where the model has no answer there.
+        """
+        if not hypothesis.slots:
+            there = self.model({hypothesis.effect: {}})
+            return Signature(hypothesis, there - self.declared, np.zeros((len(there), 0)))
+        shapes = {
+            name: slot.start for slot in hypothesis.slots if slot.shape
+            for name in slot.names
+        }  # fmt: skip
+        columns = np.zeros((len(self.declared), len(hypothesis.slots)))
+        for k, slot in enumerate(hypothesis.slots):
+            if not slot.shape:
+                for name in slot.names:
+                    columns[:, k] += self._column(hypothesis.effect, name, slot, shapes)
+        begin = np.where([s.shape for s in hypothesis.slots], 0.0, hypothesis.start)
+        return Signature(hypothesis, -columns @ begin, columns)
+
+    def _column(
+        self, effect: str, name: str, slot: Slot, shapes: dict[str, float]
+    ) -> NDArray:
+        """(N,) derivative in one unknown of one effect, where the effect begins."""
+        key = (effect, name, tuple(sorted(set(shapes.values()))))
+        if key not in self._columns:
+            step = _STEP * slot.unknown.scale
+            values = {**shapes, name: slot.unknown.start + step}
+            public = LIBRARY[effect].public(self.here.robot, values)
+            self._columns[key] = (self.model({effect: public}) - self.declared) / step
+        return self._columns[key]
+
+    def about(
+        self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
+    ) -> Signature:
+        """A hypothesis to first order about fitted values, other effects beside it.
+
+        Args:
+            hypothesis: which.
+            x: (k,) values of its unknowns.
+            others: parameters of other effects that act too.
+
+        Returns:
+            The tangent.
+        """
+        robot = self.here.robot
+
+        def model(values: NDArray) -> NDArray:
+            own = {hypothesis.effect: hypothesis.public(robot, values)}
+            return self.model({**others, **own})
+
+        middle = model(x)
+        without = self.model(others) if others else self.declared
+        columns = np.zeros((len(middle), len(x)))
+        for k, slot in enumerate(hypothesis.slots):
+            there = x.copy()
+            step = _STEP * max(slot.unknown.scale, abs(x[k]))
+            there[k] += step if there[k] + step <= slot.unknown.upper else -step
+            columns[:, k] = (model(there) - middle) / (there[k] - x[k])
+        return Signature(hypothesis, middle - without - columns @ x, columns)
