@@ -248,7 +248,9 @@ def sweep(
     from assembly.plot import map_figure
     from assembly.pose_error import READINGS
     from assembly.robots import load_robot
-    from assembly.sweep import parse_grid, save_dataset, sweep_poses
+    from assembly.dataset import save_dataset
+    from assembly.sweep import sweep_poses
+    from assembly.targets import parse_grid
 
     machine, axes = load_robot(robot), parse_grid(grid)
     if reading not in (*READINGS, "none"):

@@ -155,10 +155,8 @@ def _rank(A: NDArray) -> int:
 
 
 def _matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Closures (k, 6 c, m), drives and platform (k, m, a + 6), platform (k, m, 6).
-
-    Columns and rows of the m mobile joints, scaled, read at the platform's origin.
-    """
+    """Closures (k, 6 c, m), drives and platform (k, m, a + 6), platform (k, m, 6)."""
+    # of the m mobile joints, scaled, read at the platform's origin
     size = size_of(robot)
     i = robot.index(robot.platform)
     screws = motion_screws(robot, T)

@@ -1,258 +1,273 @@
-"""Margin, energy and platform error over a grid of postures, as a labelled data set."""
+"""Many postures, many draws of errors, many designs: one question, a data set.
+
+A sweep's points are its designs x postures x draws, draws innermost, cut into blocks
+that are solved, journalled and written one after the other, in any order and by
+anyone: no number depends on who solved it or what was solved before.
+"""
 
 import hashlib
 import json
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
-from assembly.batch import minimise_energies, zone_margins
-from assembly.conic import SolverFailed
-from assembly.energy import solve_assembly
-from assembly.pose_error import bound_pose_error
-from assembly.posture import POSE, Posture, place_many
-from assembly.robot import Robot
-from assembly.robot_file import frame_table
+from assembly.dataset import sweep_dataset, write_sweep
+from assembly.journal import open_journal
+from assembly.parameters import unit_of
+from assembly.points import Found, Points, solve_points
+from assembly.quantities import TEXTS, Question, record_type
+from assembly.robot import LibraryLink, MeshLink, Robot
+from assembly.robot_file import robot_table
+from assembly.targets import LARGEST_GRID, Targets, grid_targets, unit_of_target
 from assembly.zone import ASSEMBLABLE
-from stiffness.reading import BadInput, nearest
-from stiffness.screws import SCREW
+from stiffness.reading import BadInput
 
 if TYPE_CHECKING:
     import xarray
 
-_LARGEST_GRID = 10_000_000  # points; more is a slip of the step
-_CHUNK = 256  # points solved together between two reports of progress
-_POINT = {
-    "margin": "1", "margin_free": "1", "energy": "J", "closure_residual": "1",
-    "clearance_excess": "1", "duality_gap": "J",
-}  # fmt: skip
-_MEANING = {
-    "margin": "factor on all clearances at which it just assembles, compliant rigid",
-    "margin_free": "the same, compliant joints free about their own axis",
-    "energy": "least elastic energy that closes it, eq. (22)",
-    "platform_screw": "pose error at the platform's origin, base axes",
-    "rotation_error": "certified bounds of the largest rotation error, eq. (27)",
-    "translation_error": "certified bounds of the largest translation error, eq. (27)",
-    "status": "ok, out of reach, cannot assemble, or solver failed",
-}
+Progress = Callable[[int, int], None]
+# yields each block's number with what was found there, in any order
+Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, Found]]]
 
 
-def parse_grid(text: str) -> dict[str, NDArray]:
-    """Axes of a grid from text such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A question and the points at which it is asked.
+
+    Attributes:
+        question: what is asked at each point.
+        targets: the postures.
+        values: of each number that varies, in the order of ``question.varied``.
+        draws: number of draws of errors; 0 for the robot's own.
+        command: that asked for it, for provenance; empty if none did.
+        block_size: points solved and journalled together.
+    """
+
+    question: Question
+    targets: Targets
+    values: tuple[NDArray, ...] = ()
+    draws: int = 0
+    command: str = ""
+    block_size: int = 128
+
+    def __post_init__(self) -> None:
+        if self.size > LARGEST_GRID:
+            raise BadInput(
+                f"sweep: {self.size} points; expected at most {LARGEST_GRID}"
+            )
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the axes of the points."""
+        draw = ("draw",) if self.draws else ()
+        return (*self.question.varied, *self.targets.dims, *draw)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of points along each axis."""
+        draw = (self.draws,) if self.draws else ()
+        return (*(len(v) for v in self.values), *self.targets.shape, *draw)
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return int(np.prod(self.shape, dtype=float))
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return -(-self.size // self.block_size)
+
+    def points(self, block: int) -> Points:
+        """The points of a block."""
+        first = block * self.block_size
+        numbers = np.arange(first, min(first + self.block_size, self.size))
+        numbers, draws = np.divmod(numbers, max(1, self.draws))
+        count = int(np.prod(self.targets.shape))
+        designs, postures = np.divmod(numbers, count)
+        values = np.empty((len(numbers), len(self.values)))
+        if self.values:
+            shape = tuple(len(v) for v in self.values)
+            for k, places in enumerate(np.unravel_index(designs, shape)):
+                values[:, k] = self.values[k][places]
+        return Points(values, self.targets.at(postures), draws)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each number that varies and of each component of the postures."""
+        robot = self.question.robot
+        of_postures = {n: unit_of_target(n, robot) for n in self.targets.names}
+        return {path: unit_of(path) for path in self.question.varied} | of_postures
+
+    @cached_property
+    def provenance(self) -> dict[str, str | int]:
+        """Where the numbers come from, as attributes of the data set."""
+        asked = self.question
+        said: dict[str, str | int] = {
+            "robot": asked.robot.name,
+            "robot_sha256": robot_hash(asked.robot),
+            "program": f"forcefit {version('forcefit')}",
+            "reading": asked.reading or "none",
+            "near": repr(asked.near),
+        }
+        if asked.sources is not None:
+            said |= {"seed": asked.seed, "errors_sha256": _sources_hash(asked)}
+        if self.command:
+            said["command"] = self.command
+        return said
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """What must be the same for two sweeps to share a journal."""
+        asked = self.question
+        said = {k: str(v) for k, v in self.provenance.items() if k != "command"}
+        values = [*self.values, *self.targets.values]
+        return said | {
+            "points": " x ".join(
+                f"{d} {n}" for d, n in zip(self.dims, self.shape, strict=True)
+            ),
+            "values_sha256": hashlib.sha256(
+                b"".join(v.tobytes() for v in values)
+                + json.dumps(self.targets.labels).encode()
+            ).hexdigest(),
+            "asked": " ".join(map(str, record_type(asked).names or ())),
+            "wrenches": " ".join(asked.wrenches),
+            "block": str(self.block_size),
+        }
+
+
+def _sources_hash(question: Question) -> str:
+    """SHA-256 of how errors are drawn."""
+    sources = question.sources
+    arrays = {k: v for k, v in vars(sources).items() if isinstance(v, np.ndarray)}
+    said = [k.encode() + np.ascontiguousarray(v).tobytes() for k, v in arrays.items()]
+    return hashlib.sha256(b"".join(said)).hexdigest()
+
+
+def solve_here(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
+    """Solve blocks one after the other, on one thread."""
+    # small matrices: more threads take longer, and sum in another order
+    with threadpool_limits(1):
+        for block in blocks:
+            yield block, solve_points(sweep.question, sweep.points(block))
+
+
+def run_sweep(
+    sweep: Sweep,
+    path: Path | str,
+    progress: Progress = lambda done, total: None,
+    solve: Solver = solve_here,
+) -> None:
+    """Solve a sweep into a NetCDF file, going on from its journal if there is one.
+
+    The journal, ``<path>.journal``, holds every finished block from the first on; kill
+    the program when you like, the same sweep goes on from there and ends in the same
+    file, byte for byte.
 
     Args:
-        text: for each pose component ``start:stop:step`` [m or rad], or one number.
-            Both ends count when (stop - start)/step is whole within 1e-9.
-
-    Returns:
-        Values by pose component, in the order given.
+        sweep: what to solve.
+        path: of the file; it appears when it is complete, and the journal goes.
+        progress: called at the start and after each block with the number of points
+            that are in the journal, and of all.
+        solve: solves blocks: :func:`solve_here`, or :mod:`assembly.cluster`.
 
     Raises:
-        BadInput: not of that form, or far too many points.
+        BadInput: the journal is another sweep's, or a file cannot be written.
     """
-    axes: dict[str, NDArray] = {}
-    for part in text.split(","):
-        name, _, spec = (piece.strip() for piece in part.partition("="))
-        if name not in POSE:
-            hint = nearest(name, POSE)
-            raise BadInput(f'grid: unknown pose component "{name[:60]}"{hint}')
-        if name in axes:
-            raise BadInput(f'grid: "{name}" is given twice')
-        axes[name] = _axis(name, spec)
-    if np.prod([float(len(v)) for v in axes.values()]) > _LARGEST_GRID:
-        raise BadInput(f"grid: more than {_LARGEST_GRID} points; is a step too small?")
-    return axes
+    path = Path(path)
+    kind = record_type(sweep.question)
+    journal = open_journal(journal_path(path), sweep.identity, kind)
+    done = sum(_length(sweep, block) for block in journal.places)
+    progress(done, sweep.size)
+    waiting = [b for b in range(sweep.blocks) if b not in journal.places]
+    for block, found in solve(sweep, waiting):
+        journal.add(block, found.records, found.texts)
+        done += _length(sweep, block)
+        progress(done, sweep.size)
+    write_sweep(sweep, journal.read, path)
+    journal.path.unlink()
 
 
-def _axis(name: str, spec: str) -> NDArray:
-    """Values of one axis."""
-    expected = "expected START:STOP:STEP or one number"
-    try:
-        numbers = [float(piece) for piece in spec.split(":")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in {1, 3} or not np.isfinite(numbers).all():
-        raise BadInput(f'grid {name}: found "{spec[:60]}", {expected}')
-    if len(numbers) == 1:
-        return np.array(numbers)
-    start, stop, step = numbers
-    if step == 0 or (stop - start) / step < 0:
-        raise BadInput(
-            f"grid {name}: step {step:g} never leads from {start:g} to {stop:g}"
-        )
-    count = (stop - start) / step
-    if count > _LARGEST_GRID:
-        raise BadInput(f"grid {name}: {count:.3g} points; is the step too small?")
-    return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
+def journal_path(path: Path) -> Path:
+    """Where the journal of a file stands."""
+    return path.with_name(path.name + ".journal")
+
+
+def _length(sweep: Sweep, block: int) -> int:
+    """Number of points of a block."""
+    return min(sweep.block_size, sweep.size - block * sweep.block_size)
+
+
+def sweep_in_memory(
+    sweep: Sweep, progress: Progress = lambda done, total: None
+) -> "xarray.Dataset":
+    """Solve a sweep without a file.
+
+    Args:
+        sweep: what to solve.
+        progress: called after each block with the number of points done, and of all.
+
+    Returns:
+        The data set that :func:`run_sweep` would write.
+    """
+    records = np.zeros(sweep.size, record_type(sweep.question))
+    texts: dict[str, dict[int, str]] = {name: {} for name in TEXTS}
+    for block, found in solve_here(sweep, range(sweep.blocks)):
+        first = block * sweep.block_size
+        records[first : first + len(found.records)] = found.records
+        for name in TEXTS:
+            texts[name] |= {first + i: t for i, t in found.texts[name].items()}
+        progress(first + len(found.records), sweep.size)
+    return sweep_dataset(sweep, records, texts)
 
 
 def sweep_poses(
     robot: Robot,
     axes: Mapping[str, NDArray],
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = lambda done, total: None,
     reading: str | None = None,
 ) -> "xarray.Dataset":
     """Solve (21) and (22), and if asked (27), at every pose of a grid.
 
     Args:
         robot: with its errors, clearances and stiffnesses.
-        axes: values [m or rad] by pose component; components not named are free.
+        axes: values [m or rad] by pose component or ``q.<frame>``; components not named
+            are free.
+        progress: called after each block with the number of points done, and of all.
         reading: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None leaves
-            the bounds of the pose error out, which take most of the time.
-        progress: called after each point with the number done and the total.
+            the bounds of the pose error out.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
         ``platform_screw``, with a reading ``rotation_error`` and ``translation_error``
-        (lower and upper), certificates and ``status``; NaN where there is no answer,
-        and the status then says why.
-
-    Raises:
-        BadInput: the robot's closures do not hold in its home pose.
+        (lower and upper), certificates, distances to singularities and ``status``; NaN
+        where there is no answer, and the status then says why.
     """
-    shape = tuple(len(v) for v in axes.values())
-    poses = np.full((int(np.prod(shape)), 6), np.nan)
-    mesh = np.meshgrid(*axes.values(), indexing="ij")
-    for name, values in zip(axes, mesh, strict=True):
-        poses[:, POSE.index(name)] = values.ravel()
-    postures, reasons = place_many(robot, poses)
-    rows: list[dict] = []
-    for first in range(0, len(poses), _CHUNK):
-        some = postures[first : first + _CHUNK]
-        reached = [posture for posture in some if posture is not None]
-        solved = iter(_solve(robot, reached))
-        for posture, reason in zip(some, reasons[first:], strict=False):
-            unreached = {"status": "out of reach", "reason": reason}
-            row = _row(unreached if posture is None else next(solved))
-            if reading is not None:
-                row |= _pose_error(posture, reading, row)
-            rows.append(row)
-            progress(len(rows), len(poses))
-    return _dataset(robot, axes, shape, rows)
-
-
-def _pose_error(posture: Posture | None, reading: str, row: dict) -> dict:
-    """Bounds of (27) where (22) has an answer."""
-    unknown = np.full(2, np.nan)
-    row = {
-        "rotation_error": unknown, "translation_error": unknown,
-        "status": row["status"], "reason": row["reason"],
-    }  # fmt: skip
-    if posture is None or row["status"] != "ok":
-        return row
-    try:
-        found = bound_pose_error(solve_assembly(posture), reading)
-    except SolverFailed as error:
-        return row | {"status": "solver failed", "reason": str(error)}
-    return row | {
-        "rotation_error": np.array(found.rotation_error),
-        "translation_error": np.array(found.translation_error),
-    }
-
-
-def _solve(robot: Robot, postures: list[Posture]) -> list[dict]:
-    """What there is to say of each posture; one that fails stops nothing."""
-    frames = np.zeros((len(postures), len(robot.frames), 4, 4))
-    for T, posture in zip(frames, postures, strict=True):
-        T[:] = posture.transforms
-    off = np.array([posture.mismatch for posture in postures])
-    margins = {
-        key: zone_margins(robot, frames, reading, off)
-        for key, reading in (("margin", "rigid"), ("margin_free", "free"))
-    }
-    energies = minimise_energies(robot, frames, mismatch=off)
-    found = []
-    for i in range(len(postures)):
-        row: dict = {key: each.margin[i] for key, each in margins.items()}
-        failed = [each.reason[i] for each in margins.values() if each.reason[i]]
-        if failed:
-            row |= {"status": "solver failed", "reason": failed[0]}
-        elif energies.status[i] != "ok":
-            row |= {"status": energies.status[i], "reason": energies.reason[i]}
-        else:
-            row |= {
-                "energy": energies.energy[i],
-                "platform_screw": energies.platform_screw[i],
-                "closure_residual": energies.closure_residual[i],
-                "clearance_excess": energies.clearance_excess[i],
-                "duality_gap": energies.gap[i],
-            }
-        found.append(row)
-    return found
-
-
-def _row(found: dict) -> dict:
-    """A row of the data set, NaN where nothing was found."""
-    row: dict = dict.fromkeys(_POINT, np.nan)
-    row |= {"platform_screw": np.full(6, np.nan), "status": "ok", "reason": ""}
-    return row | found
-
-
-def _dataset(
-    robot: Robot, axes: Mapping[str, NDArray], shape: tuple[int, ...], rows: list[dict]
-) -> "xarray.Dataset":
-    """The data set with its units and where it came from."""
-    import xarray
-
-    dims = tuple(axes)
-    units = {name: "m" if name.startswith("t") else "rad" for name in axes}
-    data = {
-        key: (dims, np.array([r[key] for r in rows]).reshape(shape), {"units": unit})
-        for key, unit in _POINT.items()
-    }
-    screws = np.array([r["platform_screw"] for r in rows]).reshape(*shape, 6)
-    data["platform_screw"] = ((*dims, "screw"), screws, {"units": "rad, m"})
-    bounds = {"rotation_error": "rad", "translation_error": "m"}
-    for key, unit in bounds.items():
-        if key in rows[0]:
-            values = np.array([r[key] for r in rows]).reshape(*shape, 2)
-            data[key] = ((*dims, "bound"), values, {"units": unit})
-    for key in ("status", "reason"):
-        text = np.array([r[key] for r in rows], dtype=object).reshape(shape)
-        data[key] = (dims, text, {})
-    for key in _MEANING.keys() & data.keys():
-        data[key][2]["long_name"] = _MEANING[key]
-    coordinates = {k: (k, v, {"units": units[k]}) for k, v in axes.items()}
-    attributes = {
-        "robot": robot.name,
-        "robot_sha256": robot_hash(robot),
-        "program": f"forcefit {version('forcefit')}",
-    }
-    labels = {"screw": list(SCREW)}
-    if "rotation_error" in data:
-        labels["bound"] = ["lower", "upper"]
-    return xarray.Dataset(data, {**coordinates, **labels}, attributes)
+    targets = grid_targets(axes)
+    question = Question(robot, components=targets.names, reading=reading)
+    return sweep_in_memory(Sweep(question, targets), progress)
 
 
 def robot_hash(robot: Robot) -> str:
-    """SHA-256 of all that a robot file says of a robot, for provenance."""
-    said = [robot.platform, robot.closures, [frame_table(f) for f in robot.frames]]
-    return hashlib.sha256(json.dumps(said, default=str).encode()).hexdigest()
+    """SHA-256 of all that a robot file says, and of the meshes it names."""
+    from stiffness.library import read_compliance
 
-
-def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
-    """Write a data set as NetCDF, whole or not at all.
-
-    Args:
-        data: of :func:`sweep_poses`.
-        path: of the new file; it replaces an old one only once it is complete.
-
-    Raises:
-        BadInput: the file cannot be written.
-    """
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    try:
-        data.to_netcdf(part, engine="h5netcdf")
-        part.replace(path)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise BadInput(f"{path}: cannot be written: {reason}") from None
+    table = robot_table(robot)
+    table.pop("description", None)
+    digest = hashlib.sha256(json.dumps(table, default=str).encode())
+    for frame in robot.frames:
+        if isinstance(frame.link, MeshLink):
+            digest.update(Path(frame.link.surface).read_bytes())
+        if isinstance(frame.link, LibraryLink):
+            digest.update(read_compliance(frame.link.library, frame.link.key).tobytes())
+    return digest.hexdigest()
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:

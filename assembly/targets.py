@@ -48,11 +48,6 @@ class Targets:
         """Names of the axes."""
         return self.names if self.labels is None else ("posture",)
 
-    @property
-    def of_joints(self) -> bool:
-        """Whether joint coordinates are meant, not poses."""
-        return any(name.startswith(_JOINT) for name in self.names)
-
     def at(self, numbers: NDArray) -> NDArray:
         """(k, components) values of some postures, counted along the axes in order."""
         if self.labels is not None:
@@ -61,25 +56,31 @@ class Targets:
         pairs = zip(self.values, places, strict=True)
         return np.stack([v[i] for v, i in pairs], axis=1)
 
-    def goals(self, robot: Robot, rows: NDArray) -> NDArray:
-        """What :mod:`assembly.posture` is asked for.
 
-        Args:
-            robot: of n frames.
-            rows: (k, components) of :meth:`at`.
+def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
+    """What :mod:`assembly.posture` is asked for.
 
-        Returns:
-            (k, 6) poses, NaN where free; or (k, n) coordinates, NaN where passive.
-        """
-        if not self.of_joints:
-            goals = np.full((len(rows), len(POSE)), np.nan)
-            goals[:, [POSE.index(name) for name in self.names]] = rows
-            return goals
-        driven = [f.actuated for f in robot.frames]
-        goals = np.tile(np.where(driven, robot.positions, np.nan), (len(rows), 1))
-        named = [robot.index(name.removeprefix(_JOINT)) for name in self.names]
-        goals[:, named] = rows
+    Args:
+        names: of the components, of one kind.
+        robot: of n frames.
+        rows: (k, components) of :meth:`Targets.at`.
+
+    Returns:
+        (k, 6) poses, NaN where free; or (k, n) coordinates, NaN where passive.
+    """
+    if not of_joints(names):
+        goals = np.full((len(rows), len(POSE)), np.nan)
+        goals[:, [POSE.index(name) for name in names]] = rows
         return goals
+    driven = [f.actuated for f in robot.frames]
+    goals = np.tile(np.where(driven, robot.positions, np.nan), (len(rows), 1))
+    goals[:, [robot.index(name.removeprefix(_JOINT)) for name in names]] = rows
+    return goals
+
+
+def of_joints(names: Sequence[str]) -> bool:
+    """Whether components are joint coordinates, not a pose."""
+    return any(name.startswith(_JOINT) for name in names)
 
 
 def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
@@ -187,10 +188,14 @@ def read_targets(path: Path, robot: Robot) -> Targets:
         BadInput: not such a table; the line and the column are named.
     """
     lines = read_text(path).splitlines()
-    rows = [row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))]
+    rows = [
+        row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))
+    ]
     if len(rows) < 2:
         found = "only a header" if rows else "nothing"
-        raise BadInput(f"{path}: found {found}; expected one and a row for each posture")
+        raise BadInput(
+            f"{path}: found {found}; expected one and a row for each posture"
+        )
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]
     for name in names:

@@ -31,6 +31,7 @@ OWNERS = {
         "assembly/compiled_draws.py",
         "assembly/compiled_reduction.py",
         "assembly/compiled_zone.py",
+        "assembly/hit_and_run.py",
         "assembly/householder.py",
     ),
     "xarray": ("assembly/dataset.py", "stiffness/library.py"),

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 import xarray
 
+from assembly.dataset import save_dataset
 from assembly.energy import solve_assembly
 from assembly.plot import map_figure
 from assembly.posture import place_robot
-from assembly.sweep import assemblable, parse_grid, save_dataset, sweep_poses
+from assembly.sweep import assemblable, sweep_poses
+from assembly.targets import parse_grid
 from stiffness.reading import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
@@ -145,26 +147,27 @@ def test_maps_need_two_axes(data):
         map_figure(data.isel(tx=[0]))
 
 
-def test_progress_counts_every_point():
+def test_progress_counts_points_block_by_block():
     seen = []
     robot = coaxial_beams(np.zeros(6))
-    sweep_poses(robot, {"tx": np.array([0.5, 0.6])}, lambda d, n: seen.append((d, n)))
-    assert seen == [(1, 2), (2, 2)]
+    axes = {"tx": np.linspace(0.4, 0.6, 130)}  # a block is 128
+    sweep_poses(robot, axes, lambda d, n: seen.append((d, n)))
+    assert seen == [(128, 130), (130, 130)]
 
 
 def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
     """The solver gives up on one reading of one point: its neighbour is not touched."""
-    from assembly import sweep
+    from assembly import points
 
-    solve = sweep.zone_margins
+    solve = points.zone_margins
 
-    def spoilt(robot, frames, reading, off):
-        found = solve(robot, frames, reading, off)
+    def spoilt(robot, frames, reading, off, errors):
+        found = solve(robot, frames, reading, off, errors)
         if reading == "free":
             found.margin[0], found.reason[0] = np.nan, "zone margin: gave up"
         return found
 
-    monkeypatch.setattr(sweep, "zone_margins", spoilt)
+    monkeypatch.setattr(points, "zone_margins", spoilt)
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = sweep_poses(robot, {"tx": np.array([0.0, 0.1]), "tz": np.array([-0.4])})
     assert data.status.values.ravel().tolist() == ["solver failed", "ok"]

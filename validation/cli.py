@@ -126,7 +126,7 @@ def _crosscheck_grid(
 ) -> None:
     """Every pose of a grid, with a progress bar."""
     from assembly.robots import load_robot
-    from assembly.sweep import parse_grid
+    from assembly.targets import parse_grid
     from validation.poses import check_poses, poses_table, poses_text
 
     machine, axes = load_robot(robot), parse_grid(grid)

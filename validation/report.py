@@ -33,7 +33,7 @@ def write_study(results: StudyResults) -> Path:
     Raises:
         BadInput: the folder cannot be written.
     """
-    from assembly.sweep import save_dataset
+    from assembly.dataset import save_dataset
 
     folder = results.study.folder
     try:

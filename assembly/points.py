@@ -1,0 +1,275 @@
+"""Points of a sweep, solved: margins, energy, wrenches, errors, singularities.
+
+Points are solved in blocks.  A point that has no answer says why in its ``status`` and
+``reason`` and stops nothing; no point's numbers depend on the others of its block.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch import Energies, minimise_energies, zone_margins
+from assembly.closure import closure_signs
+from assembly.conic import SolverFailed
+from assembly.energy import CannotAssemble, solve_assembly
+from assembly.exact import solve_exact
+from assembly.nominal import size_of
+from assembly.pose_error import bound_pose_error
+from assembly.posture import Posture, place_many, place_many_joints
+from assembly.quantities import STATUSES, TEXTS, Question, record_type
+from assembly.robot import Robot
+from assembly.singularity import KINDS, find_singularities
+from assembly.targets import goals_of, of_joints
+from stiffness.reading import BadInput
+from stiffness.screws import screw_map
+
+_PAGE = 256  # draws made at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Some points of a sweep.
+
+    Attributes:
+        values: (k, p) of the numbers that vary.
+        rows: (k, components) of the postures.
+        draws: (k,) number of the draw of errors; not used without sources.
+    """
+
+    values: NDArray
+    rows: NDArray
+    draws: NDArray
+
+    def part(self, some: slice) -> "Points":
+        """Some of them."""
+        return Points(self.values[some], self.rows[some], self.draws[some])
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What was found at k points.
+
+    Attributes:
+        records: (k,) of :func:`record_type`; NaN where there is no answer.
+        texts: by name, those of :data:`TEXTS`, the text of points that have one.
+    """
+
+    records: NDArray
+    texts: dict[str, dict[int, str]]
+
+
+def solve_points(question: Question, points: Points) -> Found:
+    """Everything asked for, at some points.
+
+    Args:
+        question: what is asked.
+        points: neighbours in the sweep, so that those of one posture follow another.
+
+    Returns:
+        Rows in the order of the points.
+    """
+    count = len(points.rows)
+    found = Found(np.zeros(count, record_type(question)), {t: {} for t in TEXTS})
+    for name in found.records.dtype.names or ():
+        if name != "status":
+            found.records[name] = np.nan
+    for run in _runs(points.values):
+        _solve_variant(question, points.part(run), found, run.start)
+    return found
+
+
+def _runs(rows: NDArray) -> Iterator[slice]:
+    """Stretches of equal rows."""
+    steps = np.flatnonzero(np.any(rows[1:] != rows[:-1], axis=1)) + 1
+    edges = [0, *steps.tolist(), len(rows)]
+    for first, last in zip(edges, edges[1:], strict=False):
+        yield slice(first, last)
+
+
+@lru_cache(maxsize=4)
+def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
+    """The robot of a design, and the same without errors."""
+    robot = question.robot
+    if question.design is not None:
+        robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
+    return robot, robot.with_errors(np.zeros_like(robot.errors))
+
+
+def _solve_variant(
+    question: Question, points: Points, found: Found, first: int
+) -> None:
+    """Points of one design, into rows ``first`` .. of what is found."""
+    count = len(points.rows)
+    runs = list(_runs(points.rows))
+    starts = [run.start for run in runs]
+    try:
+        robot, perfect = _robots(question, tuple(points.values[0].tolist()))
+        goals = goals_of(question.components, robot, points.rows[starts])
+        place = place_many_joints if of_joints(question.components) else place_many
+        postures, reasons = place(robot, goals)
+    except BadInput as error:
+        _fail(found, range(first, first + count), "invalid robot", str(error))
+        return
+    reached = []
+    for run, posture, reason in zip(runs, postures, reasons, strict=True):
+        rows = range(first + run.start, first + run.stop)
+        if posture is None:
+            _fail(found, rows, "out of reach", reason)
+        else:
+            reached += [(row, posture) for row in rows]
+    if not reached:
+        return
+    at = np.array([row for row, _ in reached])
+    some = [posture for _, posture in reached]
+    errors = None
+    if question.sources is not None:
+        errors = _errors(question, points.draws[at - first])
+    _solve_reached(question, robot, perfect, some, errors, found, at)
+
+
+def _fail(found: Found, rows: range, status: str, reason: str) -> None:
+    """Points without an answer."""
+    found.records["status"][rows.start : rows.stop] = STATUSES.index(status)
+    found.texts["reason"].update(dict.fromkeys(rows, reason))
+
+
+def _errors(question: Question, draws: NDArray) -> NDArray:
+    """(k, n, 6) [rad, m] the errors of some draws."""
+    pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
+    return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
+
+
+@lru_cache(maxsize=8)
+def _page(question: Question, page: int) -> NDArray:
+    """(256, n, 6) [rad, m] errors of draws 256 page .."""
+    sources = question.sources
+    assert sources is not None
+    return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
+
+
+def _solve_reached(
+    question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
+    errors: NDArray | None, found: Found, rows: NDArray,
+) -> None:  # fmt: skip
+    """Points whose posture exists; one that fails stops nothing."""
+    T = np.array([posture.transforms for posture in postures])
+    off = np.array([posture.mismatch for posture in postures])
+    out = found.records
+    _note_singularities(question, robot, T, found, rows)
+    failed: dict[int, str] = {}
+    for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
+        zone = zone_margins(robot, T, compliant, off, errors)
+        out[key][rows] = zone.margin
+        failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
+    energies = minimise_energies(robot, T, errors, off)
+    good = []
+    for i, row in enumerate(rows.tolist()):
+        status, reason = energies.status[i], energies.reason[i]
+        if i in failed:
+            status, reason = "solver failed", failed[i]
+        if status == "ok":
+            good.append(i)
+        else:
+            _fail(found, range(row, row + 1), status, reason)
+    at = rows[good]
+    for key, values in (
+        ("energy", energies.energy), ("platform_screw", energies.platform_screw),
+        ("closure_residual", energies.closure_residual),
+        ("clearance_excess", energies.clearance_excess),
+        ("duality_gap", energies.gap),
+    ):  # fmt: skip
+        out[key][at] = values[good]
+    if question.wrenches:
+        out["wrench"][at] = _wrenches(question, robot, T, energies)[good]
+    if question.play_alone:
+        _bound_play(perfect, postures, found, rows)
+    if question.reading is None and not question.linearisation:
+        return
+    for i in good:
+        here = robot if errors is None else robot.with_errors(errors[i])
+        one = Posture(here, postures[i].coordinates, T[i], float(off[i]))
+        _solve_closely(question, one, found, int(rows[i]))
+
+
+def _note_singularities(
+    question: Question, robot: Robot, T: NDArray, found: Found, rows: NDArray
+) -> None:
+    """Distances to singularities, and the names of those that are near."""
+    # all draws of a posture share its singularities
+    runs = list(_runs(T.reshape(len(T), -1)))
+    near = find_singularities(robot, T[[run.start for run in runs]])
+    names = near.names(robot, question.near)
+    distances = np.stack([getattr(near, kind) for kind in KINDS], axis=1)
+    for i, run in enumerate(runs):
+        found.records["singular_distance"][rows[run]] = distances[i]
+        found.records["condition"][rows[run]] = near.condition[i]
+        if names[i]:
+            found.texts["near_singularity"].update(
+                dict.fromkeys(rows[run].tolist(), names[i])
+            )
+
+
+def _wrenches(
+    question: Question, robot: Robot, T: NDArray, energies: Energies
+) -> NDArray:
+    """(k, frames, 6) [N m, N] wrench through the frames asked for, in their axes."""
+    size = size_of(robot)
+    closures = energies.multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
+    chosen = [robot.index(name) for name in question.wrenches]
+    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot)[:, chosen], closures)
+    origin = T[:, None, robot.index(robot.platform), :3, 3]
+    frames = T[:, chosen]
+    paths = screw_map(frames[..., :3, 3] - origin, frames[..., :3, :3])
+    return np.einsum("kfji,kfj->kfi", paths, at_platform)
+
+
+def _bound_play(
+    perfect: Robot, postures: list[Posture], found: Found, rows: NDArray
+) -> None:
+    """Bounds of (27) by play alone, once a posture."""
+    done: dict[int, tuple] = {}
+    for row, posture in zip(rows.tolist(), postures, strict=True):
+        if id(posture) not in done:
+            one = Posture(
+                perfect, posture.coordinates, posture.transforms, posture.mismatch
+            )
+            try:
+                bounds = bound_pose_error(solve_assembly(one), "frozen")
+                done[id(posture)] = bounds.rotation_error, bounds.translation_error
+            except (SolverFailed, CannotAssemble) as error:
+                found.texts["reason"].setdefault(row, f"play alone: {error}")
+                done[id(posture)] = (np.nan, np.nan), (np.nan, np.nan)
+        rotation, translation = done[id(posture)]
+        found.records["rotation_error_play"][row] = rotation
+        found.records["translation_error_play"][row] = translation
+
+
+def _solve_closely(
+    question: Question, posture: Posture, found: Found, row: int
+) -> None:
+    """What is found at one point at a time: (27), finite motions."""
+    out = found.records
+    one = range(row, row + 1)
+    try:
+        answer = solve_assembly(posture)
+        if question.reading is not None:
+            bounds = bound_pose_error(answer, question.reading)
+            out["rotation_error"][row] = bounds.rotation_error
+            out["translation_error"][row] = bounds.translation_error
+    except (SolverFailed, CannotAssemble) as error:
+        _fail(found, one, "solver failed", str(error))
+        return
+    if not question.linearisation:
+        return
+    try:
+        gap = solve_exact(posture, None, answer).linearisation_error
+    except SolverFailed as error:
+        # the linear answer stands: only what it is worth is not known
+        found.texts["reason"][row] = f"linearisation error unknown: {error}"
+        return
+    out["linearisation_rotation"][row] = np.linalg.norm(gap.rotation)
+    out["linearisation_translation"][row] = np.linalg.norm(gap.translation)
+    out["linearisation_energy"][row] = gap.relative_energy
