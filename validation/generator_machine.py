@@ -1,0 +1,135 @@
+"""What a simulated machine reads at the rows of a design, hidden effects included."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BASE, Frame, Robot
+from validation.generator_effects import (
+    CHANGES,
+    COVARIATES,
+    POSES,
+    READINGS,
+    Machine,
+    Parameters,
+    Row,
+)
+from validation.generator_outside import (
+    OUTSIDE_CHANGES,
+    OUTSIDE_COVARIATES,
+    OUTSIDE_READINGS,
+)
+from validation.generator_rest import rest_pose
+from validation.motion import placement, shifted, turn_of
+
+_ALL_CHANGES = CHANGES | OUTSIDE_CHANGES
+_ALL_READINGS = READINGS | OUTSIDE_READINGS
+_ALL_COVARIATES = COVARIATES | OUTSIDE_COVARIATES
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """An effect that the declared model lacks.
+
+    Attributes:
+        name: a public one, or one that begins with an underscore.
+        parameters: as in the public formats.
+    """
+
+    name: str
+    parameters: Parameters
+
+
+def simulate_readings(
+    robot: Robot,
+    reference_point: NDArray,
+    rows: Sequence[Row],
+    effects: Sequence[Hidden] = (),
+    update: Progress | None = None,
+) -> NDArray:
+    """Deviations of a simulated machine at the rows of a design, without noise.
+
+    Rows whose machine is the same are simulated once.
+
+    Args:
+        robot: declared; every joint is tight unless it has a clearance.
+        reference_point: (3,) [m] where the load acts and the pose is read, platform
+            axes.
+        rows: commanded configurations, loads and covariates.
+        effects: what the machine has and the declared model lacks.
+        update: called with the number of rows done and their total.
+
+    Returns:
+        (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T and difference of
+        the reference point's position, base axes.
+
+    Raises:
+        SimulationFailed: a row has no equilibrium.
+    """
+    pointed = with_point(robot, reference_point)
+    used = sorted({c for e in effects for c in _ALL_COVARIATES.get(e.name, ())})
+    known: dict[tuple, NDArray] = {}
+    readings = np.zeros((len(rows), 6))
+    for i, row in enumerate(rows):
+        key = (
+            tuple(row.coordinates.values()),
+            row.load.tobytes(),
+            tuple(row.covariates[name] for name in used),
+        )
+        if key not in known:
+            known[key] = _actual_pose(pointed, row, effects)
+        nominal = nominal_pose(pointed, row)
+        readings[i] = _read(known[key], nominal, row, effects)
+        if update is not None:
+            update(i + 1, len(rows))
+    return readings
+
+
+def with_point(robot: Robot, reference_point: NDArray) -> Robot:
+    """The robot with its reference point as the platform."""
+    point = Frame("platform~point", robot.platform, translation=reference_point)
+    return replace(robot, platform=point.name, frames=(*robot.frames, point))
+
+
+def nominal_pose(robot: Robot, row: Row) -> NDArray:
+    """(4, 4) platform of the robot as drawn, along the chain that leads to it."""
+    T, frame = np.eye(4), robot.frame(robot.platform)
+    while True:
+        own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
+        if frame.joint == "prismatic":
+            T = shifted(own) @ T
+        elif frame.joint == "revolute":
+            T = placement(own, np.zeros(3)) @ T
+        T = placement(frame.rotation, frame.translation) @ T
+        if frame.parent == BASE:
+            return T
+        frame = robot.frame(frame.parent)
+
+
+def _actual_pose(robot: Robot, row: Row, effects: Sequence[Hidden]) -> NDArray:
+    """(4, 4) where the reference point comes to rest."""
+    machine = Machine(robot, row.coordinates, row.load)
+    for effect in effects:
+        if effect.name in _ALL_CHANGES:
+            change = _ALL_CHANGES[effect.name]
+            machine = change(machine, row, effect.parameters)
+    return rest_pose(machine)
+
+
+def _read(
+    pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
+) -> NDArray:
+    """(6,) [rad, m] what the measuring device says of a pose."""
+    for effect in effects:
+        if effect.name in POSES:
+            pose = POSES[effect.name](pose, row, effect.parameters)
+    turn = turn_of(pose[:3, :3] @ nominal[:3, :3].T)
+    reading = np.concatenate([turn, pose[:3, 3] - nominal[:3, 3]])
+    for effect in effects:
+        if effect.name in _ALL_READINGS:
+            reading = _ALL_READINGS[effect.name](reading, row, effect.parameters)
+    return reading
