@@ -1,0 +1,139 @@
+"""Which effects a campaign's design can tell apart, before anything is fitted.
+
+An effect shows in the readings as a combination of its signature's columns.  Nuisances
+(an unknown registration) are projected out first: what they can imitate is lost.
+
+======  ============  =========  ==================================================
+symbol  code          shape      meaning
+======  ============  =========  ==================================================
+A_e     ``columns``   (N, k)     signature of effect e: change of the readings, in
+                                 sigma, at plausible sizes of its unknowns
+Q_e     ``basis``     (N, r)     orthonormal basis of what nuisances leave of A_e
+c_ef    ``shared``    (m, m)     share of e that f can imitate, |P_f A_e| / |A_e|
+======  ============  =========  ==================================================
+
+Sources:
+    Bjoerck, Golub (1973), Numerical methods for computing angles between linear
+    subspaces, Math. Comp. 27, 579: cosines are singular values of Q_e^T Q_f.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+LIKE = 0.98  # cosine above which a design cannot separate
+SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
+_RANK = 1e-6  # relative singular value below which columns are one
+
+
+@dataclass(frozen=True, eq=False)
+class Separability:
+    """What of each effect is left to be seen, and what looks like it.
+
+    Attributes:
+        names: m effects.
+        strength: (m,) [sigma] length of an effect's signature at plausible sizes of
+            its unknowns, all rows together, before nuisances are projected out.
+        left: (m,) share of it that nuisances leave.
+        unknowns: (m,) number of unknowns.
+        rank: (m,) how many of them the design can tell apart.
+        cosine: (m, m) of the smallest angle between two signatures: 1 if some
+            combination of one looks like some combination of the other.
+        shared: (m, m) share of the row's effect that the column's effect can imitate.
+    """
+
+    names: tuple[str, ...]
+    strength: NDArray
+    left: NDArray
+    unknowns: NDArray
+    rank: NDArray
+    cosine: NDArray
+    shared: NDArray
+
+    @property
+    def visible(self) -> NDArray:
+        """(m,) bool: would stand out of the noise at a plausible size."""
+        return self.strength * self.left >= SEEN
+
+    def classes(self) -> list[tuple[str, ...]]:
+        """Effects that imitate each other, wholly and both ways.
+
+        Returns:
+            Classes of two and more; a verdict can only name the class.
+        """
+        alike = (self.shared > LIKE) & (self.shared.T > LIKE)
+        alike &= np.outer(self.visible, self.visible)
+        waiting = list(range(len(self.names)))
+        found = []
+        while waiting:
+            group, edge = set(), {waiting[0]}
+            while edge:
+                group |= edge
+                near = np.flatnonzero(alike[list(edge)].any(axis=0))
+                edge = set(near.tolist()) - group
+            waiting = [i for i in waiting if i not in group]
+            if len(group) > 1:
+                found.append(tuple(self.names[i] for i in sorted(group)))
+        return found
+
+    def imitated(self) -> list[tuple[str, str]]:
+        """Pairs (a, b): whatever a does b can do as well, but not the other way."""
+        one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
+        one_way &= np.outer(self.visible, self.visible)
+        return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
+
+    def overlapping(self) -> list[tuple[str, str]]:
+        """Pairs of which neither imitates the other, but parts of them do."""
+        part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
+        part &= np.outer(self.visible, self.visible)
+        return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
+
+
+def compare_signatures(
+    columns: Mapping[str, NDArray], nuisance: NDArray | None = None
+) -> Separability:
+    """Angles between signatures.
+
+    Args:
+        columns: (N, k) by effect: change of the readings over sigma at plausible sizes.
+        nuisance: (N, p) columns fitted in any case, over sigma.
+
+    Returns:
+        The comparison.
+    """
+    names = tuple(columns)
+    rows = len(next(iter(columns.values()))) if names else 0
+    out = _basis(np.zeros((rows, 0)) if nuisance is None else nuisance)
+    left = {e: A - out @ (out.T @ A) for e, A in columns.items()}
+    bases = {e: _basis(left[e], float(np.linalg.norm(columns[e]))) for e in names}
+    sizes = np.array([np.linalg.norm(columns[e]) for e in names])
+    cosine, shared = np.eye(len(names)), np.eye(len(names))
+    for i, e in enumerate(names):
+        size = np.linalg.norm(left[e])
+        for j, f in enumerate(names):
+            if i != j and bases[e].shape[1] and bases[f].shape[1]:
+                cosine[i, j] = np.linalg.norm(bases[e].T @ bases[f], 2)
+                shared[i, j] = np.linalg.norm(bases[f].T @ left[e]) / size
+    rest = np.array([np.linalg.norm(left[e]) for e in names])
+    return Separability(
+        names=names,
+        strength=sizes,
+        left=np.divide(rest, sizes, out=np.zeros(len(names)), where=sizes > 0),
+        unknowns=np.array([columns[e].shape[1] for e in names], dtype=int),
+        rank=np.array([bases[e].shape[1] for e in names], dtype=int),
+        cosine=np.minimum(cosine, 1.0),
+        shared=np.minimum(shared, 1.0),
+    )
+
+
+def _basis(columns: NDArray, whole: float | None = None) -> NDArray:
+    """(N, rank) orthonormal basis; ``whole`` is the size that counts as large."""
+    size = np.linalg.norm(columns, axis=0)
+    floor = _RANK * (size.max(initial=0.0) if whole is None else whole)
+    kept = columns[:, size > floor] / size[size > floor]
+    if not kept.size:
+        return np.zeros((len(columns), 0))
+    U, s, _ = np.linalg.svd(kept, full_matrices=False)
+    return U[:, s > _RANK * s[0]]
