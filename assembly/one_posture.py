@@ -54,6 +54,9 @@ class OnePosture:
         joints: what may move.
         starts: (cones + 1,) first clearance of each cone, and nu.
         G: (r, nu) springs' answer to the clearances.
+        H: (p, nu) rows of the clearances that no spring can take up: the fast road is
+            closed where there are any.
+        closures: (m, 6n) scaled closure rows.
         misfit: (r, 6n) springs' answer to the errors, h = misfit @ errors; as well the
             work of unit multipliers on the errors, before any elimination.
         closing: (m, r) closure multipliers of the springs'.
@@ -61,7 +64,6 @@ class OnePosture:
         cones: (nu, r) how they pull the clearances, likewise.
         free: (nq, r) how they pull free motions: nothing but rounding.
         unanswered: (m - .., 6n) what of the errors no spring takes up.
-        any_rigid: whether clearances enter such rows: the fast road is then closed.
         screws: (6, nu + 6n) platform screw.
         motions: (nq, nu + 6n) free motions.
         left: (m, nu + 6n) what stays open in the closures: rounding.
@@ -73,13 +75,14 @@ class OnePosture:
     joints: VirtualJoints
     starts: NDArray
     G: NDArray
+    H: NDArray
+    closures: NDArray
     misfit: NDArray
     closing: NDArray
     pulls: NDArray
     cones: NDArray
     free: NDArray
     unanswered: NDArray
-    any_rigid: bool
     screws: NDArray
     motions: NDArray
     left: NDArray
@@ -125,7 +128,7 @@ class OnePosture:
             float(np.linalg.norm(slip)), u, y, energy, bound, road,
         )  # fmt: skip
         parts = np.hstack([u, e])
-        slower = (road > 0) | self.any_rigid
+        slower = (road > 0) | bool(len(self.H))
         for rows, limit in (
             (left, np.full(len(left), _LEFT_OPEN)), (motions, self.ranges)
         ):  # fmt: skip
@@ -152,16 +155,12 @@ class OnePosture:
         answer.energy[rows], answer.bound[rows] = found.energy, found.bound
         answer.platform_screw[rows] = found.platform_screw
         answer.clearances[rows] = found.clearances
-        found_here = found.multipliers
-        if not self.any_rigid:
+        multipliers = found.multipliers
+        if not len(self.H):
             # the smallest wrenches where rigid parts leave them undetermined
-            springs = found_here @ (self._spring_columns() @ self.pulls)
-            found_here = springs @ self.closing.T
-        answer.multipliers[rows] = found_here
-
-    def _spring_columns(self) -> NDArray:
-        """(m, ny) closure columns of the springs."""
-        return linearise(self.posture).rows @ self.joints.elastic
+            springs = multipliers @ (self.closures @ self.joints.elastic @ self.pulls)
+            multipliers = springs @ self.closing.T
+        answer.multipliers[rows] = multipliers
 
 
 def prepare_energies(posture: Posture) -> OnePosture:
@@ -198,9 +197,9 @@ def prepare_energies(posture: Posture) -> OnePosture:
     starts = np.searchsorted(joints.group, np.arange(joints.group.max(initial=-1) + 2))
     return OnePosture(
         posture, joints, starts.astype(np.int64),
-        small.G, misfit, closing, A_y.T @ closing,
+        small.G, small.H, A, misfit, closing, A_y.T @ closing,
         np.ascontiguousarray(A_u.T @ closing), A_q.T @ closing,
-        over.T @ A, len(small.k) > 0, lin.platform @ moved, motions, A @ moved,
+        over.T @ A, lin.platform @ moved, motions, A @ moved,
         bounds[np.flatnonzero(joints.free.any(axis=1))],
         wrench.reshape(len(robot.frames), 6, -1) / size,
     )  # fmt: skip

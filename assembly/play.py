@@ -1,71 +1,104 @@
-"""Play taken up by the load: each joint rests against its cone, where the load pushes.
+"""Where the play of an assembled robot may sit, and what its platform then does.
 
-A joint that transmits the wrench w rests at the point of its clearance cones farthest
-along w.  In a robot without closures the wrenches follow from the loads alone, and this
-is the exact minimum of (22); with closures it is its limit for small play, by the
-envelope theorem: dE/d(bound) = -|w| in the cone's directions.
+Least energy holds the clearances that carry load at their bound; what the others may
+do without changing any spring is a convex set.  Its points are drawn
+
+======== =====================================================================
+least    not at all: as the solution of (22) leaves it
+uniform  uniformly over the set (hit-and-run): nothing is known of the play
+contact  pushed by a wrench of random direction on the platform until it is taken up
+======== =====================================================================
 """
-
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.clearance import CONES, clearance_bounds, scales_with_margin
-from assembly.conditions import Conditions
-from assembly.flexibility import flexibility, in_groups
-from assembly.load import row_forces
-from assembly.robot import Clearance, Frame, Robot
+from assembly.nominal import size_of
+from assembly.one_posture import Draws, OnePosture
 
-_PUSHED = 1e-9  # of the largest wrench of its kind: less pushes nowhere
+PLAY = ("least", "uniform", "contact")
+STEPS = 400  # of a walk; twice as many change no quantile, see tests/test_play.py
 
 
-def taken_up(here: Conditions) -> tuple[Conditions, NDArray]:
-    """Conditions with play replaced by the screws it takes up under the load.
-
-    Args:
-        here: R situations of a robot with play.
-
-    Returns:
-        The same situations of the robot without play, the play among its errors, and
-        (R,) whether some joint with play transmits nothing, so that where it rests is
-        open; it is then left in the middle.
-    """
-    tight = replace(here, robot=without_play(here.robot))
-    distinct, which = in_groups(tight.postures)
-    errors = here.errors.reshape(len(here), -1)
-    forces = row_forces(tight.postures, tight.load_at_origin(), tight.gravity)
-    through = flexibility(distinct).solve(which, errors, forces).joint_wrenches
-    wrenches = through.reshape(len(here), -1, 6)
-    bounds = np.where(scales_with_margin(here.robot), clearance_bounds(here.robot), 0.0)
-    play, open_ = np.zeros_like(wrenches), np.zeros(len(here), dtype=bool)
-    for cone, rows in enumerate(CONES):
-        pushed = wrenches[:, :, list(rows)]
-        size = np.linalg.norm(pushed, axis=2)
-        rests = size > _PUSHED * size.max(initial=0.0)
-        unit = pushed / np.where(rests, size, 1.0)[:, :, None]
-        play[:, :, list(rows)] = unit * (rests * bounds[:, cone])[:, :, None]
-        open_ |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
-    return replace(tight, errors=here.errors + play), open_
-
-
-def without_play(robot: Robot) -> Robot:
-    """The robot with tight joints; bounds of passive joints' own motion stay.
+def settle_play(
+    one: OnePosture, found: Draws, errors: NDArray, play: str, seeds: NDArray,
+    steps: int = STEPS,
+) -> NDArray:  # fmt: skip
+    """Platform screws with the play somewhere in its set.
 
     Args:
-        robot: any.
+        one: the posture.
+        found: of :meth:`~assembly.one_posture.OnePosture.solve`, k draws.
+        errors: (k, n, 6) [rad, m] they were found for.
+        play: one of :data:`PLAY`.
+        seeds: (k,) whole numbers below 2^32, one for each draw.
+        steps: of each walk.
 
     Returns:
-        A robot without clearance cones.
+        (k, 6) [rad, m]; NaN where a draw has no answer in unit cones (the bound of a
+        passive joint's own motion mattered).
+
+    Raises:
+        ValueError: ``play`` is something else.
     """
-    return replace(robot, frames=tuple(_tight(f) for f in robot.frames))
+    if play not in PLAY:
+        raise ValueError(f"play is {play!r}, expected one of {PLAY}")
+    if play == "least" or not len(one.G.T):
+        return found.platform_screw
+    from assembly.hit_and_run import push_all, walk_all
+
+    u = found.clearances.copy()
+    loaded = loaded_clearances(one, found)
+    nu = u.shape[1]
+    solved = ~np.isnan(u).any(axis=1)
+    to_platform = one.screws[:, :nu]
+    patterns, which = np.unique(loaded, axis=0, return_inverse=True)
+    for i, pattern in enumerate(patterns):
+        some = np.flatnonzero((which.ravel() == i) & solved)
+        rows, free = play_rows(one, pattern), ~pattern
+        here = np.ascontiguousarray(u[some])
+        if play == "uniform":
+            walk_all(rows, one.starts, free, here, steps, seeds[some])
+        else:
+            size = size_of(one.posture.robot)
+            scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+            wrench = _directions(seeds[some]) * scale
+            push_all(rows, one.starts, free, here, wrench @ to_platform)
+        u[some] = here
+    moved = (u - found.clearances) @ to_platform.T
+    return found.platform_screw + moved
 
 
-def _tight(frame: Frame) -> Frame:
-    if frame.clearance is None:
-        return frame
-    kept = Clearance()
-    if frame.passive and frame.joint_stiffness is None:
-        own = "axial" if frame.joint == "prismatic" else "spin"
-        kept = Clearance(**{own: getattr(frame.clearance, own)})
-    return replace(frame, clearance=kept)
+def loaded_clearances(one: OnePosture, found: Draws) -> NDArray:
+    """(k, nu) bool: clearances that press on their bound, by strict complementarity."""
+    pull = found.multipliers @ (_cone_columns(one))
+    push = _sizes(pull, one.starts)
+    slack = np.maximum(0.0, 1.0 - _sizes(found.clearances, one.starts))
+    # push times slack is about the solver's gap: one of the two is nearly zero
+    scale = np.maximum(found.energy, 1e-18)[:, None]
+    loaded = (push > scale * slack) & (push > 1e-9 * scale)
+    return np.repeat(loaded, np.diff(one.starts), axis=1)
+
+
+def play_rows(one: OnePosture, loaded: NDArray) -> NDArray:
+    """(p, nu) orthonormal rows that the free clearances must not change."""
+    rows = np.vstack([one.G, one.H]) * ~loaded
+    _, S, Vt = np.linalg.svd(rows, full_matrices=False)
+    return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])
+
+
+def _cone_columns(one: OnePosture) -> NDArray:
+    """(m, nu) closure columns of the clearances."""
+    return one.closures @ one.joints.cones
+
+
+def _sizes(values: NDArray, starts: NDArray) -> NDArray:
+    """(k, cones) size of each cone's part."""
+    return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))
+
+
+def _directions(seeds: NDArray) -> NDArray:
+    """(k, 6) random unit vectors, one for each seed."""
+    vectors = np.array([np.random.default_rng(s).normal(size=6) for s in seeds])
+    vectors = vectors.reshape(-1, 6)
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
