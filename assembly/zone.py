@@ -58,18 +58,29 @@ def zone_margin(posture: Posture, compliant: str = "rigid") -> Zone:
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     lin = linearise(posture)
-    zone, screws = _margin(lin, virtual_joints(posture.robot, compliant))
+    zone, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
     bounds = clearance_bounds(posture.robot, compliant)
     ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
     if zone.margin is not None and clearance_excess(screws, ranges) > 1e-9:
         # the range of a passive joint's motion was left out, but it matters
         joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
-        zone, _ = _margin(lin, joints)
+        zone, _ = margin_with(lin, joints)
     return zone
 
 
-def _margin(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, NDArray]:
-    """Margin with one set of columns, and the clearance screws that attain it."""
+def margin_with(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, NDArray]:
+    """Margin with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move, without springs.
+
+    Returns:
+        The margin, and the (n, 6) [rad, m] clearance screws that attain it.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
     small = reduce_problem(lin, joints)
     zone, u = _least(small)
     if zone.margin is None:
