@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -114,15 +115,21 @@ def progress_bars() -> Generator[Any, None, None]:
 
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-        TimeElapsedColumn(), TimeRemainingColumn(),
+        TextColumn("{task.fields[rate]}"), TimeElapsedColumn(), TimeRemainingColumn(),
     )  # fmt: skip
     tasks: dict[str, Any] = {}
+    began: dict[str, tuple[float, int]] = {}
     with Progress(*columns, console=Console(stderr=True)) as bars:
 
         def update(what: str, done: int, total: int) -> None:
             if what not in tasks:
-                tasks[what] = bars.add_task(what, total=total)
-            bars.update(tasks[what], completed=done, total=total)
+                # what was done in an earlier run does not count in the rate
+                tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
+                began[what] = time.monotonic(), done
+            start, before = began[what]
+            passed = time.monotonic() - start
+            rate = f"{(done - before) / passed:.3g}/s" if done > before else ""
+            bars.update(tasks[what], completed=done, total=total, rate=rate)
 
         yield update
 
@@ -233,39 +240,139 @@ def error(
 @app.command()
 def sweep(
     robot: RobotArgument,
-    grid: Annotated[
-        str, typer.Option(help="Such as tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025.")
-    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            help="Such as tx=-0.2:0.2:0.025,tz=-0.5, or q.<frame>=.. for joints."
+        ),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV table of postures: pose.tx .. or q.<frame>, perhaps id."
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A number of the robot file, PATH=VALUE,.. or PATH=A:B:STEP."
+        ),
+    ] = None,
+    errors: Annotated[
+        Path | None, typer.Option(help="How errors are distributed (TOML).")
+    ] = None,
+    draws: Annotated[
+        int | None, typer.Option(help="Draws of errors at each point.", min=1)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
     reading: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
-    figure: Annotated[
-        Path | None, typer.Option(help="Also draw the maps, as PNG, SVG or PDF.")
+    play_alone: Annotated[
+        bool, typer.Option("--play-alone", help="The pose error also without errors.")
+    ] = False,
+    wrench: Annotated[
+        list[str] | None, typer.Option(help="A frame whose wrench is kept.")
     ] = None,
+    linearisation: Annotated[
+        bool,
+        typer.Option("--linearisation", help="What finite motions would change; slow."),
+    ] = False,
+    near: Annotated[
+        float, typer.Option(help="Distance below which a singularity is named.")
+    ] = 0.02,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes on this machine.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw it, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
 ) -> None:
-    """Margins, energy and platform error over a grid of platform poses."""
-    from assembly.plot import map_figure
-    from assembly.pose_error import READINGS
-    from assembly.robots import load_robot
-    from assembly.dataset import save_dataset
-    from assembly.sweep import sweep_poses
-    from assembly.targets import parse_grid
+    """Margins, energy, errors, singularities over postures, designs and draws.
 
-    machine, axes = load_robot(robot), parse_grid(grid)
-    if reading not in (*READINGS, "none"):
-        hint = nearest(reading, [*READINGS, "none"])
-        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
-    wanted = None if reading == "none" else reading
+    Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
+    you like, the same command goes on from there and ends in the same file.
+    """
+    from assembly.dataset import open_dataset
+    from assembly.maps import figure_of
+    from assembly.sweep import Solver, journal_path, run_sweep, solve_here
+    from assembly.sweep_request import ask_sweep, summary_of, summary_text
+
+    asked = ask_sweep(
+        robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+        seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
+        linearisation=linearisation, near=near,
+    )  # fmt: skip
+    if workers is not None and scheduler is not None:
+        raise BadInput("sweep: found --workers and --scheduler, expected one of them")
     for path in filter(None, (output, figure)):
         check_writable(path)
-    with progress_bars() as update:
-        data = sweep_poses(machine, axes, lambda d, n: update("postures", d, n), wanted)
-    save_dataset(data, output)
+    done = [0]
+    solver: Solver = solve_here
+    if workers is not None or scheduler is not None:
+        from assembly.cluster import cluster_solver
+
+        solver = cluster_solver(workers, scheduler)
+    try:
+        with progress_bars() as update:
+
+            def note(finished: int, total: int) -> None:
+                done[0] = finished
+                update("points", finished, total)
+
+            run_sweep(asked, output, note, solver)
+    except KeyboardInterrupt:
+        print(
+            f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
+            f"{journal_path(output)}: the same command goes on",
+            file=sys.stderr,
+        )
+        raise typer.Exit(130) from None
+    data = open_dataset(output)
     if figure is not None:
-        map_figure(data).savefig(figure, dpi=150)
-    counts = data["status"].to_series().value_counts()
-    print(", ".join(f"{name}: {count}" for name, count in counts.items()))
+        save_figure(figure_of(data), figure)
+    summary = {"output": str(output)} | summary_of(data)
+    write_json(summary, json)
+    if json != "-":
+        print(summary_text(summary, data))
+
+
+@app.command()
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="PNG, SVG or PDF file.")
+    ],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Where to stand on other axes, such as draw=3."),
+    ] = None,
+) -> None:
+    """Draw a saved sweep: six maps over two axes, or lines along one."""
+    from assembly.dataset import open_dataset
+    from assembly.maps import figure_of
+
+    check_writable(output)
+    places = {}
+    for text in at or ():
+        name, equals, value = (piece.strip() for piece in text.rpartition("="))
+        if not equals:
+            raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
+        places[name] = value
+    save_figure(figure_of(open_dataset(file), places), output)
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a figure; a kind of file that is not known is bad input."""
+    try:
+        figure.savefig(path, dpi=150)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: cannot be written: {error}") from None
 
 
 @app.command()

@@ -1,10 +1,10 @@
-"""Figures of assemblies: maps over the workspace, and the robot itself, deformed.
+"""Pictures of the robot itself, deformed, and of the errors its platform can have.
 
-Functions take a result and return a figure or a plotter; none shows or saves.
+Functions take a result and return a plotter; none shows or saves.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,75 +13,6 @@ from assembly.energy import Assembly
 from assembly.error_body import ErrorBody, error_body
 from assembly.pose_error import reachable_screws
 from stiffness.screws import rotation_matrix, screw_map
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
-
-_MAPS = (
-    ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
-    ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r"),
-    ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
-    ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
-    ("translation", 1e3, "platform position error [mm]", "viridis"),
-)
-
-
-def map_figure(data: "xarray.Dataset") -> "Figure":
-    """Maps over a two-dimensional grid: margins, energy and platform error.
-
-    Args:
-        data: of :func:`assembly.sweep.sweep_poses` over two pose components with more
-            than one value each.
-
-    Returns:
-        A figure with a panel for each quantity; the line in the margins is 1, inside
-        which the manipulator assembles rigidly.
-
-    Raises:
-        ValueError: the grid does not have two such axes.
-    """
-    from matplotlib.figure import Figure
-
-    names = [d for d in data["energy"].dims if data.sizes[d] > 1]
-    if len(names) != 2:
-        raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
-    x, y = (str(name) for name in names)
-    data = data.squeeze(drop=True)
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    panels = figure.subplots(3, 2).ravel()
-    for panel, (key, scale, title, colours) in zip(panels, _MAPS, strict=False):
-        values = _quantity(data, key).transpose(y, x) * scale
-        finite = values.where(np.isfinite(values))
-        image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
-        figure.colorbar(image, ax=panel)
-        inside = bool((finite < 1).any()) and bool((finite > 1).any())
-        if key.startswith("margin") and inside and min(finite.shape) > 1:
-            panel.contour(data[x], data[y], finite, levels=[1.0], colors="cyan")
-        panel.set(title=title, xlabel=f"{x} [m]", ylabel=f"{y} [m]", aspect="equal")
-    _states(panels[-1], data, x, y)
-    return figure
-
-
-def _quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A variable; for pose errors the upper bound, or else half the platform screw."""
-    halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-    if key not in halves:
-        return data[key]
-    if f"{key}_error" in data:
-        return data[f"{key}_error"].sel(bound="upper", drop=True)
-    part = data["platform_screw"].isel(screw=halves[key])
-    return np.sqrt((part**2).sum("screw", skipna=False))
-
-
-def _states(panel: Any, data: "xarray.Dataset", x: str, y: str) -> None:
-    """Which points were solved, as text and colour."""
-    names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
-    order = {name: i for i, name in enumerate(names)}
-    codes = np.vectorize(order.get)(data["status"].transpose(y, x).values.astype(str))
-    panel.pcolormesh(data[x], data[y], codes, cmap="Set2", vmin=0, vmax=7)
-    said = ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
-    panel.set(title=said, xlabel=f"{x} [m]", ylabel=f"{y} [m]", aspect="equal")
 
 
 def draw_assembly(

@@ -6,7 +6,7 @@ import xarray
 
 from assembly.dataset import save_dataset
 from assembly.energy import solve_assembly
-from assembly.plot import map_figure
+from assembly.maps import map_figure
 from assembly.posture import place_robot
 from assembly.sweep import assemblable, sweep_poses
 from assembly.targets import parse_grid

@@ -278,7 +278,7 @@ def _significant(K: NDArray) -> NDArray:
 
 def _maps(results: StudyResults) -> str:
     """Maps over the grid."""
-    from assembly.plot import map_figure
+    from assembly.maps import map_figure
 
     summary = map_summary(results.maps)
     rows = [

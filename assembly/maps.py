@@ -1,0 +1,282 @@
+"""Figures of a sweep, from its data set alone: maps over two axes, lines along one.
+
+Functions take a data set and return a figure; none solves, shows or saves.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.reading import BadInput, nearest, quoted
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# variable, factor, title, colours: the six panels of the paper's figure 5, then what
+# stands in for the last two where they were not asked for
+_PAPER = (
+    ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
+    ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
+    ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
+    ("translation", 1e3, "platform position error [mm]", "viridis"),
+    ("rotation_error_play", 1e3, "orientation error by play alone [mrad]", "viridis"),
+    ("translation_error_play", 1e3, "position error by play alone [mm]", "viridis"),
+)
+_RIGID = ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
+
+Panel = tuple[str, float, str, str]
+
+
+def figure_of(
+    data: "xarray.Dataset", at: Mapping[str, float | str] | None = None
+) -> "Figure":
+    """Maps of a sweep over two axes, or lines along one.
+
+    Args:
+        data: of a sweep, as saved.
+        at: where to stand on other axes, by name: the nearest value is taken; over
+            draws that are not chosen from, the median is shown.
+
+    Returns:
+        A figure with six panels.
+
+    Raises:
+        BadInput: an axis is unknown, or more than two are left.
+    """
+    view, note = seen_at(data, at or {})
+    dims = [str(d) for d in view["energy"].dims]
+    if len(dims) > 2:
+        long = ", ".join(f"{d} ({view.sizes[d]})" for d in dims)
+        raise BadInput(
+            f"figure: found axes {long}; choose with --at, such as {dims[0]}="
+        )
+    if not dims:
+        raise BadInput("figure: found a single point; expected an axis or two")
+    figure = map_figure(view) if len(dims) == 2 else path_figure(view)
+    if note:
+        figure.text(0.995, 0.995, note, ha="right", va="top", fontsize=8)
+    return figure
+
+
+def seen_at(
+    data: "xarray.Dataset", at: Mapping[str, float | str]
+) -> tuple["xarray.Dataset", str]:
+    """A part of a sweep: some axes held, draws by their median.
+
+    Args:
+        data: of a sweep.
+        at: value by axis.
+
+    Returns:
+        The part, without axes of one value, and a note that says what it is.
+
+    Raises:
+        BadInput: an axis or a value is unknown.
+    """
+    axes = [str(d) for d in data["energy"].dims]
+    said = []
+    for name, value in at.items():
+        if name not in axes:
+            raise BadInput(f"--at: no axis {quoted(name)}{nearest(name, axes)}")
+        labels = data[name].values
+        if labels.dtype.kind in "fiu":
+            place = int(np.abs(labels - _number(name, value)).argmin())
+        elif str(value) in (known := [str(v) for v in labels]):
+            place = known.index(str(value))
+        else:
+            raise BadInput(
+                f"--at {name}: no {quoted(str(value))}{nearest(str(value), known)}"
+            )
+        data = data.isel({name: place})
+        said.append(f"{name} = {labels[place]}")
+    data = data.squeeze(drop=True)
+    if "draw" in data["energy"].dims:
+        said.append(f"median of {data.sizes['draw']} draws")
+        data = _median(data)
+    return data, "; ".join(said)
+
+
+def _number(name: str, value: float | str) -> float:
+    """A number asked for on an axis."""
+    try:
+        return float(value)
+    except ValueError:
+        raise BadInput(
+            f"--at {name}: found {quoted(str(value))}, expected a number"
+        ) from None
+
+
+def _median(data: "xarray.Dataset") -> "xarray.Dataset":
+    """Median over the draws; a status that any draw has instead of ok."""
+    numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
+    middle = data[numbers].median("draw", skipna=True)
+    first = data.isel(draw=0, drop=True)
+    status = data["status"].transpose(..., "draw")
+    bad = (status != "ok").values
+    shown = np.take_along_axis(
+        status.values, bad.argmax(axis=-1)[..., None], axis=-1
+    )[..., 0]  # fmt: skip
+    middle["status"] = first["status"].transpose(*status.dims[:-1]).copy(data=shown)
+    for text in ("near_singularity", "reason"):
+        if text in first:
+            middle[text] = first[text]
+    return middle
+
+
+def map_figure(data: "xarray.Dataset") -> "Figure":
+    """Maps over a two-dimensional grid: margins, energy and platform error.
+
+    Args:
+        data: of a sweep over two axes with more than one value each.
+
+    Returns:
+        A figure with a panel for each quantity; the line in the margins is 1, inside
+        which the manipulator assembles rigidly; crosses mark singularities near by.
+
+    Raises:
+        ValueError: the grid does not have two such axes.
+    """
+    from matplotlib.figure import Figure
+
+    data = data.squeeze(drop=True)
+    names = [str(d) for d in data["energy"].dims]
+    if len(names) != 2:
+        raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
+    x, y = names
+    figure = Figure(figsize=(11, 11), layout="constrained")
+    axes = figure.subplots(3, 2).ravel()
+    panels = _panels(data)
+    for panel, (key, scale, title, colours) in zip(axes, panels, strict=False):
+        values = quantity(data, key).transpose(y, x) * scale
+        finite = values.where(np.isfinite(values))
+        image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
+        figure.colorbar(image, ax=panel)
+        inside = bool((finite < 1).any()) and bool((finite > 1).any())
+        if key.startswith("margin") and inside and min(finite.shape) > 1:
+            panel.contour(data[x], data[y], finite, levels=[1.0], colors="cyan")
+        _mark(panel, data, x, y)
+        _label(panel, data, x, y, title)
+    if len(panels) < len(axes):
+        _states(axes[-1], data, x, y)
+    figure.suptitle(_caption(data), fontsize=10)
+    return figure
+
+
+def path_figure(data: "xarray.Dataset") -> "Figure":
+    """The same quantities along one axis, or from posture to posture of a list.
+
+    Args:
+        data: of a sweep over one axis.
+
+    Returns:
+        A figure with a panel for each quantity; crosses mark singularities near by.
+    """
+    from matplotlib.figure import Figure
+
+    data = data.squeeze(drop=True)
+    (x,) = (str(d) for d in data["energy"].dims)
+    along = (
+        data[x].values if data[x].dtype.kind == "f" else np.arange(data.sizes[x]) + 1
+    )
+    near = _near(data)
+    figure = Figure(figsize=(11, 9), layout="constrained")
+    axes = figure.subplots(3, 2).ravel()
+    for panel, (key, scale, title, _) in zip(axes, _panels(data), strict=False):
+        values = quantity(data, key).values * scale
+        values = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(along, values, ".-", color="tab:blue")
+        panel.plot(along[near], values[near], "kx", label="near a singularity")
+        if key.startswith("margin"):
+            panel.axhline(1.0, color="tab:cyan", linewidth=1)
+        panel.set(title=title, xlabel=_axis_name(data, x))
+        panel.grid(alpha=0.3)
+    if len(_panels(data)) < len(axes):
+        axes[-1].semilogy(along, data["condition"].values, ".-")
+        axes[-1].set(
+            title="condition, drives to platform [-]", xlabel=_axis_name(data, x)
+        )
+    figure.suptitle(_caption(data), fontsize=10)
+    return figure
+
+
+def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
+    """The panels that a data set has the numbers for."""
+    if "rotation_error_play" in data:
+        return _PAPER
+    return (*_PAPER[:4], _RIGID)
+
+
+def quantity(data: "xarray.Dataset", key: str) -> Any:
+    """A variable; for pose errors the upper bound, or else half the platform screw."""
+    halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+    if key not in halves:
+        return data[key].sel(bound="upper", drop=True) if "play" in key else data[key]
+    if f"{key}_error" in data:
+        return data[f"{key}_error"].sel(bound="upper", drop=True)
+    part = data["platform_screw"].isel(screw=halves[key])
+    return np.sqrt((part**2).sum("screw", skipna=False))
+
+
+def _near(data: "xarray.Dataset") -> NDArray:
+    """Bool: where a singularity is near."""
+    if "near_singularity" not in data:
+        return np.zeros(data["energy"].shape, dtype=bool)
+    texts = data["near_singularity"].transpose(*data["energy"].dims)
+    return texts.values.astype(str) != ""
+
+
+def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
+    """Crosses where a singularity is near."""
+    i, j = np.nonzero(_near(data))
+    if len(i):
+        here = data["energy"].dims[0] == x
+        xs, ys = (i, j) if here else (j, i)
+        panel.plot(data[x].values[xs], data[y].values[ys], "kx", markersize=3)
+
+
+def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
+    """Which points were solved, as text and colour."""
+    texts = data["status"].transpose(y, x).values.astype(str)
+    _, codes = np.unique(texts, return_inverse=True)
+    codes = codes.reshape(texts.shape)
+    panel.pcolormesh(data[x], data[y], codes, cmap="Set2", vmin=0, vmax=7)
+    _label(panel, data, x, y, _counts(data))
+    _mark(panel, data, x, y)
+
+
+def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
+    """Title and axes; lengths beside lengths are drawn to one scale."""
+    same = data[x].attrs.get("units") == data[y].attrs.get("units")
+    spans = [float(np.ptp(data[k].values)) for k in (x, y)]
+    fits = same and 0.2 < spans[0] / spans[1] < 5
+    panel.set(title=title, xlabel=_axis_name(data, x), ylabel=_axis_name(data, y),
+              aspect="equal" if fits else "auto")  # fmt: skip
+
+
+def _axis_name(data: "xarray.Dataset", name: str) -> str:
+    """Name and unit of an axis."""
+    unit = data[name].attrs.get("units")
+    return f"{name} [{unit}]" if unit else name
+
+
+def _counts(data: "xarray.Dataset") -> str:
+    """How many points have each status."""
+    names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
+    return ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
+
+
+def _caption(data: "xarray.Dataset") -> str:
+    """Robot, statuses, and the singularities that the crosses mark."""
+    said = f"{data.attrs.get('robot', '')}; {_counts(data)}"
+    if _near(data).any():
+        texts = np.unique(data["near_singularity"].values.astype(str))
+        kinds = sorted({
+            part.partition(",")[0] for t in texts if t for part in t.split("; ")
+        })  # fmt: skip
+        more = f" and {len(kinds) - 6} more" if len(kinds) > 6 else ""
+        said += f"\nx: singularities near by ({'; '.join(kinds[:6])}{more})"
+    return said
