@@ -139,6 +139,24 @@ class ErrorSources:
         )  # fmt: skip
 
 
+def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
+    """Random numbers of one draw, as many as it likes.
+
+    Args:
+        seed: of all draws, below 2^64.
+        draw: its number.
+        stream: other than those of :meth:`ErrorSources.uniforms`.
+
+    Returns:
+        A generator that depends on these three only.
+    """
+    philox = np.random.Philox(
+        key=np.array([seed, stream], dtype=np.uint64),
+        counter=np.array([0, draw, 0, 0], dtype=np.uint64),
+    )
+    return np.random.Generator(philox)
+
+
 def tolerance_sources(
     robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
     distribution: str = "uniform", deviations: float = 3.0,

@@ -10,9 +10,12 @@ contact  pushed by a wrench of random direction on the platform until it is take
 ======== =====================================================================
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.conic import minimise_energy
 from assembly.nominal import size_of
 from assembly.one_posture import Draws, OnePosture
 
@@ -21,7 +24,7 @@ STEPS = 400  # of a walk; twice as many change no quantile, see tests/test_play.
 
 
 def settle_play(
-    one: OnePosture, found: Draws, errors: NDArray, play: str, seeds: NDArray,
+    one: OnePosture, found: Draws, play: str, generators: Sequence[np.random.Generator],
     steps: int = STEPS,
 ) -> NDArray:  # fmt: skip
     """Platform screws with the play somewhere in its set.
@@ -29,9 +32,8 @@ def settle_play(
     Args:
         one: the posture.
         found: of :meth:`~assembly.one_posture.OnePosture.solve`, k draws.
-        errors: (k, n, 6) [rad, m] they were found for.
         play: one of :data:`PLAY`.
-        seeds: (k,) whole numbers below 2^32, one for each draw.
+        generators: of random numbers, one for each draw.
         steps: of each walk.
 
     Returns:
@@ -45,7 +47,7 @@ def settle_play(
         raise ValueError(f"play is {play!r}, expected one of {PLAY}")
     if play == "least" or not len(one.G.T):
         return found.platform_screw
-    from assembly.hit_and_run import push_all, walk_all
+    from assembly.hit_and_run import hit_and_run, push_all
 
     u = found.clearances.copy()
     loaded = loaded_clearances(one, found)
@@ -58,15 +60,39 @@ def settle_play(
         rows, free = play_rows(one, pattern), ~pattern
         here = np.ascontiguousarray(u[some])
         if play == "uniform":
-            walk_all(rows, one.starts, free, here, steps, seeds[some])
+            for v, k in zip(here, some.tolist(), strict=True):
+                hit_and_run(rows, one.starts, free, v, steps, generators[k])
         else:
             size = size_of(one.posture.robot)
             scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
-            wrench = _directions(seeds[some]) * scale
-            push_all(rows, one.starts, free, here, wrench @ to_platform)
+            wrench = [generators[k].normal(size=6) * scale for k in some.tolist()]
+            pushes, ends = np.array(wrench) @ to_platform, np.empty_like(here)
+            push_all(rows, one.starts, free, here, pushes, ends)
+            for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
+                ends[k] = _push_slowly(one, rows, free, here[k], pushes[k])
+            here = ends
         u[some] = here
     moved = (u - found.clearances) @ to_platform.T
     return found.platform_screw + moved
+
+
+def _push_slowly(
+    one: OnePosture, rows: NDArray, free: NDArray, u: NDArray, push: NDArray
+) -> NDArray:
+    """(nu,) where a push leads, by Clarabel where the interior point breaks down."""
+    group = np.unique(one.joints.group[free], return_inverse=True)[1]
+    none, at = np.zeros((0, int(free.sum()))), np.linalg.norm(push[free])
+    least = minimise_energy(
+        none,
+        np.zeros(0),
+        push[free] / at,
+        rows[:, free],
+        rows[:, free] @ u[free],
+        group,
+    )
+    end = u.copy()
+    end[free] = least.clearances
+    return end
 
 
 def loaded_clearances(one: OnePosture, found: Draws) -> NDArray:
@@ -95,10 +121,3 @@ def _cone_columns(one: OnePosture) -> NDArray:
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
     """(k, cones) size of each cone's part."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))
-
-
-def _directions(seeds: NDArray) -> NDArray:
-    """(k, 6) random unit vectors, one for each seed."""
-    vectors = np.array([np.random.default_rng(s).normal(size=6) for s in seeds])
-    vectors = vectors.reshape(-1, 6)
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
