@@ -1,0 +1,81 @@
+"""Figures of ``crosscheck_validity.py``: what assumptions cost, over what matters."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+PANELS = {
+    "closures": ("(a) linear closures", "errors [mrad]"),
+    "beams": ("(b) beams, not solids", "slenderness L / r"),
+    "weights": ("(c) weight at the links' ends", "slenderness L / r"),
+    "discs": ("(d) disc and cone, not two bushes", "errors [mrad]"),
+}
+LIMITS = {"position": 20e-6, "energy": 0.01}  # [m], [-]
+STYLES = {"position": "o-", "energy": "s--"}
+
+
+def validity_figure(rows: list[dict]) -> Figure:
+    """Costs over their limits, 20 um or 1 %: medians, and the largest as thin lines.
+
+    Args:
+        rows: of the benchmark.
+
+    Returns:
+        One row of panels a robot, one panel an assumption.
+    """
+    names = list(dict.fromkeys(r["robot"] for r in rows))
+    figure = Figure(figsize=(15, 3.6 * len(names)), layout="constrained")
+    axes = figure.subplots(len(names), len(PANELS), sharey=True)
+    for (i, name), (j, (what, (title, label))) in (
+        (a, b) for a in enumerate(names) for b in enumerate(PANELS.items())
+    ):
+        panel = axes[i, j]
+        mine = [r for r in rows if r["robot"] == name and r["assumption"] == what]
+        for k, case in enumerate(dict.fromkeys(r["case"] for r in mine)):
+            chosen = [r for r in mine if r["case"] == case]
+            unit = 1e3 if label.startswith("errors") else 1.0
+            x = unit * np.array([r["x"] for r in chosen])
+            for kind, limit in LIMITS.items():
+                y = np.array([r[kind] for r in chosen]) / limit
+                shown = np.where(y > 1e-3, y, np.nan)
+                style = {"color": f"C{k}", "ms": 4}
+                panel.loglog(
+                    x, shown[:, 0], STYLES[kind], label=f"{case}: {kind}", **style
+                )
+                panel.loglog(x, shown[:, 1], STYLES[kind][1:], lw=0.5, color=f"C{k}")
+        panel.axhspan(1, 1e4, color="C3", alpha=0.08)
+        panel.axhline(1, color="C3", lw=1)
+        panel.set(title=f"{name} {title}", xlabel=label, ylim=(1e-3, 1e3))
+        panel.grid(visible=True, alpha=0.3)
+        panel.legend(fontsize=6)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("cost / (20 um or 1 %)")
+    return figure
+
+
+def pose_figure(maps: dict[str, dict]) -> Figure:
+    """Costs over the workspace at the paper's errors.
+
+    Args:
+        maps: by robot ``x``, ``z`` [m] and by assumption (z, x, 2) [m], [-].
+
+    Returns:
+        Position and energy of two assumptions for each robot.
+    """
+    from matplotlib.colors import LogNorm
+
+    figure = Figure(figsize=(15, 3.2 * len(maps)), layout="constrained")
+    axes = figure.subplots(len(maps), 4)
+    for i, (name, found) in enumerate(maps.items()):
+        kinds = [(a, k) for a in ("closures", "discs") for k in range(2)]
+        for panel, (what, k) in zip(axes[i], kinds, strict=True):
+            kind = list(LIMITS)[k]
+            values = found[what][..., k] / LIMITS[kind]
+            image = panel.pcolormesh(
+                found["x"], found["z"], values, cmap="coolwarm",
+                norm=LogNorm(1e-2, 1e2), shading="nearest",
+            )  # fmt: skip
+            panel.set(title=f"{name} {PANELS[what][0]}: {kind}", xlabel="x [m]",
+                      ylabel="z [m]")  # fmt: skip
+            panel.title.set_fontsize("small")
+        figure.colorbar(image, ax=axes[i], label="cost / (20 um or 1 %)")
+    return figure
