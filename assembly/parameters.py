@@ -23,9 +23,9 @@ _ABSENT: dict[str, Any] = {  # what a frame says that does not mention it
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
+_DH_UNITS = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}
 _UNITS = {
-    "translation": "m", "rotation": "rad", "theta": "rad", "d": "m", "a": "m",
-    "alpha": "rad", "radial": "m", "axial": "m", "tilt": "rad", "spin": "rad",
+    "translation": "m", "rotation": "rad", "radial": "m", "axial": "m", "tilt": "rad", "spin": "rad",
     "radius": "m", "inner_radius": "m", "width": "m", "height": "m", "length": "m",
     "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4", "shear_y": "1",
     "shear_z": "1", "young": "Pa", "poisson": "1", "density": "kg/m^3", "mass": "kg",
@@ -148,12 +148,12 @@ def load_design(name: str | Path) -> Design:
 
 def unit_of(path: str) -> str:
     """Unit of the number a path leads to; ``"SI"`` where it depends on more."""
-    for key in reversed(path.split(".")):
-        if key in _UNITS:
-            return _UNITS[key]
-        if key == "geometric_error":
-            return "rad" if path[-2] == "r" else "m"
-    return "SI"
+    *_, above, key = path.split(".")
+    if above == "dh":
+        return _DH_UNITS[key]
+    if above == "geometric_error":
+        return "rad" if key.startswith("r") else "m"
+    return _UNITS.get(key, _UNITS.get(above, "SI"))
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
