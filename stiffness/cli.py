@@ -6,44 +6,61 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
-from stiffness.interface import parse_interface
-from stiffness.options import BeamOptions, checked, direction
+from stiffness.arguments import (
+    Accuracy,
+    Base,
+    Density,
+    Figure,
+    Height,
+    InnerRadius,
+    Json,
+    Kind,
+    Poisson,
+    Radius,
+    Seconds,
+    SectionText,
+    Surface,
+    Theory,
+    Tip,
+    Unit,
+    Up,
+    Width,
+    Young,
+)
+from stiffness.interface import Interface, parse_interface
+from stiffness.library_cli import library
+from stiffness.link import LinkStiffness
+from stiffness.options import (
+    BeamOptions,
+    beam_name,
+    checked,
+    direction,
+    numbers,
+)
+from stiffness.options import (
+    wrench as parse_wrench,
+)
 from stiffness.reading import BadInput
 from stiffness.results import (
     comparison_results,
     comparison_text,
     link_results,
     link_text,
+    stress_results,
+    stress_text,
+    sweep_results,
+    sweep_text,
 )
 from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
-library = typer.Typer(no_args_is_help=True)
 app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
 
-Surface = Annotated[Path, typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, ...")]
-Young = Annotated[float, typer.Option(help="Young's modulus [Pa].")]
-Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
-Radius = Annotated[float | None, typer.Option(help="Outer radius [m].")]
-InnerRadius = Annotated[float | None, typer.Option(help="Of a tube's hole [m].")]
-Width = Annotated[float | None, typer.Option(help="Across `up` [m].")]
-Height = Annotated[float | None, typer.Option(help="Along `up` [m].")]
-Up = Annotated[str | None, typer.Option(help="The section's z: x, y, z or 0,0,1.")]
-Theory = Annotated[str, typer.Option(help="timoshenko or euler.")]
-Base = Annotated[
-    str, typer.Option(help='Held: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].')
+CurveFile = Annotated[
+    Path | None, typer.Option("--curve", help="A beam along a curve (TOML).")
 ]
-Tip = Annotated[str, typer.Option(help="Where the screw is read, like --base [m].")]
-Unit = Annotated[str, typer.Option(help="Of the file: m, cm, mm, um, inch.")]
-Accuracy = Annotated[float, typer.Option(help="Asked largest relative error of K.")]
-Kind = Annotated[str, typer.Option(help="rigid, distributing, distributing-both.")]
-Density = Annotated[float, typer.Option(help="[kg/m^3] for mass and inertia.")]
-Seconds = Annotated[float, typer.Option(help="Budget of time [s].")]
-Json = Annotated[
-    str | None, typer.Option("--json", help="Write results as JSON; - is stdout.")
-]
-Figure = Annotated[Path | None, typer.Option(help="Draw the comparison (png, svg).")]
 
 
 def _tell_progress() -> None:
@@ -51,6 +68,42 @@ def _tell_progress() -> None:
     log = logging.getLogger("stiffness.fea")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
+
+
+def _check_outputs(json: str | None, figure: Path | None = None) -> None:
+    """Refuse files that could not be written, before the work."""
+    for path in (figure, None if json in {None, "-"} else Path(str(json))):
+        if path is not None:
+            check_writable(path)
+
+
+def _interfaces(base: str, tip: str) -> tuple[Interface, Interface]:
+    """Both interfaces of the options."""
+    return parse_interface(base, "--base"), parse_interface(tip, "--tip")
+
+
+def _up(text: str | None) -> NDArray | None:
+    """The section's z, if it was given."""
+    return None if text is None else direction("--up", text)
+
+
+def _accuracy(value: float) -> float:
+    """An accuracy that can be asked for."""
+    return checked("--accuracy", value, "1", least=1e-5, below=0.5)
+
+
+def _curve_link(path: Path, options: BeamOptions) -> tuple[LinkStiffness, float, float]:
+    """A beam along a curve, its section's size and its length [m]."""
+    from stiffness.curve import curve_compliance, curve_length
+    from stiffness.curve_file import read_curve
+
+    E, nu = options.material()
+    theory = options.checked_theory()
+    pieces = read_curve(path, nu)
+    C = curve_compliance(pieces, E, nu, theory=theory)
+    name = f"{beam_name(theory)} along a curve"
+    link = LinkStiffness(name, C, tip=pieces[-1].place(1.0), base=pieces[0].place(0.0))
+    return link, pieces[0].section(0.0).size, curve_length(pieces)
 
 
 @app.command()
@@ -62,16 +115,34 @@ def beam(
     inner_radius: InnerRadius = None,
     width: Width = None,
     height: Height = None,
+    section: SectionText = None,
     axis: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
     up: Up = None,
     theory: Theory = "timoshenko",
     json: Json = None,
 ) -> None:
     """K_E of a straight beam of constant section, in closed form."""
-    options = BeamOptions(young, poisson, radius, inner_radius, width, height, theory)
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, theory, section
+    )
     along = direction("--axis", axis)
     tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
-    link = options.link(np.zeros(3), tip, None if up is None else direction("--up", up))
+    link = options.link(np.zeros(3), tip, _up(up))
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+@app.command()
+def curve(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Pieces (TOML).")],
+    young: Young,
+    poisson: Poisson,
+    theory: Theory = "timoshenko",
+    json: Json = None,
+) -> None:
+    """K_E of a beam along a curve: tapered, bent, L-shaped."""
+    link, _, _ = _curve_link(file, BeamOptions(young, poisson, theory=theory))
     write_json(link_results(link), json)
     if json != "-":
         print(link_text(link))
@@ -95,12 +166,11 @@ def fea(
     from stiffness.fea import Budget, mesh_link
 
     E, nu = BeamOptions(young, poisson).material()
-    held, moved = parse_interface(base, "--base"), parse_interface(tip, "--tip")
-    accuracy = checked("--accuracy", accuracy, "1", least=1e-5, below=0.5)
+    held, moved = _interfaces(base, tip)
     density = checked("--density", density, "kg/m^3", least=0)
     budget = Budget(seconds=checked("--seconds", seconds, "s", above=0))
-    if json not in {None, "-"}:
-        check_writable(Path(str(json)))
+    accuracy = _accuracy(accuracy)
+    _check_outputs(json)
     _tell_progress()
     link = mesh_link(
         surface, held, moved, E, nu,
@@ -123,6 +193,8 @@ def compare(
     inner_radius: InnerRadius = None,
     width: Width = None,
     height: Height = None,
+    section: SectionText = None,
+    curve: CurveFile = None,
     up: Up = None,
     theory: Theory = "timoshenko",
     unit: Unit = "m",
@@ -131,24 +203,32 @@ def compare(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """K_E by finite elements beside a straight beam, entry by entry."""
+    """K_E by finite elements beside a beam, straight or --curve, entry by entry."""
     from stiffness.compare import compare_link
     from stiffness.fea import mesh_link
 
-    options = BeamOptions(young, poisson, radius, inner_radius, width, height, theory)
-    section, (E, nu) = options.section(), options.material()
-    held, moved = parse_interface(base, "--base"), parse_interface(tip, "--tip")
-    accuracy = checked("--accuracy", accuracy, "1", least=1e-5, below=0.5)
-    roll = None if up is None else direction("--up", up)
-    for path in (figure, None if json in {None, "-"} else Path(str(json))):
-        if path is not None:
-            check_writable(path)
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, theory, section
+    )
+    (E, nu), roll = options.material(), _up(up)
+    if curve is not None:
+        if {radius, inner_radius, width, height, section, up} != {None}:
+            raise BadInput("--curve: its file has the sections and their axes")
+        bent = _curve_link(curve, options)
+    else:
+        bent, size = None, options.section().size
+    held, moved = _interfaces(base, tip)
+    accuracy = _accuracy(accuracy)
+    _check_outputs(json, figure)
     _tell_progress()
     meshed = mesh_link(
         surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
     )
-    straight = options.link(meshed.base, meshed.tip, roll)
-    comparison = compare_link(straight, meshed, section.size)
+    if bent is None:
+        straight = options.link(meshed.base, meshed.tip, roll)
+        comparison = compare_link(straight, meshed, size)
+    else:
+        comparison = compare_link(bent[0], meshed, *bent[1:])
     if figure is not None:
         from stiffness.plot import plot_comparison
 
@@ -158,84 +238,107 @@ def compare(
         print(comparison_text(comparison))
 
 
-Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
-
-
-@library.command()
-def build(
-    spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
-    workers: Annotated[int, typer.Option(help="Processes.")] = 1,
+@app.command()
+def slenderness(
+    young: Young,
+    poisson: Poisson,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    ratios: Annotated[str, typer.Option(help="L / r, two or more.")] = "5,10,20,40",
+    accuracy: Accuracy = 0.002,
+    interface: Kind = "rigid",
+    figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """Compute the entries a build file asks for; those already there are kept."""
+    """Beam beside finite elements over L / r: the end effect, fitted and drawn.
+
+    r is twice the section's larger radius of gyration, a round bar's radius.
+    """
     from rich.console import Console
     from rich.progress import Progress
 
-    from stiffness.library import build_library, read_spec
+    from stiffness.slenderness import sweep_slenderness
 
-    wanted = read_spec(spec)
-    count = int(checked("--workers", workers, "1", least=1))
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, section_text=section
+    )
+    (E, nu), declared = options.material(), options.declared()
+    wanted = numbers("--ratios", ratios, "1")
+    accuracy = _accuracy(accuracy)
+    _check_outputs(json, figure)
     with Progress(console=Console(stderr=True)) as bars:
-        task = bars.add_task("entries")
-        files = build_library(
-            wanted,
-            count,
-            lambda done, total: bars.update(task, completed=done, total=total),
-        )
-    write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
+        task = bars.add_task("lengths", total=len(wanted))
+        sweep = sweep_slenderness(
+            declared, E, nu, wanted, accuracy=accuracy, interface=interface,
+            update=lambda done, total: bars.update(task, completed=done, total=total),
+        )  # fmt: skip
+    if figure is not None:
+        from stiffness.plot import plot_slenderness
+
+        plot_slenderness(sweep).savefig(figure)
+    write_json(sweep_results(sweep), json)
     if json != "-":
-        print(f"{len(files)} entries in {wanted.folder}")
+        print(sweep_text(sweep))
 
 
-@library.command(name="list")
-def list_entries(folder: Folder, json: Json = None) -> None:
-    """The entries of a library and how good they are."""
-    from stiffness.library import read_library
-
-    entries = read_library(folder)
-    write_json({"entries": [e.about for e in entries]}, json)
-    if json != "-":
-        for entry in entries:
-            error = entry.about["relative_error_estimate"]
-            print(f"{entry.key}  error {error:.2g}")
-
-
-@library.command(name="look-up")
-def look_up_entry(
-    folder: Folder,
-    at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
+@app.command()
+def stress(
+    surface: Surface,
+    base: Base,
+    tip: Tip,
+    young: Young,
+    poisson: Poisson,
+    wrench: Annotated[list[str], typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")],
+    away: Annotated[
+        float | None,
+        typer.Option(help="From the interfaces [m]; one interface radius if absent."),
+    ] = None,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    up: Up = None,
+    unit: Unit = "m",
+    accuracy: Accuracy = 0.005,
+    interface: Kind = "rigid",
+    figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """K_E at parameters inside the library's grid, interpolated, with its error."""
-    from stiffness.library import look_up, read_library
-    from stiffness.link import scaled
-    from stiffness.options import assignments
-    from stiffness.results import matrix_text
+    """Peak von Mises stress of a tip wrench, away from the clamped edges.
 
-    wanted = assignments("--at", at)
-    K, error = look_up(read_library(folder), wanted)
-    worst = float(scaled(error, K).max())
-    results = {"parameters": wanted, "stiffness": K, "relative_error_estimate": worst}
-    write_json(results, json)
+    With a section, the beam formula stands beside it.
+    """
+    from stiffness.fea import Material, solve_link
+    from stiffness.stress import peak_stress, stress_influence
+    from stiffness.surface import read_surface
+
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, section_text=section
+    )
+    (E, nu), roll, load = options.material(), _up(up), parse_wrench("--wrench", wrench)
+    plain = {radius, inner_radius, width, height, section} == {None}
+    declared = None if plain else options.declared()
+    held, moved = _interfaces(base, tip)
+    accuracy = _accuracy(accuracy)
+    if away is not None:
+        checked("--away", away, "m", above=0)
+    _check_outputs(json, figure)
+    _tell_progress()
+    solved = solve_link(
+        read_surface(surface, unit), held, moved, [Material(E, nu)],
+        accuracy=accuracy, interface=interface,
+    )  # fmt: skip
+    peak = peak_stress(solved, load, section=declared, up=roll, away=away)
+    if figure is not None:
+        from stiffness.plot import plot_stress
+
+        everywhere = stress_influence(solved, away=0.0)
+        ends = solved.link.base, solved.link.tip
+        plot_stress(everywhere, peak, *ends, declared, roll).savefig(figure)
+    write_json(stress_results(peak), json)
     if json != "-":
-        print(matrix_text(K))
-        print(f"largest relative error: {worst:.2g} (estimate)")
-
-
-@library.command()
-def export(
-    folder: Folder,
-    to: Annotated[str, typer.Option(help="csv, exudyn, adams or mapdl.")] = "csv",
-    key: Annotated[str | None, typer.Option(help="One entry; all for csv.")] = None,
-) -> None:
-    """Print a library as CSV, or one entry's K_E for another program."""
-    from stiffness.export import library_csv, stiffness_for
-    from stiffness.library import read_entry, read_library
-
-    if to == "csv":
-        entries = read_library(folder) if key is None else [read_entry(folder, key)]
-        print(library_csv(entries), end="")
-        return
-    if key is None:
-        raise BadInput("--key: missing; another program reads one entry at a time")
-    print(stiffness_for(to, read_entry(folder, key).stiffness, key), end="")
+        print(stress_text(peak))

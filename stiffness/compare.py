@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.link import LinkStiffness, scaled
+from stiffness.reading import BadInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class Comparison:
         beam: the formula's answer.
         fea: the finite elements' answer, same tip and axes.
         difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
-        length: [m] base to tip.
+        length: [m] base to tip, along the beam.
         size: [m] of the section: radius of gyration times 2, the radius of a round bar.
     """
 
@@ -56,17 +57,46 @@ class Comparison:
         )
 
 
-def compare_link(beam: LinkStiffness, fea: LinkStiffness, size: float) -> Comparison:
+def compare_link(
+    beam: LinkStiffness,
+    fea: LinkStiffness,
+    size: float,
+    length: float | None = None,
+) -> Comparison:
     """Put two answers for one link side by side.
 
     Args:
         beam: by formula.
         fea: by finite elements, read at the same tip in the same axes.
         size: [m] of the section, the radius of a round bar.
+        length: [m] of the beam; from base to tip if absent.
 
     Returns:
         The comparison.
+
+    Raises:
+        BadInput: the two tips are further apart than 1e-6 m and 0.1 % of the length.
     """
+    length = float(np.linalg.norm(fea.tip - fea.base)) if length is None else length
+    gap = float(np.linalg.norm(fea.tip - beam.tip))
+    if gap > 1e-6 + 1e-3 * length:
+        ends = [", ".join(f"{v:.6g}" for v in link.tip) for link in (beam, fea)]
+        raise BadInput(
+            f"compare: the beam ends at ({ends[0]}) m, the surface's tip is at "
+            f"({ends[1]}) m; both must be one point"
+        )
     difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
-    length = float(np.linalg.norm(fea.tip - fea.base))
     return Comparison(beam, fea, difference, length, size)
+
+
+def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
+    """Upper entries of a stiffness that are more than a thousandth of their scale.
+
+    Args:
+        stiffness: (6, 6).
+
+    Returns:
+        Rows and columns.
+    """
+    matters = np.abs(np.triu(scaled(stiffness, stiffness))) > 1e-3
+    return [(int(i), int(j)) for i, j in zip(*np.nonzero(matters), strict=True)]

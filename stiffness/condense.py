@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from stiffness.elements import Quadratic, assemble
+from stiffness.elements import Quadratic, assemble, triangle_areas
 from stiffness.link import inverted
 from stiffness.screws import screw_map, skew
 from stiffness.solver import solve
@@ -139,9 +139,7 @@ def _averaging(mesh: Quadratic, patch: int, center: NDArray) -> NDArray:
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)
     mass = np.zeros((len(nodes), len(nodes)))
-    N, dN, weights = _triangle_rule()
-    J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
-    area = np.linalg.norm(np.cross(J[:, :, 0], J[:, :, 1]), axis=2) * weights
+    N, area = triangle_areas(mesh, faces)
     blocks = np.einsum("tq,qa,qb->tab", area, N, N)
     np.add.at(mass, (index[:, :, None], index[:, None, :]), blocks)
     motions = rigid_motions(mesh.nodes[nodes], center)
@@ -150,22 +148,6 @@ def _averaging(mesh: Quadratic, patch: int, center: NDArray) -> NDArray:
     loads = np.zeros((len(mesh.nodes), 3, 6))
     loads[nodes] = weighted @ inverted(gram)
     return loads
-
-
-def _triangle_rule() -> tuple[NDArray, NDArray, NDArray]:
-    """Shape functions, gradients and weights: six points, degree 4 (Dunavant)."""
-    a, b = 0.445948490915965, 0.091576213509771
-    v, w = 0.223381589678011 / 2, 0.109951743655322 / 2
-    L = np.array([np.roll([1 - 2 * p, p, p], k) for p in (a, b) for k in range(3)])
-    pairs = [(0, 1), (1, 2), (0, 2)]
-    middle = np.stack([4 * L[:, i] * L[:, j] for i, j in pairs], axis=1)
-    d = np.zeros((6, 6, 3))
-    for k in range(3):
-        d[:, k, k] = 4 * L[:, k] - 1
-    for k, (i, j) in enumerate(pairs):
-        d[:, 3 + k, i], d[:, 3 + k, j] = 4 * L[:, j], 4 * L[:, i]
-    N = np.concatenate([L * (2 * L - 1), middle], axis=1)
-    return N, d[:, :, 1:] - d[:, :, :1], np.repeat([v, w], 3)
 
 
 def _three_supports(mesh: Quadratic) -> NDArray:

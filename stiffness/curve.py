@@ -179,6 +179,22 @@ def curve_compliance(
     )
 
 
+def curve_length(pieces: Sequence[Piece]) -> float:
+    """Length of a beam along its curve.
+
+    Args:
+        pieces: straight ones and arcs, base to tip.
+
+    Returns:
+        [m].
+    """
+    speeds = [
+        [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
+        for piece in pieces
+    ]
+    return float(np.sum(np.array(speeds) @ _WEIGHTS) / 2)
+
+
 def _check_joined(pieces: Sequence[Piece]) -> None:
     """Each piece must begin where the one before ends."""
     for number, (one, next_one) in enumerate(

@@ -163,6 +163,41 @@ def node_gradients(mesh: Quadratic) -> Iterator[tuple[NDArray, NDArray]]:
         yield part, np.einsum("qai,tqxi->tqax", dN, np.linalg.inv(J))
 
 
+def triangle_areas(mesh: Quadratic, faces: NDArray) -> tuple[NDArray, NDArray]:
+    """What integrals over curved triangles need.
+
+    Args:
+        mesh: whose nodes they have.
+        faces: (f, 6) nodes of triangles.
+
+    Returns:
+        Shape functions (6, 6) at the quadrature points and weights (f, 6) [m^2].
+    """
+    N, dN, weights = triangle_rule()
+    J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
+    return N, np.linalg.norm(np.cross(J[:, :, 0], J[:, :, 1]), axis=2) * weights
+
+
+def triangle_rule() -> tuple[NDArray, NDArray, NDArray]:
+    """Quadrature of six points on a quadratic triangle, degree 4 (Dunavant).
+
+    Returns:
+        Shape functions (6, 6), their gradients (6, 6, 2) and weights (6,).
+    """
+    a, b = 0.445948490915965, 0.091576213509771
+    v, w = 0.223381589678011 / 2, 0.109951743655322 / 2
+    L = np.array([np.roll([1 - 2 * p, p, p], k) for p in (a, b) for k in range(3)])
+    pairs = [(0, 1), (1, 2), (0, 2)]
+    middle = np.stack([4 * L[:, i] * L[:, j] for i, j in pairs], axis=1)
+    d = np.zeros((6, 6, 3))
+    for k in range(3):
+        d[:, k, k] = 4 * L[:, k] - 1
+    for k, (i, j) in enumerate(pairs):
+        d[:, 3 + k, i], d[:, 3 + k, j] = 4 * L[:, j], 4 * L[:, i]
+    N = np.concatenate([L * (2 * L - 1), middle], axis=1)
+    return N, d[:, :, 1:] - d[:, :, :1], np.repeat([v, w], 3)
+
+
 def lame(E: float, nu: float) -> tuple[float, float]:
     """Lame's constants.
 

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from stiffness.beam import check_material
 from stiffness.body import PointMass, mass_properties
 from stiffness.condense import KINDS, Condensed, condense
-from stiffness.elements import Quadratic, integration, lame, quadratic
+from stiffness.elements import Quadratic, lame, quadratic
 from stiffness.estimate import error_matrices
 from stiffness.interface import Interface
 from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.mesh import MeshFailed, Solid, element_quality, mesh_solid
+from stiffness.mesh import MeshFailed, Solid, mesh_solid
 from stiffness.patches import triangles_on
+from stiffness.quality import mesh_report
 from stiffness.reading import BadInput, describe, nearest
 from stiffness.refine import refine
 from stiffness.solver import expected_cost, solver_name
@@ -398,19 +399,12 @@ def _finer(level: Level, growth: float) -> Solid:
 def _report(
     level: Level, surface: Surface, meshes: int, start: float
 ) -> dict[str, Any]:
-    """Counts, volume and quality of the finest mesh."""
-    volume = sum(float(w.sum()) for *_, w in integration(level.mesh))
-    quality = element_quality(level.solid)
-    return {
-        "nodes": len(level.mesh.nodes),
-        "elements": len(level.mesh.cells),
+    """The finest mesh, the surface it stands for, and what it took."""
+    return mesh_report(level.solid, level.mesh) | {
         "unknowns": level.solution.unknowns,
         "meshes": meshes,
-        "volume": volume,
         "surface_volume": surface.volume,
         "surface_area": surface.area,
-        "worst_quality": float(quality.min()),
-        "mean_quality": float(quality.mean()),
         "repairs": list(surface.repairs),
         "solver": solver_name(),
         "seconds": time.monotonic() - start,

@@ -280,22 +280,6 @@ def _nearest_patch(
     return patch
 
 
-def element_quality(solid: Solid) -> NDArray:
-    """How well shaped tetrahedra are.
-
-    Args:
-        solid: straight tetrahedra.
-
-    Returns:
-        (t,) [1] 1 for a regular one, 0 for a flat one: 6 sqrt(2) volume over the cube
-        of the root mean square edge.
-    """
-    corners = solid.points[solid.cells]
-    i, j = np.triu_indices(4, 1)
-    mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
-    return 6 * np.sqrt(2) * solid.volumes() / mean_square**1.5
-
-
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:

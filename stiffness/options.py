@@ -1,21 +1,25 @@
 """Values of command line options, checked; every mistake names its option."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.beam import (
-    THEORIES,
-    Section,
-    beam_compliance,
-    rectangular_section,
-    round_section,
-)
+from stiffness.beam import THEORIES, Section, beam_compliance, declared_section
 from stiffness.link import LinkStiffness
 from stiffness.reading import BadInput, describe, nearest
+from stiffness.screws import WRENCH
 
+_SECTIONS = (
+    {"radius"},
+    {"radius", "inner_radius"},
+    {"width", "height"},
+    {"width", "height", "wall"},
+    {"width", "height", "web", "flange"},
+    {item.name for item in fields(Section)},
+)
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -112,6 +116,79 @@ def assignments(option: str, texts: list[str]) -> dict[str, float]:
     return found
 
 
+def wrench(option: str, texts: list[str]) -> NDArray:
+    """A wrench as ``fx=10,mz=1``; components not named are zero.
+
+    Args:
+        option: for the message.
+        texts: what was given.
+
+    Returns:
+        (6,) [N m, N].
+
+    Raises:
+        BadInput: a part is not a component and a finite number, or comes twice.
+    """
+    names = [name.lower() for name in WRENCH]
+    found = np.zeros(6)
+    for name, value in assignments(option, texts).items():
+        if name not in names:
+            hint = nearest(name, names)
+            raise BadInput(f'{option}: unknown component "{name}"{hint}')
+        found[names.index(name)] = value
+    return found
+
+
+def numbers(option: str, text: str, unit: str) -> list[float]:
+    """Positive numbers between commas, smallest first, none twice.
+
+    Args:
+        option: for the message.
+        text: what was given.
+        unit: for the message.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        BadInput: one is not a finite number > 0, or stands there twice.
+    """
+    try:
+        found = sorted(float(part) for part in text.split(","))
+    except ValueError:
+        raise BadInput(
+            f"{option}: found {describe(text)}, expected numbers such as 5,10,20"
+        ) from None
+    for one, other in zip(found, [*found[1:], math.inf], strict=True):
+        checked(option, one, unit, above=0)
+        if one == other:
+            raise BadInput(f"{option}: {one:g} is given twice")
+    return found
+
+
+def check_section(place: str, given: Mapping[str, float]) -> None:
+    """Refuse what describes no section.
+
+    Args:
+        place: where it stands, for the message.
+        given: lengths or constants by name, see
+            :func:`stiffness.beam.declared_section`.
+
+    Raises:
+        BadInput: a name belongs to no section, or one lacks.
+    """
+    if set(given) in _SECTIONS:
+        return
+    known = set().union(*_SECTIONS)
+    for name in given:
+        if name not in known:
+            raise BadInput(f'{place}: unknown "{name}"{nearest(name, known)}')
+    kinds = "; ".join(", ".join(sorted(kind)) for kind in _SECTIONS)
+    raise BadInput(
+        f"{place}: found {', '.join(given) or 'nothing'}, expected one of: {kinds}"
+    )
+
+
 @dataclass(frozen=True)
 class BeamOptions:
     """What the command line says about a beam; absent values are None."""
@@ -123,52 +200,78 @@ class BeamOptions:
     width: float | None = None
     height: float | None = None
     theory: str = "timoshenko"
+    section_text: str | None = None
 
     def material(self) -> tuple[float, float]:
         """Young's modulus [Pa] and Poisson's ratio."""
         E = checked("--young", self.young, "Pa", above=0)
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
+    def declared(self) -> dict[str, float]:
+        """The section's lengths or constants by name; an error that says what lacks."""
+        plain = {
+            "radius": self.radius,
+            "inner_radius": self.inner_radius,
+            "width": self.width,
+            "height": self.height,
+        }
+        given = {name: value for name, value in plain.items() if value is not None}
+        if self.section_text is not None:
+            if given:
+                name = next(iter(given)).replace("_", "-")
+                raise BadInput(f"--section: says it all, --{name} does not go with it")
+            found = assignments("--section", [self.section_text])
+            check_section("--section", found)
+            return found
+        rectangle = "width" in given or "height" in given
+        if ("radius" in given) == rectangle:
+            raise BadInput(
+                "give either --radius, or --width and --height, or --section"
+            )
+        if rectangle and "inner_radius" in given:
+            raise BadInput("--inner-radius: goes with --radius, not with a rectangle")
+        for name in ("width", "height") if rectangle else ("radius",):
+            if name not in given:
+                raise BadInput(f"--{name}: missing; a rectangle has both")
+            checked(f"--{name}", given[name], "m", above=0)
+        if "inner_radius" in given:
+            inner = given["inner_radius"]
+            checked("--inner-radius", inner, "m", least=0, below=given["radius"])
+        return given
+
     def section(self) -> Section:
         """The section that the options describe, or an error that says what lacks."""
         _, nu = self.material()
-        rectangle = self.width is not None or self.height is not None
-        if (self.radius is not None) == rectangle:
-            raise BadInput("give either --radius, or --width and --height")
-        if self.radius is not None:
-            radius = checked("--radius", self.radius, "m", above=0)
-            inner = self.inner_radius or 0.0
-            inner = checked("--inner-radius", inner, "m", least=0, below=radius)
-            return round_section(radius, nu, inner)
-        if self.width is None or self.height is None:
-            missing = "--width" if self.width is None else "--height"
-            raise BadInput(f"{missing}: missing; a rectangle has both")
-        if self.inner_radius is not None:
-            raise BadInput("--inner-radius: goes with --radius, not with a rectangle")
-        width = checked("--width", self.width, "m", above=0)
-        return rectangular_section(
-            width, checked("--height", self.height, "m", above=0), nu
-        )
+        return declared_section(self.declared(), nu)
+
+    def checked_theory(self) -> str:
+        """The name of a beam theory."""
+        if self.theory not in THEORIES:
+            raise BadInput(
+                f"--theory: found {describe(self.theory)}"
+                f"{nearest(self.theory, THEORIES)}"
+            )
+        return self.theory
 
     def link(
         self, base: NDArray, tip: NDArray, up: NDArray | None = None
     ) -> LinkStiffness:
         """The beam between two points, in the axes they are given in."""
         E, nu = self.material()
-        if self.theory not in THEORIES:
-            raise BadInput(
-                f"--theory: found {describe(self.theory)}"
-                f"{nearest(self.theory, THEORIES)}"
-            )
-        section = self.section()
+        theory = self.checked_theory()
         C = beam_compliance(
             float(np.linalg.norm(tip - base)),
-            section,
+            self.section(),
             E,
             nu,
-            theory=self.theory,
+            theory=theory,
             axis=tip - base,
             up=up,
         )
-        names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
-        return LinkStiffness(names[self.theory], C, tip=tip, base=base)
+        return LinkStiffness(beam_name(theory), C, tip=tip, base=base)
+
+
+def beam_name(theory: str) -> str:
+    """What a result of a beam theory is called."""
+    names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
+    return names[theory]

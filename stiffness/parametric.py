@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.beam import Section, rectangular_section, round_section
+from stiffness.beam import Section, declared_section, round_section
 from stiffness.curve import Piece, straight_piece
 from stiffness.reading import BadInput, nearest
 from stiffness.surface import Surface, check_surface
@@ -16,6 +16,7 @@ SHAPES: dict[str, dict[str, float | None]] = {
     "tube": {"length": None, "radius": None, "inner_radius": None},
     "cone": {"length": None, "radius": None, "tip_radius": None},
     "rectangle": {"length": None, "width": None, "height": None},
+    "box": {"length": None, "width": None, "height": None, "wall": None},
 }
 _FACETS = 64
 
@@ -43,6 +44,10 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
             raise BadInput(f"{shape}: {name}: {found}, expected a length > 0 [m]")
     if shape == "tube" and lengths["inner_radius"] >= lengths["radius"]:
         raise BadInput("tube: inner_radius must be smaller than radius")
+    if shape == "box" and 2 * lengths["wall"] >= min(
+        lengths["width"], lengths["height"]
+    ):
+        raise BadInput("box: wall must leave a hole")
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
@@ -60,17 +65,17 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
     """
     check_shape(shape, lengths)
     L = lengths["length"]
-    if shape == "rectangle":
+    if shape in {"rectangle", "box"}:
         corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
         # the height stands along y: `up` of a beam along z
-        ring = corner * [lengths["width"], lengths["height"]]
-        return _prism([ring, ring], L, shape)
+        sides = np.array([lengths["width"], lengths["height"]])
+        hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
+        return _prism([corner * sides] * 2, L, shape, hole)
     angle = 2 * np.pi * np.arange(_FACETS) / _FACETS
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     r = lengths["radius"]
     if shape == "tube":
-        hole = lengths["inner_radius"]
-        return _prism([r * circle, r * circle], L, shape, hole * circle)
+        return _prism([r * circle] * 2, L, shape, lengths["inner_radius"] * circle)
     tip = lengths["tip_radius"] if shape == "cone" else r
     return _prism([r * circle, tip * circle], L, shape)
 
@@ -124,8 +129,5 @@ def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piec
             return round_section(r + taper * t, nu)
 
         return [straight_piece([0, 0, 0], top, section, [0, 1, 0])]
-    if shape == "rectangle":
-        constant = rectangular_section(lengths["width"], lengths["height"], nu)
-    else:
-        constant = round_section(r, nu, lengths.get("inner_radius", 0.0))
+    constant = declared_section({k: v for k, v in lengths.items() if k != "length"}, nu)
     return [straight_piece([0, 0, 0], top, constant, [0, 1, 0])]

@@ -8,11 +8,14 @@ and the report says so.  What happens inside that distance, and how a real joint
 the link, is left out.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffness.beam import section_axes
+from stiffness.beam_stress import peak_beam_stress
 from stiffness.elements import Quadratic, node_gradients
 from stiffness.estimate import PAIRS
 from stiffness.fea import Level, MeshedLink
@@ -65,6 +68,74 @@ class StressInfluence:
         values = von_mises(self.stresses(wrench))
         worst = int(np.argmax(values))
         return float(values[worst]), self.places[worst]
+
+
+@dataclass(frozen=True, eq=False)
+class PeakStress:
+    """The largest von Mises stress of one wrench at the tip of a meshed link.
+
+    Attributes:
+        wrench: (6,) [N m, N] at the tip, in the link's axes.
+        von_mises: [Pa].
+        place: (3,) [m] of it.
+        region: what was looked at, in words.
+        away: [m] nothing nearer than this to an interface was looked at.
+        beam: [Pa] and (3,) [m] by the beam formula, between the sections that are so
+            far from base and tip; None without a section.
+        beam_whole: [Pa] by the beam formula over the whole length; NaN without.
+    """
+
+    wrench: NDArray
+    von_mises: float
+    place: NDArray
+    region: str
+    away: float
+    beam: tuple[float, NDArray] | None = None
+    beam_whole: float = float("nan")
+
+
+def peak_stress(
+    solved: MeshedLink,
+    wrench: ArrayLike,
+    *,
+    section: Mapping[str, float] | None = None,
+    up: ArrayLike | None = None,
+    away: float | None = None,
+) -> PeakStress:
+    """Largest von Mises stress of a tip wrench, with the beam formula beside it.
+
+    Args:
+        solved: from :func:`stiffness.fea.solve_link`.
+        wrench: (6,) [N m, N] at the tip, in the link's axes.
+        section: of a straight beam from base to tip, as for
+            :func:`stiffness.beam_stress.peak_beam_stress`.
+        up: (3,) the section's z, in the link's axes.
+        away: [m] from the interfaces; one interface radius if absent.
+
+    Returns:
+        The peak, its place and region.
+
+    Raises:
+        BadInput: nothing of the link is so far away, or the section has no formula.
+    """
+    w = np.asarray(wrench, dtype=float)
+    if section is not None:
+        peak_beam_stress(section, 0.0, np.zeros(6))  # refused before the work
+    field = stress_influence(solved, away)
+    value, place = field.peak(w)
+    if section is None:
+        return PeakStress(w, value, place, field.region, field.away)
+    base, tip = solved.link.base, solved.link.tip
+    R = section_axes(tip - base, up)
+    length = float(np.linalg.norm(tip - base))
+    in_beam = np.r_[w[:3] @ R, w[3:] @ R]
+    whole, _ = peak_beam_stress(section, length, in_beam)
+    near_tip = in_beam.copy()
+    near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
+    stress, where = peak_beam_stress(section, length - 2 * field.away, near_tip)
+    where = base + R @ (where + [field.away, 0, 0])
+    beam = (float(stress), where)
+    return PeakStress(w, value, place, field.region, field.away, beam, float(whole))
 
 
 def von_mises(stress: ArrayLike) -> NDArray:

@@ -14,10 +14,10 @@ from stiffness.mesh import (
     MeshFailed,
     boundary_faces,
     cache_folder,
-    element_quality,
     mesh_solid,
 )
 from stiffness.patches import find_patches
+from stiffness.quality import element_quality
 from stiffness.reading import BadInput
 from stiffness.refine import refine
 from stiffness.screws import rotation_matrix
