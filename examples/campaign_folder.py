@@ -1,0 +1,115 @@
+"""Campaign folders written from other people's data, and where those data lie."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import Robot
+from assembly.robot_file import write_robot
+from stiffness.reading import BadInput
+from stiffness.screws import rotation_vector
+from validation.campaign import READING
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+def data_folder(name: str, data: Path | None = None) -> Path:
+    """Folder of a set of measured data.
+
+    Args:
+        name: of the set.
+        data: where all sets lie; the variable ``FORCEFIT_DATA`` if absent, else
+            ``../shared/data`` beside the repository.
+
+    Returns:
+        The folder.
+
+    Raises:
+        BadInput: there is none.
+    """
+    folder = (data or Path(os.environ.get("FORCEFIT_DATA", DATA))) / name
+    if not folder.is_dir():
+        raise BadInput(
+            f"{folder}: no such folder; expected the measured data there, or set "
+            "FORCEFIT_DATA to the folder that holds it (docs/measured_data.md)"
+        )
+    return folder
+
+
+def write_campaign(
+    folder: Path,
+    robot: Robot,
+    columns: Mapping[str, NDArray],
+    sigma: tuple[float, float],
+    registration: str = "unknown",
+) -> Path:
+    """Write a campaign folder in the public format, the robot file beside it.
+
+    Args:
+        folder: made if absent.
+        robot: its platform is the point that was measured.
+        columns: (k,) by the names of ``measurements.csv``; ``id`` is added if absent.
+        sigma: [rad], [m] of a reading.
+        registration: ``"known"`` or ``"unknown"``.
+
+    Returns:
+        The folder.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    write_robot(robot, folder / "robot.toml")
+    (folder / "campaign.toml").write_text(
+        'robot = "robot.toml"\n'
+        'measurements = "measurements.csv"\n'
+        f'registration = "{registration}"\n'
+        f"\n[noise]\nrotation = {sigma[0]!r}\nposition = {sigma[1]!r}\n"
+    )
+    count = len(next(iter(columns.values())))
+    table = {"id": np.array([f"m{i + 1:05d}" for i in range(count)]), **columns}
+    text = [",".join(table)]
+    cells = [[_cell(x) for x in column.tolist()] for column in table.values()]
+    text += [",".join(row) for row in zip(*cells, strict=True)]
+    (folder / "measurements.csv").write_text("\n".join(text) + "\n")
+    return folder
+
+
+def _cell(value: float | str) -> str:
+    """Text of a cell; NaN is an empty one."""
+    if isinstance(value, str):
+        return value
+    return "" if np.isnan(value) else f"{value:.12g}"
+
+
+def deviation_columns(nominal: NDArray, measured: NDArray, turn: bool) -> dict:
+    """``meas.*`` of poses measured in one frame, brought onto the nominal ones.
+
+    The device's frame is laid on the base by least squares over positions (Kabsch,
+    1976), so that deviations are small; its exact place stays to be fitted.
+
+    Args:
+        nominal: (k, 4, 4) platform seen from the base.
+        measured: (k, 4, 4) seen from the device.
+        turn: whether rotations were measured too.
+
+    Returns:
+        Columns (k,).
+    """
+    base = base_pose(nominal, measured)
+    R = base[:3, :3].T
+    shift = (measured[:, :3, 3] - base[:3, 3]) @ R.T - nominal[:, :3, 3]
+    turned = R @ measured[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    screw = np.concatenate([rotation_vector(turned), shift], axis=1)
+    kept = READING if turn else READING[3:]
+    return {f"meas.{name}": screw[:, READING.index(name)] for name in kept}
+
+
+def base_pose(nominal: NDArray, measured: NDArray) -> NDArray:
+    """(4, 4) base seen from the device, from positions (k, 4, 4): Kabsch (1976)."""
+    a, b = nominal[:, :3, 3], measured[:, :3, 3]
+    U, _, Vt = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
+    T = np.eye(4)
+    T[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    T[:3, 3] = b.mean(0) - T[:3, :3] @ a.mean(0)
+    return T

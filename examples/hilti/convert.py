@@ -1,0 +1,132 @@
+"""Hilti's construction robot: URDF to a robot file, waypoints to campaign folders.
+
+The robot file is derived from the URDF and stays under its licence (CC BY-NC-SA 3.0):
+it is written beside the campaigns and not kept in this repository.
+"""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from assembly.nominal import Target, follow
+from assembly.posture import home_posture
+from assembly.robot import Frame, Robot
+from examples.campaign_folder import (
+    data_folder,
+    deviation_columns,
+    write_campaign,
+)
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+
+NAME = "hilti_trailblazer"
+FILES = ("flat", "pallet", "orthogonal_wood")
+SEGMENTS = {"column_middle_joint": -0.706, "column_top_joint": -0.736}  # [m] README
+ARM = tuple(f"dsr_joint{k}" for k in range(1, 7))
+SIGMA = 0.75e-3  # [m] of the total station, an axis
+STATIONING = ("stationing_measurements", "evaluation_measurements")
+
+
+def urdf_robot(path: Path, tip: str = "prism") -> Robot:
+    """The chain of a URDF from its root to a link; that link's frame is the platform.
+
+    A URDF link hangs behind its joint, a body of ours reaches to it: the mass of a
+    link belongs to the next frame.  Side branches are left out with their masses.
+
+    Args:
+        path: of the file.
+        tip: name of the last link.
+
+    Returns:
+        The robot; every joint of the chain that moves is actuated.
+    """
+    root = ET.parse(path).getroot()
+    links = {link.get("name"): link for link in root.findall("link")}
+    above = {j.find("child").get("link"): j for j in root.findall("joint")}
+    chain = []
+    while tip in above:
+        chain.append(above[tip])
+        tip = above[tip].find("parent").get("link")
+    frames, parent = [], "base"
+    for joint in reversed(chain):
+        place = _origin(joint)
+        inertial = links[joint.find("parent").get("link")].find("inertial")
+        mass, centre = 0.0, np.zeros(3)
+        if inertial is not None:
+            mass = float(inertial.find("mass").get("value"))
+            centre = np.linalg.solve(place, _origin(inertial))[:3, 3]
+        kind = joint.get("type")
+        frames.append(
+            Frame(
+                joint.get("name"), parent, place[:3, 3],
+                rotation_vector(place[:3, :3]), joint=kind, actuated=kind != "fixed",
+                mass=mass, centre_of_mass=centre,
+            )
+        )  # fmt: skip
+        parent = joint.get("name")
+    return Robot(root.get("name"), parent, tuple(frames), (), "from a URDF")
+
+
+def _origin(element: ET.Element) -> NDArray:
+    """(4, 4) of an ``origin``; roll, pitch, yaw about fixed axes."""
+    origin = element.find("origin")
+    xyz = [float(x) for x in origin.get("xyz").split()]
+    r, p, y = (float(x) for x in (origin.get("rpy") or "0 0 0").split())
+    turn = rotation_matrix([[0, 0, y], [0, p, 0], [r, 0, 0]])
+    return transform(xyz, turn[0] @ turn[1] @ turn[2])
+
+
+def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
+    """Write one campaign folder for each file of waypoints.
+
+    Args:
+        out: folder of the campaigns.
+        data: where all measured data lie.
+
+    Returns:
+        The folders by file.
+    """
+    source = data_folder(NAME, data)
+    robot = urdf_robot(source / "trailblazer.urdf")
+    return {file: _convert(robot, source, file, out / file) for file in FILES}
+
+
+def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
+    """One file of waypoints."""
+    text = (source / f"{file}.yaml").read_text()
+    rows = list(_rows(yaml.load(text, yaml.CSafeLoader)))
+    rows.sort(key=lambda row: row["time"])
+    joints = np.array([row["joint_states"] for row in rows])
+    q = np.zeros((len(rows), len(robot.frames)))
+    for name, offset in SEGMENTS.items():
+        q[:, robot.index(name)] = 0.5 * joints[:, 0] + offset
+    q[:, [robot.index(name) for name in ARM]] = joints[:, 1:]
+    home = home_posture(robot).coordinates
+    T = follow(robot, home, Target(coordinates=q), steps=1).transforms[:, -1]
+    measured = transform([row["prism_position"] for row in rows], T[:, :3, :3])
+    columns = {f"q.{n}": q[:, robot.index(n)] for n in (*SEGMENTS, *ARM)}
+    columns |= deviation_columns(T, measured, turn=False)
+    time = np.array([row["time"] for row in rows])
+    columns["cov.time"] = time - time[0]
+    for name in ("stationing", "height", "space"):
+        columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
+    for place in ("base", "column"):
+        accel = np.array([row[f"tilt_sensor_{place}_accel"] for row in rows])
+        up = accel / np.linalg.norm(accel, axis=1)[:, None]
+        for k, axis in enumerate("xyz"):
+            columns[f"cov.up_{place}_{axis}"] = up[:, k]
+    return write_campaign(folder, robot, columns, (1.0, SIGMA))
+
+
+def _rows(content: dict) -> list[dict]:
+    """All waypoints, with column height, solution space and whether for stationing."""
+    found = []
+    for height, at_height in content["column_heights"].items():
+        for space, station in at_height["solution_spaces"].items():
+            for kind in STATIONING:
+                marks = {"height": height, "space": space}
+                marks["stationing"] = kind == STATIONING[0]
+                found += [row | marks for row in station[kind]]
+    return found
