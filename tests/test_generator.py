@@ -48,12 +48,17 @@ def row(q=0.0, load=(0, 0, 0, 0, 0, 0), **conditions):
     return Row({"drive": q, "tip": 0.0}, wrench, CONDITIONS | conditions)
 
 
-def added(name, parameters, where, robot=None, point=(0, 0, 0)):
-    """What an effect adds to the reading of a row."""
-    robot = robot or one_link()
-    without = simulate_readings(robot, np.array(point), [where])
-    effects = [Hidden(name, parameters)]
-    return (simulate_readings(robot, np.array(point), [where], effects) - without)[0]
+@pytest.fixture(params=["multibody", "springs"])
+def added(request):
+    """What an effect adds to the reading of a row, by either program."""
+
+    def difference(name, parameters, where, robot=None, program=request.param):
+        case = robot or one_link(), np.zeros(3), [where]
+        without = simulate_readings(*case, program=program)
+        effects = [Hidden(name, parameters)]
+        return (simulate_readings(*case, effects, program) - without)[0]
+
+    return difference
 
 
 def close(found, expected, relative, floor=1e-11):
@@ -77,7 +82,7 @@ def test_a_declared_error_is_in_the_reading_exactly():
 
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
-def test_weight_bends_a_beam_with_a_body_at_its_end(g):
+def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
     """w L^4/8EI + w L^2/2kGA of the beam, m g L^3/3EI + m g L/kGA of the body.
 
     A bent beam is also shorter, by less than s^2/L = 2.4e-8 m: second order.
@@ -90,19 +95,19 @@ def test_weight_bends_a_beam_with_a_body_at_its_end(g):
     close(found, [0, slope, 0, 0, 0, -sag], 1e-5, 2.4e-8)
 
 
-def test_a_warm_beam_is_longer_along_itself():
+def test_a_warm_beam_is_longer_along_itself(added):
     """Alpha T L = 2e-5 x 5 x 0.5 m, exact."""
     q = 0.7
     found = added("thermal_expansion", {"tip": 2e-5}, row(q))
     close(found, [0, 0, 0, 5e-5 * math.cos(q), 5e-5 * math.sin(q), 0], 1e-9)
 
 
-def test_a_longer_beam_is_longer_along_itself():
+def test_a_longer_beam_is_longer_along_itself(added):
     found = added("link_length", {"tip": 3e-4}, row(-0.4))
     close(found, [0, 0, 0, 3e-4 * math.cos(0.4), -3e-4 * math.sin(0.4), 0], 1e-9)
 
 
-def test_a_longer_beam_also_bends_more():
+def test_a_longer_beam_also_bends_more(added):
     """P (L + d)^3 / 3EI + P (L + d) / kGA beside the same with d = 0, across."""
     P, d = 1.0, 1e-2
     found = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
@@ -110,14 +115,14 @@ def test_a_longer_beam_also_bends_more():
     assert found[5] == pytest.approx(-P * more, rel=1e-4)
 
 
-def test_an_elastic_drive_turns_under_the_moment_it_holds():
+def test_an_elastic_drive_turns_under_the_moment_it_holds(added):
     """F L / k, beside the declared spring and not instead of it."""
     F, k = 10.0, 5e4
     found = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
     close(found[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
 
 
-def test_a_foundation_shifts_and_tilts():
+def test_a_foundation_shifts_and_tilts(added):
     """A force F along y at (L, 0, 0): F/k_t along y, F L / k_r about z."""
     F = 10.0
     springs = {"rx": 1e6, "ry": 1e6, "rz": 2e5, "tx": 1e8, "ty": 4e6, "tz": 1e8}
@@ -127,7 +132,7 @@ def test_a_foundation_shifts_and_tilts():
 
 
 @pytest.mark.parametrize("name", ["offset", "eccentricity", "wobble"])
-def test_an_encoder_that_reads_wrong_turns_the_beam(name):
+def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
     """Exact: the tip is at L (cos, sin)(q + d)."""
     q, size, phase = 0.6, 2e-3, 0.9
     given = {"drive.amplitude": size, "drive.phase": phase}
@@ -142,7 +147,7 @@ def test_an_encoder_that_reads_wrong_turns_the_beam(name):
     close(found, [0, 0, d, L * dx, L * dy, 0], 1e-9)
 
 
-def test_the_measuring_frame_stands_off_and_the_target_too():
+def test_the_measuring_frame_stands_off_and_the_target_too(added):
     """Exact: B R and B (p + R tool); a turn by b about z, then a shift."""
     q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
     given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
@@ -154,7 +159,7 @@ def test_the_measuring_frame_stands_off_and_the_target_too():
     close(found, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
 
 
-def test_a_softer_beam_bends_more():
+def test_a_softer_beam_bends_more(added):
     """(1/f - 1) (P L^3/3EI + P L/kGA): G falls with E."""
     P, f = 1.0, 0.8
     found = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
@@ -163,20 +168,20 @@ def test_a_softer_beam_bends_more():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_load_takes_up_play(side):
+def test_a_load_takes_up_play(added, side):
     """A force along x shifts the beam by the radial play, towards the force."""
     play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
     found = added("joint_clearance", play, row(load=(0, 0, 0, 20 * side, 0, 0)))
     close(found, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
-def test_play_that_no_load_takes_up_moves_nothing():
+def test_play_that_no_load_takes_up_moves_nothing(added):
     play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
     assert np.abs(added("joint_clearance", play, row())).max() < 1e-9
 
 
 @pytest.mark.parametrize("approach", [1.0, -1.0])
-def test_friction_holds_an_elastic_joint_back(approach):
+def test_friction_holds_an_elastic_joint_back(added, approach):
     """- tau x approach / k about the joint's axis."""
     tau = 0.5
     found = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
@@ -185,7 +190,7 @@ def test_friction_holds_an_elastic_joint_back(approach):
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
 @pytest.mark.parametrize("force", [10.0, -0.1])
-def test_a_contact_yields_as_its_law_says(exponent, force):
+def test_a_contact_yields_as_its_law_says(added, exponent, force):
     """F L = c d^n beside all else that yields."""
     c = 2e7
     given = {"drive.coefficient": c, "drive.exponent": exponent}
@@ -194,7 +199,7 @@ def test_a_contact_yields_as_its_law_says(exponent, force):
     close(found[[2, 4]], [d, d * L], 1e-4)
 
 
-def test_a_load_that_is_not_the_one_recorded():
+def test_a_load_that_is_not_the_one_recorded(added):
     """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
     P, f, more = 2.0, 1.1, 0.3
     given = {"factor": f, "offset.fz": more}
@@ -203,13 +208,13 @@ def test_a_load_that_is_not_the_one_recorded():
     assert found[5] == pytest.approx(((f - 1) * P + more) * bend, rel=1e-7)
 
 
-def test_the_reading_drifts():
+def test_the_reading_drifts(added):
     given = {"amplitude.ry": 2e-5, "amplitude.tz": -1e-5, "time_constant": 150.0}
     rise = 1 - math.exp(-2.0)  # at 300 s
     close(added("drift", given, row()), [0, 2e-5 * rise, 0, 0, 0, -1e-5 * rise], 1e-12)
 
 
-def test_what_a_linear_model_misses_is_added():
+def test_what_a_linear_model_misses_is_added(added):
     """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
@@ -225,7 +230,7 @@ def test_what_a_linear_model_misses_is_added():
     assert campaign.strength["geometric_stiffening"] == pytest.approx(5.0, rel=1e-9)
 
 
-def test_effects_outside_the_library():
+def test_effects_outside_the_library(added):
     """A drive's softness (1 + cos 3q)/2, swelling, T^2, a stand, a sagging target."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
@@ -258,7 +263,7 @@ def two_walls():
     return Robot("walls", "a", frames, (("a", "b"),))
 
 
-def test_a_closed_loop_shares_what_does_not_fit():
+def test_a_closed_loop_shares_what_does_not_fit(added):
     """Equal springs: half of a length, of an offset, of a strain; F / (k1 + k2)."""
     robot = two_walls()
     rest = {f.name: 0.0 for f in robot.frames}
@@ -277,7 +282,7 @@ def test_a_closed_loop_shares_what_does_not_fit():
     assert soft[3] == pytest.approx(F / (2 * k), rel=1e-5)
 
 
-def test_errors_of_the_declared_robot_and_an_effect_add_up():
+def test_errors_of_the_declared_robot_and_an_effect_add_up(added):
     """First order: what an effect adds does not depend on small declared errors."""
     rng = np.random.default_rng(3)
     wrong = one_link(error=1e-4 * rng.normal(size=6))

@@ -21,8 +21,12 @@ from assembly.cli import (
 from assembly.posture import Posture
 from stiffness.reading import BadInput
 from stiffness.writing import write_json
+from validation.generator_cli import generate
+from validation.inspect_cli import inspect
 
 app = typer.Typer(no_args_is_help=True)
+app.command()(generate)
+app.command()(inspect)
 
 
 @app.callback()

@@ -21,15 +21,14 @@ from assembly.robot import Robot
 from assembly.robot_file import write_robot
 from stiffness.reading import BadInput
 from stiffness.writing import check_writable
-from validation.generator_design import Design, Plan, plan_campaign, thinned
+from validation.generator_design import Design, Plan, plan_campaign
 from validation.generator_draws import draw_effect, strengthened
 from validation.generator_effects import SCREW, WRENCH, Row
 from validation.generator_machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
-_SAMPLE = 24  # rows on which an effect's strength is set
-_TRIES = 6
-_CLOSE = 0.02  # relative, of a strength to the one asked for
+_TRIES = 5
+_CLOSE = 0.05  # relative, of a strength to the one asked for
 _SMALL = 1e-2  # scale of errors and load at which the machine is linear
 _BLUNDER = 40.0  # [-] sigmas of an outlier
 
@@ -100,6 +99,7 @@ def generate_campaign(
     noise: Noise | None = None,
     reference_point: ArrayLike = (0.0, 0.0, 0.0),
     seed: int = 0,
+    program: str = "multibody",
     update: Progress | None = None,
 ) -> Synthetic:
     """Measure a simulated machine.
@@ -112,6 +112,7 @@ def generate_campaign(
         noise: what spoils it.
         reference_point: (3,) [m] measured point, platform axes.
         seed: of all draws.
+        program: ``"multibody"`` or, much faster, ``"springs"``.
         update: called with a stage, the rows done and their total.
 
     Returns:
@@ -132,17 +133,15 @@ def generate_campaign(
         wanted = [(drawn[name], multiple) for name, multiple in wanted.items()]
     # what has no strength of its own sets the noise, before the others follow it
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
-    lab = _Lab(robot, point, plan.rows, update)
+    lab = _Lab(robot, point, plan.rows, program, update)
     declared = lab.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
         declared = _linear(lab)
-    sigma, effects, strength = noise.sigma, [], {}
+    sigma, exact = noise.sigma, declared
+    effects, strength = [], {}
     for effect, multiple in wanted:
-        found, sigma = _as_strong_as(lab, effect, multiple, sigma, declared)
-        effects.append(found)
-    exact = declared
-    for effect in effects:
-        exact = lab.read([effect], effect.name)
+        effect, exact, sigma = _as_strong_as(lab, effect, multiple, sigma, declared)
+        effects.append(effect)
         strength[effect.name] = _rms((exact - declared) / sigma)
     if len(effects) > 1:
         exact = lab.read(effects, "all effects")
@@ -166,39 +165,35 @@ class _Lab:
     robot: Robot
     point: NDArray
     rows: Sequence[Row]
+    program: str
     update: Progress | None
 
-    def read(
-        self, effects: Sequence[Hidden], stage: str, some: Sequence[int] | None = None
-    ) -> NDArray:
-        """Readings without noise, of some rows or of all."""
-        rows = self.rows if some is None else [self.rows[i] for i in some]
+    def read(self, effects: Sequence[Hidden], stage: str) -> NDArray:
+        """Readings of all rows without noise."""
         update = self.update
         progress = None if update is None else (lambda d, n: update(stage, d, n))
-        return simulate_readings(self.robot, self.point, rows, effects, progress)
+        return simulate_readings(
+            self.robot, self.point, self.rows, effects, self.program, progress
+        )
 
 
 def _as_strong_as(
     lab: _Lab, effect: Hidden, multiple: float, sigma: NDArray, declared: NDArray
-) -> tuple[Hidden, NDArray]:
-    """The effect at a strength, or the noise that gives it that strength."""
-    some = thinned(lab.rows, _SAMPLE)
-
-    def strength(tried: Hidden) -> float:
-        added = lab.read([tried], f"strength of {effect.name}", some) - declared[some]
-        return _rms(added / sigma)
-
-    if effect.name in _GIVEN_STRENGTH:
-        return effect, sigma * (strength(effect) / multiple)
+) -> tuple[Hidden, NDArray, NDArray]:
+    """The effect at a strength, what is read then, and the noise (see the head)."""
     factor = 1.0
-    for _ in range(_TRIES):
-        reached = strength(strengthened(effect, factor))
+    for attempt in range(_TRIES):
+        tried = strengthened(effect, factor) if attempt else effect
+        exact = lab.read([tried], f"{effect.name}, strength {factor:.3g}")
+        reached = _rms((exact - declared) / sigma)
         if reached == 0.0:
             raise BadInput(f"{effect.name}: adds nothing to any reading; try another")
+        if effect.name in _GIVEN_STRENGTH:
+            return tried, exact, sigma * (reached / multiple)
         if abs(reached / multiple - 1.0) < _CLOSE:
             break
         factor *= multiple / reached
-    return strengthened(effect, factor), sigma
+    return tried, exact, sigma
 
 
 def _linear(lab: _Lab) -> NDArray:
@@ -207,7 +202,7 @@ def _linear(lab: _Lab) -> NDArray:
     for scale in (_SMALL, -_SMALL):
         small = lab.robot.with_errors(scale * lab.robot.errors)
         rows = [replace(row, load=scale * row.load) for row in lab.rows]
-        ends.append(_Lab(small, lab.point, rows, lab.update).read((), "linear model"))
+        ends.append(replace(lab, robot=small, rows=rows).read((), "linear model"))
     return (ends[0] - ends[1]) / (2 * _SMALL)
 
 
@@ -230,6 +225,20 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that a campaign cannot be written to, before the work.
+
+    Args:
+        folder: to be new, or empty.
+
+    Raises:
+        BadInput: it holds something already, or where it should be is closed to us.
+    """
+    check_writable(folder.parent / "file")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadInput(f"{folder}: found something there, expected a new folder")
+
+
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
     """Write campaign.toml, measurements.csv and robot.toml, all or none of them.
 
@@ -241,9 +250,7 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
         BadInput: the folder holds something already or cannot be written.
     """
     folder = Path(folder)
-    check_writable(folder.parent / "file")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise BadInput(f"{folder}: found something there, expected a new folder")
+    check_folder(folder)
     part = folder.with_name(folder.name + ".part")
     shutil.rmtree(part, ignore_errors=True)
     try:

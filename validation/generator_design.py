@@ -1,6 +1,5 @@
 """Which configurations, loads and conditions a synthetic campaign measures."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -219,9 +218,3 @@ def _temperature(design: Design, time: NDArray, rng: np.random.Generator) -> NDA
     phase = rng.uniform(0, 2 * np.pi)
     wave = middle + size * np.sin(2 * np.pi * time / _PERIOD + phase)
     return (wave + rng.normal(0, 0.05, len(time))).round(2)
-
-
-def thinned(rows: Sequence[Row], count: int) -> list[int]:
-    """Numbers of about as many rows as asked for, evenly spread."""
-    step = max(len(rows) // count, 1)
-    return list(range(0, len(rows), step))

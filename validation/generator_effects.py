@@ -25,7 +25,7 @@ from validation.motion import placement, turned
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
-SENSOR = 1e11  # [N m/rad, N/m] rigid for all that matters, and it tells its load
+SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] rigid for all that matters; tells its load
 Parameters = Mapping[str, float]
 
 
@@ -92,6 +92,21 @@ class Machine:
     load: NDArray
     gravity: NDArray = field(default_factory=lambda: np.zeros(3))
     laws: Mapping[str, "Contact | Rattle"] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Where a machine comes to rest; rows are frames.
+
+    Attributes:
+        transforms: (n, 4, 4) before the joint's own motion, seen from the base.
+        joint_wrenches: (n, 6) [N m, N] what joint springs carry, frame's axes.
+        joint_screws: (n, 6) [rad, m] how far they give way.
+    """
+
+    transforms: NDArray
+    joint_wrenches: NDArray
+    joint_screws: NDArray
 
 
 Change = Callable[[Machine, Row, Parameters], Machine]
@@ -229,7 +244,8 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
         if robot.closures:  # who takes up how much is for the simulation to find
             robot = with_frame(robot, replace(robot.frame(name), clearance=play))
             continue
-        K = along_own_axis(robot.frame(name), math.inf, SENSOR)
+        K = np.repeat(SENSOR, 3)
+        K[robot.frame(name).own_axis] = math.inf
         robot = insert_after(robot, name, "play", joint_stiffness=np.diag(K))
         laws[f"{name}~play"] = Rattle(play)
     return replace(machine, robot=robot, laws=laws)

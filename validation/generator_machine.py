@@ -1,6 +1,6 @@
 """What a simulated machine reads at the rows of a design, hidden effects included."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,14 +21,12 @@ from validation.generator_outside import (
     OUTSIDE_COVARIATES,
     OUTSIDE_READINGS,
 )
-from validation.generator_rest import rest_pose
+from validation.generator_rest import Progress, rest_poses
 from validation.motion import placement, shifted, turn_of
 
 _ALL_CHANGES = CHANGES | OUTSIDE_CHANGES
 _ALL_READINGS = READINGS | OUTSIDE_READINGS
 _ALL_COVARIATES = COVARIATES | OUTSIDE_COVARIATES
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +47,7 @@ def simulate_readings(
     reference_point: NDArray,
     rows: Sequence[Row],
     effects: Sequence[Hidden] = (),
+    program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
     """Deviations of a simulated machine at the rows of a design, without noise.
@@ -61,7 +60,8 @@ def simulate_readings(
             axes.
         rows: commanded configurations, loads and covariates.
         effects: what the machine has and the declared model lacks.
-        update: called with the number of rows done and their total.
+        program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
+        update: called with the number of machines done and their total.
 
     Returns:
         (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T and difference of
@@ -71,22 +71,21 @@ def simulate_readings(
         SimulationFailed: a row has no equilibrium.
     """
     pointed = with_point(robot, reference_point)
-    used = sorted({c for e in effects for c in _ALL_COVARIATES.get(e.name, ())})
-    known: dict[tuple, NDArray] = {}
-    readings = np.zeros((len(rows), 6))
-    for i, row in enumerate(rows):
-        key = (
-            tuple(row.coordinates.values()),
-            row.load.tobytes(),
-            tuple(row.covariates[name] for name in used),
-        )
-        if key not in known:
-            known[key] = _actual_pose(pointed, row, effects)
-        nominal = nominal_pose(pointed, row)
-        readings[i] = _read(known[key], nominal, row, effects)
-        if update is not None:
-            update(i + 1, len(rows))
-    return readings
+    changing = [effect for effect in effects if effect.name in _ALL_CHANGES]
+    used = sorted({c for e in changing for c in _ALL_COVARIATES.get(e.name, ())})
+    machines: dict[tuple, Machine] = {}
+    keys = []
+    for row in rows:
+        conditions = tuple(row.covariates[name] for name in used)
+        keys.append((*row.coordinates.values(), row.load.tobytes(), *conditions))
+        if keys[-1] not in machines:
+            machines[keys[-1]] = _machine(pointed, row, changing)
+    poses = rest_poses(list(machines.values()), program, update)
+    known = dict(zip(machines, poses, strict=True))
+    return np.array([
+        _read(known[key], nominal_pose(pointed, row), row, effects)
+        for key, row in zip(keys, rows, strict=True)
+    ])
 
 
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
@@ -110,14 +109,13 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
         frame = robot.frame(frame.parent)
 
 
-def _actual_pose(robot: Robot, row: Row, effects: Sequence[Hidden]) -> NDArray:
-    """(4, 4) where the reference point comes to rest."""
+def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
+    """The machine of a row, with the effects that change it."""
     machine = Machine(robot, row.coordinates, row.load)
-    for effect in effects:
-        if effect.name in _ALL_CHANGES:
-            change = _ALL_CHANGES[effect.name]
-            machine = change(machine, row, effect.parameters)
-    return rest_pose(machine)
+    for effect in changing:
+        change = _ALL_CHANGES[effect.name]
+        machine = change(machine, row, effect.parameters)
+    return machine
 
 
 def _read(
