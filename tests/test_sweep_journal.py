@@ -1,0 +1,205 @@
+"""A sweep killed anywhere goes on, loses nothing and ends in the same bytes."""
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.journal import open_journal
+from assembly.quantities import Question, record_type
+from assembly.robots import load_robot
+from assembly.sweep import Sweep, journal_path, run_sweep, solve_here, sweep_in_memory
+from assembly.targets import grid_targets, parse_grid
+from stiffness.reading import BadInput
+
+ROOT = Path(__file__).parents[1]
+
+
+def small_sweep(grid="tx=-0.04:0.04:0.02,ty=0.10:0.14:0.02", **options):
+    """15 postures of the five-bar robot, some out of reach, in blocks of 4."""
+    robot = load_robot("five_bar")
+    targets = grid_targets(parse_grid(grid, robot))
+    question = Question(robot, None, (), targets.names, **options)
+    return Sweep(question, targets, block_size=4)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The sweep, its file's bytes, and its journal's just before the end."""
+    sweep, path = small_sweep(), tmp_path_factory.mktemp("whole") / "map.nc"
+    kept = {}
+
+    def keep(done, _):
+        kept[done] = journal_path(path).read_bytes()
+
+    run_sweep(sweep, path, keep)
+    assert not journal_path(path).exists()
+    return sweep, path.read_bytes(), kept
+
+
+def go_on(sweep, folder, journal):
+    """Finish a sweep from the bytes of a journal; its file's, and the points solved."""
+    path, solved = folder / "map.nc", []
+    journal_path(path).write_bytes(journal)
+
+    def solve(sweep, blocks):
+        solved.extend(blocks)
+        return solve_here(sweep, solved)
+
+    run_sweep(sweep, path, solve=solve)
+    return path.read_bytes(), solved
+
+
+def test_a_journal_holds_each_block_as_soon_as_it_is_finished(whole, tmp_path):
+    sweep, _, kept = whole
+    assert list(kept) == [0, 4, 8, 12, 15]
+    for blocks, journal in enumerate(kept.values()):
+        path = tmp_path / "map.nc.journal"
+        path.write_bytes(journal)
+        found = open_journal(path, sweep.identity, record_type(sweep.question))
+        assert sorted(found.places) == list(range(blocks))
+
+
+def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
+    """Every byte of the file is a place where a power failure may cut it."""
+    sweep, _, kept = whole
+    sizes = [len(journal) for journal in kept.values()]
+    journal, path = kept[15], tmp_path / "map.nc.journal"
+    first_line = journal.index(b"\n") + 1
+    for cut in [*range(0, first_line, 7), *range(first_line, len(journal) + 1, 3)]:
+        path.write_bytes(journal[:cut])
+        found = open_journal(path, sweep.identity, record_type(sweep.question))
+        whole_blocks = sum(size <= cut for size in sizes[1:])
+        assert sorted(found.places) == list(range(whole_blocks))
+        assert path.stat().st_size == max(s for s in sizes if s <= max(cut, sizes[0]))
+
+
+@pytest.mark.parametrize("done", [0, 4, 12, 15])
+def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path, done):
+    sweep, expected, kept = whole
+    torn = kept[done] + (kept[15][len(kept[done]) :][:50] if done < 15 else b"")
+    found, solved = go_on(sweep, tmp_path, torn)
+    assert found == expected
+    assert solved == list(range(-(-done // 4), 4))
+
+
+def test_a_damaged_record_is_solved_again(whole, tmp_path):
+    sweep, expected, kept = whole
+    spoilt = bytearray(kept[15])
+    spoilt[len(kept[8]) + 100] ^= 1
+    found, solved = go_on(sweep, tmp_path, bytes(spoilt))
+    assert (found, solved) == (expected, [2, 3])
+
+
+def test_blocks_may_come_in_any_order(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+    run_sweep(sweep, path, solve=lambda s, b: solve_here(s, [2, 0, 3, 1]))
+    assert path.read_bytes() == expected
+
+
+def test_the_file_is_what_memory_holds(whole, tmp_path):
+    import xarray
+
+    sweep, content, _ = whole
+    (tmp_path / "map.nc").write_bytes(content)
+    with xarray.open_dataset(tmp_path / "map.nc") as data:
+        xarray.testing.assert_equal(data, sweep_in_memory(sweep))
+        assert data.attrs["robot_sha256"] == sweep.provenance["robot_sha256"]
+        assert data.margin.attrs["units"] == "1"
+        assert data.singular_distance.dims == ("tx", "ty", "kind")
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (small_sweep("tx=-0.04:0.04:0.02,ty=0.10:0.14:0.04"),
+         "found points 'tx 5 x ty 3', values_sha256 '"),
+        (small_sweep(reading="free"), "found reading 'none', asked 'margin"),
+        (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
+    ],
+)  # fmt: skip
+def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
+    _, _, kept = whole
+    path = journal_path(tmp_path / "map.nc")
+    path.write_bytes(kept[8])
+    with pytest.raises(BadInput) as error:
+        run_sweep(other, tmp_path / "map.nc")
+    assert str(error.value).startswith(f"{path}: journal of another sweep: found ")
+    assert message in str(error.value)
+    assert path.read_bytes() == kept[8]
+
+
+def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
+    path = journal_path(tmp_path / "map.nc")
+    path.write_text("notes\n")
+    with pytest.raises(BadInput, match="found no journal of a sweep; expected one"):
+        run_sweep(small_sweep(), tmp_path / "map.nc")
+    assert path.read_text() == "notes\n"
+
+
+def test_block_size_changes_no_number():
+    """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
+    from dataclasses import replace
+
+    options = {"reading": "frozen", "wrenches": ("left.elbow",), "play_alone": True}
+    small = small_sweep(**options)
+    one = sweep_in_memory(small)
+    other = sweep_in_memory(replace(small, block_size=15))
+    assert one.identical(other)
+    assert np.isfinite(one.rotation_error_play).any()
+
+
+@pytest.mark.slow
+def test_sigkill_at_random_moments_loses_no_point():
+    """The benchmark does 200; here some, each in a process of its own."""
+    spec = importlib.util.spec_from_file_location(
+        "sweep_kills", ROOT / "benchmarks" / "sweep_kills.py"
+    )
+    kills = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(kills)
+    counts = kills.main(kills=20, seed=int(time.time()))
+    assert counts["kills"] >= 20
+    assert counts["lost"] == counts["different"] == 0
+
+
+COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
+           "tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003"]  # fmt: skip
+
+
+def start_command(folder, *words):
+    """The command in a process group of its own, stopped once its journal has grown."""
+    path = folder / "map.nc"
+    with subprocess.Popen(
+        [*COMMAND, "-o", path, *words], stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    ) as process:  # fmt: skip
+        journal = journal_path(path)
+        end = time.monotonic() + 120
+        while not journal.exists() or journal.stat().st_size < 20_000:
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        yield process
+        yield process.wait(timeout=60), process.stderr.read()
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(tmp_path):
+    run = start_command(tmp_path)
+    os.killpg(next(run).pid, signal.SIGINT)
+    status, said = next(run)
+    assert status == 130
+    assert "points are kept in" in said
+    assert "Traceback" not in said
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
+    subprocess.run([*COMMAND, "-o", tmp_path / "map.nc"], check=True)
+    once = tmp_path / "once.nc"
+    subprocess.run([*COMMAND, "-o", once], check=True)
+    assert (tmp_path / "map.nc").read_bytes() == once.read_bytes()
