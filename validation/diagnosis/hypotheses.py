@@ -16,7 +16,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.effect import Effect, Unknown, at
 from assembly.robot import Robot
 
-_FEWEST_LEVELS = 2  # values of a covariate without which nothing depends on it
+_MOST_UNKNOWNS = 24  # of one effect; beyond it frames share them, kind by kind
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _of(effect: Effect, here: Conditions, loads: Sequence[str]) -> Iterator[Hypo
             yield from _scanned(effect, (), [((u.name,), u) for u in chosen], here)
         return
     places = effect.frames(here.robot)
-    for groups in _groupings(places):
+    for groups in _groupings(places, len(unknowns)):
         slots = [
             (tuple(at(f, u.name) for f in group), u)
             for group in groups
@@ -136,18 +136,24 @@ def _choices(
             yield [u]
 
 
-def _groupings(places: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], ...]]:
+def _groupings(
+    places: tuple[str, ...], each: int
+) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Ways in which frames share numbers: own each, one for all, by kind, one alone."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
     for name in places:
         kinds.setdefault(name.rpartition(".")[2], []).append(name)
-    ways: list[tuple[tuple[str, ...], ...]] = [tuple((p,) for p in places)]
-    ways.append((places,))
+    few = len(places) * each <= _MOST_UNKNOWNS
+    ways: list[tuple[tuple[str, ...], ...]] = []
+    if few:
+        ways.append(tuple((p,) for p in places))
     ways.append(tuple(tuple(names) for names in kinds.values()))
+    ways.append((places,))
     ways += [(tuple(names),) for names in kinds.values()]
-    ways += [((p,),) for p in places]
+    if few:
+        ways += [((p,),) for p in places]
     yield from dict.fromkeys(ways)
 
 

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.signatures import Signature
 
-_KEPT = 40  # sets of each size that are enlarged
+_WAYS = 2  # ways of each effect that are tried in pairs, beside its most general
+_BEST = 8  # sets of each size that are enlarged by anything
 _APART = 1e-3  # sine of the angle between a column and those before it
 _RANK = 1e-9  # relative eigenvalue below which columns are one
 
@@ -87,15 +88,17 @@ class Screen:
         """
         members = tuple(sorted(members))
         columns: list[int] = []
-        fixed = np.zeros(len(self._gram))
-        fixed[-1] = 1.0
+        # what is left to fit: the residual minus the offsets of all members
+        left = [len(self._gram) - 1]
         for i in members:
-            a, b = self._slices[i]
-            columns += range(a, b)
-            fixed[b] -= 1.0
+            begin, end = self._slices[i]
+            columns += range(begin, end)
+            left.append(end)
+        sign = np.full(len(left), -1.0)
+        sign[0] = 1.0
         G = self._gram[np.ix_(columns, columns)]
-        b = self._gram[columns] @ fixed
-        rest = float(fixed @ self._gram @ fixed)
+        b = self._gram[np.ix_(columns, left)] @ sign
+        rest = float(sign @ self._gram[np.ix_(left, left)] @ sign)
         empty = np.zeros(0)
         lower = np.concatenate([empty, *(self._bounds[i][0] for i in members)])
         upper = np.concatenate([empty, *(self._bounds[i][1] for i in members)])
@@ -122,8 +125,8 @@ class Screen:
     def search(self, largest: int = 3) -> list[Scored]:
         """Fit the sets worth fitting.
 
-        All single hypotheses and all pairs; of larger sets, the best of each size with
-        one more member.
+        All single hypotheses; all pairs of each effect's best ways to act, and of the
+        best single hypotheses with any; of larger sets, the best with one more member.
 
         Args:
             largest: number of effects in a set at most.
@@ -132,21 +135,35 @@ class Screen:
             Sets, best score first.
         """
         found: dict[tuple[int, ...], Scored] = {(): self.fit(())}
-        for i in range(len(self.signatures)):
+        everyone = range(len(self.signatures))
+        for i in everyone:
             found[(i,)] = self.fit((i,))
-        for i, j in combinations(range(len(self.signatures)), 2):
-            if self.effects[i] != self.effects[j]:
-                found[(i, j)] = self.fit((i, j))
+        alone = sorted(everyone, key=lambda i: -found[(i,)].score)
+        ways: dict[str, list[int]] = {}
+        for i in everyone:  # the first way of every effect is its most general
+            ways.setdefault(self.effects[i], []).append(i)
+        chosen = {own[0] for own in ways.values()}
+        for own in ways.values():
+            chosen.update(sorted(own, key=alone.index)[:_WAYS])
+        pairs = {*combinations(sorted(chosen), 2)}
+        pairs |= {(i, j) for i in alone[:_BEST] for j in everyone if i != j}
+        self._enlarge(found, pairs)
         for size in range(3, largest + 1):
             best = [s for s in found.values() if len(s.members) == size - 1]
             best.sort(key=lambda s: -s.score)
-            for one in best[:_KEPT]:
-                have = {self.effects[i] for i in one.members}
-                for j in range(len(self.signatures)):
-                    members = tuple(sorted((*one.members, j)))
-                    if self.effects[j] not in have and members not in found:
-                        found[members] = self.fit(members)
+            self._enlarge(
+                found, {(*s.members, j) for s in best[:_BEST] for j in chosen}
+            )
         return sorted(found.values(), key=lambda s: -s.score)
+
+    def _enlarge(
+        self, found: dict[tuple[int, ...], Scored], sets: set[tuple[int, ...]]
+    ) -> None:
+        """Fit sets of different effects that are not yet found."""
+        for members in sorted({tuple(sorted(one)) for one in sets}):
+            effects = {self.effects[i] for i in members}
+            if len(effects) == len(members) and members not in found:
+                found[members] = self.fit(members)
 
 
 def _within(

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from assembly.conditions import Conditions, as_declared
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
-from assembly.resting_play import taken_up
 from assembly.posture import Posture
 from assembly.predict import predict
+from assembly.resting_play import taken_up
 from validation.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
@@ -128,7 +128,9 @@ class Tangents:
         """
         if not hypothesis.slots:
             there = self.model({hypothesis.effect: {}})
-            return Signature(hypothesis, there - self.declared, np.zeros((len(there), 0)))
+            return Signature(
+                hypothesis, there - self.declared, np.zeros((len(there), 0))
+            )
         shapes = {
             name: slot.start for slot in hypothesis.slots if slot.shape
             for name in slot.names
@@ -136,19 +138,17 @@ class Tangents:
         columns = np.zeros((len(self.declared), len(hypothesis.slots)))
         for k, slot in enumerate(hypothesis.slots):
             if not slot.shape:
-                for name in slot.names:
-                    columns[:, k] += self._column(hypothesis.effect, name, slot, shapes)
+                columns[:, k] = self._column(hypothesis.effect, slot, shapes)
         begin = np.where([s.shape for s in hypothesis.slots], 0.0, hypothesis.start)
         return Signature(hypothesis, -columns @ begin, columns)
 
-    def _column(
-        self, effect: str, name: str, slot: Slot, shapes: dict[str, float]
-    ) -> NDArray:
-        """(N,) derivative in one unknown of one effect, where the effect begins."""
-        key = (effect, name, tuple(sorted(set(shapes.values()))))
+    def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
+        """(N,) derivative in one slot of one effect, where the effect begins."""
+        key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._columns:
             step = _STEP * slot.unknown.scale
-            values = {**shapes, name: slot.unknown.start + step}
+            here = slot.unknown.start + step
+            values = {**shapes, **dict.fromkeys(slot.names, here)}
             public = LIBRARY[effect].public(self.here.robot, values)
             self._columns[key] = (self.model({effect: public}) - self.declared) / step
         return self._columns[key]

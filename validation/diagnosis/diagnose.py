@@ -1,0 +1,367 @@
+"""The diagnosis of a campaign: residual, the effects it shows, and how sure that is.
+
+Order of things, each opened once:
+
+1. rows of whole configurations are kept aside;
+2. the measuring frame is found, where it is not known;
+3. every hypothesis's signature; all small sets scored; the best refitted in the full
+   model, signatures retaken there, and scored again until the best set stays;
+4. outlying rows are named, left out, and 3 repeated;
+5. is what is left noise?  The verdict;
+6. errors before and after on the rows kept aside.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.conditions import Conditions
+from assembly.effects import LIBRARY
+from assembly.effects.effect import Values
+from assembly.predict import predict
+from validation.campaign import Campaign
+from validation.diagnosis.holdout import Split, split
+from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
+from validation.diagnosis.refit import Fit, refit
+from validation.diagnosis.registration import device_frame, register
+from validation.diagnosis.scoring import Scored, Screen, inclusion, posterior
+from validation.diagnosis.signatures import (
+    Signature,
+    Tangents,
+    conditions_of,
+    loaded_components,
+    whiten,
+)
+
+CLAIM = 0.9  # probability from which an effect is claimed
+RIVAL = 0.5  # probability from which another one stands against it
+_ROUNDS = 4  # of refitting and scoring again
+_LISTED = 0.02  # probability from which an alternative is listed
+_VISIBLE = 4.0  # squared whitened change of the readings
+_NEAR = 6.0  # in score: sets this near the best are refitted too
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Root mean squares over the rows kept aside.
+
+    Attributes:
+        position: [m] of the components measured.
+        rotation: [rad] likewise.
+        normalised: [-] of residual over sigma.
+    """
+
+    position: float
+    rotation: float
+    normalised: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What a campaign says about the machine, and what it cannot say.
+
+    Attributes:
+        campaign: what was measured.
+        verdict: ``"explained"``, ``"none_needed"``, ``"ambiguous"`` or
+            ``"outside_library"``.
+        fit: the best set of effects, fitted in the full model.
+        claimed: names of the effects that are claimed.
+        probability: of every effect of the library that the design can show.
+        alternatives: sets of effects by name, with their probabilities, best first.
+        best_by_score: the effects of the single best set, whatever its probability.
+        lack: is what is left noise?
+        declared: the same for the declared model.
+        before: on the rows kept aside, with the declared model.
+        after: with the effects claimed, or the best set where the verdict is ambiguous.
+        noise: by the stated sigma.
+        split: which rows were kept aside.
+        outliers: (R,) bool, rows left out of everything.
+        conditions: the campaign's, as declared and registered.
+        residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
+        residual_after: (R, 6) [rad, m] reading minus the best set's model.
+        screen: the scored hypotheses of the last round.
+    """
+
+    campaign: Campaign
+    verdict: str
+    fit: Fit
+    claimed: tuple[str, ...]
+    probability: dict[str, float]
+    alternatives: tuple[tuple[tuple[str, ...], float], ...]
+    best_by_score: tuple[str, ...]
+    lack: LackOfFit
+    declared: LackOfFit
+    before: Errors
+    after: Errors
+    noise: Errors
+    split: Split
+    outliers: NDArray
+    conditions: Conditions
+    residual_before: NDArray
+    residual_after: NDArray
+    screen: Screen
+
+
+def diagnose(campaign: Campaign) -> Diagnosis:
+    """Trace a campaign's residual to the effect that the declared model lacks.
+
+    Args:
+        campaign: measured deviations.
+
+    Returns:
+        The diagnosis.
+
+    Raises:
+        BadInput: the measuring frame is not known and cannot be found.
+    """
+    parts = split(campaign)
+    here = conditions_of(campaign)
+    if campaign.registration == "unknown":
+        here = register(campaign.take(parts.fitted), here)
+    outliers = np.zeros(len(campaign), dtype=bool)
+    while True:
+        used = parts.fitted & ~outliers
+        found = _select(campaign.take(used), here.take(used))
+        far = np.zeros_like(outliers)
+        far[used] = outlying(campaign.take(used), found.fit.residual)
+        if not far.any():
+            break
+        outliers |= far
+    return _judge(campaign, here, parts, outliers, found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Selection:
+    """Sets of hypotheses with their scores, the best fitted in the full model."""
+
+    screen: Screen
+    sets: list[Scored]
+    fit: Fit
+    unknowns: int
+    tangents: Tangents
+
+
+def _select(campaign: Campaign, here: Conditions) -> _Selection:
+    """Score all small sets; refit the best; score again about it until it stays."""
+    tangents = Tangents(campaign, here)
+    nuisance = [device_frame(here)] if campaign.registration == "unknown" else []
+    candidates = hypotheses(here, loaded_components(campaign))
+    if nuisance:
+        candidates = [h for h in candidates if not _moves_base(h)]
+    signatures = [tangents.at_start(h) for h in candidates]
+    signatures = [s for s in signatures if _finite(s) and _shows(s)]
+    project = _projector([tangents.at_start(h) for h in nuisance])
+    best: tuple[Hypothesis, ...] | None = None
+    for _ in range(_ROUNDS):
+        screen = Screen(
+            project(tangents.residual[:, None])[:, 0],
+            [_projected(s, project) for s in signatures],
+        )
+        sets = screen.search()
+        # near rivals and their parts too: a tangent may flatter a set that is larger
+        fits: dict[tuple[int, ...], Fit] = {}
+        for one in _worth_refitting(sets):
+            members = [screen.signatures[i].hypothesis for i in one.members]
+            start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
+            fit = refit(campaign, here, [*nuisance, *members], start)
+            if fit is not None:
+                fits[one.members] = fit
+        sets = _with_fits(screen, sets, fits)
+        fit = fits[sets[0].members]
+        chosen = fit.hypotheses
+        if chosen == best:
+            break
+        best = chosen
+        signatures = _about(tangents, signatures, fit, len(nuisance))
+    unknowns = sets[0].rank + 6 * len(nuisance)
+    return _Selection(screen, sets, fit, unknowns, tangents)
+
+
+def _worth_refitting(sets: Sequence[Scored]) -> list[Scored]:
+    """The best sets, and all their parts."""
+    near = [s for s in sets[:6] if s.score > sets[0].score - _NEAR]
+    parts = {
+        tuple(i for i in s.members if i != left)
+        for s in near
+        for left in (None, *s.members)
+    }
+    return [s for s in sets if s.members in parts]
+
+
+def _start(one: Scored, members: Sequence[Hypothesis]) -> NDArray:
+    """Where to begin a refit: the screening's values, shapes where they were held."""
+    held = np.concatenate([np.zeros(0), *(h.start for h in members)])
+    shape = [slot.shape for h in members for slot in h.slots]
+    return np.where(np.array(shape, dtype=bool), held, one.values)
+
+
+def _with_fits(
+    screen: Screen, sets: list[Scored], fits: dict[tuple[int, ...], Fit]
+) -> list[Scored]:
+    """Sets with the scores of their refits, best first; a refit comes before the rest."""
+    scored = []
+    for one in sets:
+        fit = fits.get(one.members)
+        scored.append(one if fit is None else screen.rescored(one, fit.rss, one.values))
+    scored.sort(key=lambda s: -s.score)
+    best = next(s for s in scored if s.members in fits)
+    return [best, *(s for s in scored if s is not best)]
+
+
+def _about(
+    tangents: Tangents, signatures: list[Signature], fit: Fit, skipped: int
+) -> list[Signature]:
+    """Signatures with those of a fitted set retaken where the fit ended."""
+    retaken: dict[Hypothesis, Signature] = {}
+    at = sum(len(h.slots) for h in fit.hypotheses[:skipped])
+    for h in fit.hypotheses[skipped:]:
+        x = fit.values[at : at + len(h.slots)]
+        at += len(h.slots)
+        if LIBRARY[h.effect].linear or not h.slots:
+            continue
+        others: dict[str, Values] = {
+            name: values for name, values in fit.effects.items() if name != h.effect
+        }
+        moved = replace(
+            h,
+            slots=tuple(
+                replace(s, start=float(v)) if s.shape else s
+                for s, v in zip(h.slots, x, strict=True)
+            ),
+        )
+        again = tangents.about(moved, x, others)
+        if _finite(again):
+            retaken[h] = _frozen_shapes(again, x)
+    return [retaken.get(s.hypothesis, s) for s in signatures]
+
+
+def _frozen_shapes(signature: Signature, x: NDArray) -> Signature:
+    """A tangent whose shapes stay at their fitted values."""
+    shape = np.array([s.shape for s in signature.hypothesis.slots])
+    columns = np.where(shape, 0.0, signature.columns)
+    offset = signature.offset + signature.columns @ np.where(shape, x, 0.0)
+    return Signature(signature.hypothesis, offset, columns)
+
+
+def _finite(signature: Signature) -> bool:
+    """Whether the model had answers for a hypothesis."""
+    return bool(
+        np.isfinite(signature.columns).all() and np.isfinite(signature.offset).all()
+    )
+
+
+def _shows(signature: Signature) -> bool:
+    """Whether a hypothesis without unknowns changes the readings enough to be told."""
+    squares = float(signature.offset @ signature.offset)
+    return bool(signature.hypothesis.slots) or squares > _VISIBLE
+
+
+def _moves_base(h: Hypothesis) -> bool:
+    """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
+    return h.effect == "registration" and any(
+        name.startswith("base.") for slot in h.slots for name in slot.names
+    )
+
+
+class _projector:
+    """Takes nuisances out of columns."""
+
+    def __init__(self, nuisances: list[Signature]) -> None:
+        self._q = None
+        if nuisances:
+            A = np.hstack([s.columns for s in nuisances])
+            norm = np.linalg.norm(A, axis=0)
+            u, size, _ = np.linalg.svd(A / np.where(norm > 0, norm, 1.0), False)
+            self._q = u[:, size > 1e-10 * size[0]]
+
+    def __call__(self, columns: NDArray) -> NDArray:
+        if self._q is None:
+            return columns
+        return columns - self._q @ (self._q.T @ columns)
+
+
+def _projected(s: Signature, project: _projector) -> Signature:
+    """A signature without what nuisances can show."""
+    return Signature(s.hypothesis, project(s.offset[:, None])[:, 0], project(s.columns))
+
+
+def _judge(
+    campaign: Campaign, here: Conditions, parts: Split, outliers: NDArray,
+    found: _Selection,
+) -> Diagnosis:  # fmt: skip
+    """The verdict, then the rows kept aside."""
+    used = parts.fitted & ~outliers
+    fitting = campaign.take(used)
+    lack = lack_of_fit(fitting, found.fit.residual, found.unknowns)
+    declared = lack_of_fit(fitting, found.tangents.residual, 0)
+    by_names = _by_names(found)
+    probability = inclusion(found.screen, found.sets)
+    best = tuple(sorted(found.screen.effects[i] for i in found.sets[0].members))
+    verdict, claimed = _verdict(by_names, probability, lack)
+    after = _apply_to_all(here, found.fit)
+    measured = campaign.measured
+    residual_before = measured - predict(here).deviation
+    residual_after = measured - predict(after).deviation
+    held = ~parts.fitted & ~outliers
+    if not held.any():
+        held = used
+    far = np.zeros_like(held)
+    shown = residual_after if verdict in {"explained", "ambiguous"} else residual_before
+    judged = campaign.take(held)
+    far[held] = outlying(judged, whiten(judged, residual_after[held]))
+    outliers = outliers | far
+    held &= ~far
+    return Diagnosis(
+        campaign, verdict, found.fit, claimed, probability, by_names, best, lack,
+        declared, _errors(campaign, residual_before, held),
+        _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
+        parts, outliers, here, residual_before, residual_after, found.screen,
+    )  # fmt: skip
+
+
+def _by_names(found: _Selection) -> tuple[tuple[tuple[str, ...], float], ...]:
+    """Probabilities of sets of effects, whatever their way to act."""
+    weights: dict[tuple[str, ...], float] = {}
+    for one, weight in zip(found.sets, posterior(found.sets), strict=True):
+        names = tuple(sorted(found.screen.effects[i] for i in one.members))
+        weights[names] = weights.get(names, 0.0) + float(weight)
+    listed = sorted(weights.items(), key=lambda item: -item[1])
+    return tuple((names, p) for names, p in listed if p >= _LISTED)
+
+
+def _verdict(
+    sets: Sequence[tuple[tuple[str, ...], float]], probability: dict[str, float],
+    lack: LackOfFit,
+) -> tuple[str, tuple[str, ...]]:  # fmt: skip
+    """The verdict, and which effects it claims."""
+    if lack.significant:
+        return "outside_library", ()
+    names, weight = sets[0]
+    if not names and weight >= RIVAL:
+        return "none_needed", ()
+    sure = tuple(sorted(name for name, p in probability.items() if p >= CLAIM))
+    rivals = [name for name, p in probability.items() if RIVAL <= p < CLAIM]
+    if sure and not rivals and dict(sets).get(sure, 0.0) >= RIVAL:
+        return "explained", sure
+    return "ambiguous", ()
+
+
+def _apply_to_all(here: Conditions, fit: Fit) -> Conditions:
+    """All rows under the effects of a fit."""
+    from assembly.effects import apply_effects
+
+    return apply_effects(here, fit.effects)
+
+
+def _errors(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
+    """Root mean squares over the measured cells of some rows."""
+    z = np.where(campaign.cells, residual, np.nan)[rows]
+
+    def rms(values: NDArray) -> float:
+        known = values[np.isfinite(values)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+    return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))

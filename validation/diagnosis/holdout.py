@@ -1,0 +1,51 @@
+"""Rows kept aside: whole configurations, so that no fold shares one with another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.campaign import Campaign
+
+_FEWEST = 8  # configurations from which blocks can be kept aside
+_SHARE = 4  # one block in this many
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Which rows choose and fit the effects, and which only judge.
+
+    Attributes:
+        fitted: (R,) bool.
+        how: in words.
+    """
+
+    fitted: NDArray
+    how: str
+
+
+def split(campaign: Campaign) -> Split:
+    """Keep whole configurations aside; spans of time where there are too few.
+
+    Args:
+        campaign: of R rows.
+
+    Returns:
+        The split; the same for the same campaign.
+    """
+    blocks, kind = campaign.configuration, "configurations"
+    if len(np.unique(blocks)) < _FEWEST:
+        time = campaign.covariates.get("time", np.arange(len(campaign)))
+        order = np.argsort(np.argsort(time, kind="stable"))
+        blocks = order * min(2 * _FEWEST, len(campaign)) // len(campaign)
+        kind = "spans of time"
+    names = np.unique(blocks)
+    kept = np.random.default_rng(0).permutation(names)[: max(1, len(names) // _SHARE)]
+    if len(names) < 2:
+        return Split(np.ones(len(campaign), dtype=bool), "no rows: too few to spare")
+    held = np.isin(blocks, kept)
+    how = (
+        f"{int(held.sum())} rows of {len(kept)} of {len(names)} {kind}, drawn once, "
+        "kept aside from choosing and fitting"
+    )
+    return Split(~held, how)

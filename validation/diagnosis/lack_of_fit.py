@@ -1,0 +1,113 @@
+"""Is what is left noise?  Against the stated sigma, and against repeats.
+
+Sources:
+    Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
+    pure error).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, f
+
+from validation.campaign import Campaign
+
+SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
+_OUTLYING = 5.5  # rms of a row, in medians of all rows
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """What is left of a residual, judged.
+
+    Attributes:
+        rms: [-] of the whitened residual, degrees of freedom counted.
+        freedom: [-] degrees of freedom.
+        probability: that noise of the stated sigma leaves as much.
+        repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
+        repeats_freedom: [-] its degrees of freedom.
+        against_repeats: probability that noise as between repeats leaves as much.
+    """
+
+    rms: float
+    freedom: int
+    probability: float
+    repeats: float
+    repeats_freedom: int
+    against_repeats: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether more than noise is left, whichever noise is believed."""
+        by_sigma = self.probability < SIGNIFICANT
+        if self.sigma_too_small:
+            return self.against_repeats < SIGNIFICANT
+        return by_sigma
+
+    @property
+    def sigma_too_small(self) -> bool:
+        """Whether repeats scatter more than sigma says."""
+        if not self.repeats_freedom:
+            return False
+        squares = self.repeats**2 * self.repeats_freedom
+        return float(chi2.sf(squares, self.repeats_freedom)) < SIGNIFICANT
+
+
+def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfFit:
+    """Judge a residual.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        residual: (N,) whitened.
+        unknowns: how many were fitted.
+
+    Returns:
+        The judgement.
+    """
+    rss = float(residual @ residual)
+    freedom = max(1, len(residual) - unknowns)
+    squares, between = _repeats(campaign, residual)
+    repeats = np.sqrt(squares / between) if between else np.nan
+    against = 1.0
+    if between and freedom > between:
+        # what repeats do not share with the rest: lack of fit over pure error
+        ratio = ((rss - squares) / (freedom - between)) / (squares / between)
+        against = float(f.sf(ratio, freedom - between, between))
+    return LackOfFit(
+        float(np.sqrt(rss / freedom)), freedom, float(chi2.sf(rss, freedom)),
+        float(repeats), between, against,
+    )  # fmt: skip
+
+
+def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
+    """Squares between repeats of the same configuration and load, and their number."""
+    rows, columns = np.nonzero(campaign.cells)
+    group = campaign.repeat[rows] * 6 + columns
+    order = np.argsort(group, kind="stable")
+    _, start, count = np.unique(group[order], return_index=True, return_counts=True)
+    sums = np.add.reduceat(residual[order], start)
+    squares = np.add.reduceat(residual[order] ** 2, start) - sums**2 / count
+    return float(squares[count > 1].sum()), int((count[count > 1] - 1).sum())
+
+
+def outlying(campaign: Campaign, residual: NDArray) -> NDArray:
+    """Rows that stand far off all others.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        residual: (N,) whitened.
+
+    Returns:
+        (R,) bool; at most one row in twenty.
+    """
+    rows = np.nonzero(campaign.cells)[0]
+    squares = np.bincount(rows, residual**2, minlength=len(campaign))
+    cells = np.bincount(rows, minlength=len(campaign))
+    rms = np.sqrt(squares / np.maximum(cells, 1))
+    # a row of few cells is noisier: compared with what noise of its size may reach
+    far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
+    if far.sum() > len(campaign) / 20:
+        worst = np.argsort(-rms)[: len(campaign) // 20]
+        far &= np.isin(np.arange(len(campaign)), worst)
+    return far

@@ -1,0 +1,153 @@
+"""A set of hypotheses fitted in the full model, with the uncertainty of its numbers.
+
+Sources:
+    Nocedal, Wright, Numerical Optimization, chapter 10 (least squares).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from assembly.conditions import Conditions
+from assembly.effects import apply_effects
+from assembly.effects.effect import Values
+from assembly.predict import predict
+from validation.campaign import Campaign
+from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.signatures import whiten
+
+_STEP = 1e-4  # of an unknown's size, for derivatives
+_MOST_CALLS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Hypotheses with fitted numbers.
+
+    Attributes:
+        hypotheses: the set.
+        values: fitted unknowns, one hypothesis after the other.
+        covariance: of the unknowns.
+        residual: (N,) whitened, what is left.
+        conditions: the campaign's, with the effects fitted.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    values: NDArray
+    covariance: NDArray
+    residual: NDArray
+    conditions: Conditions
+
+    @property
+    def rss(self) -> float:
+        """[-] squared whitened residual."""
+        return float(self.residual @ self.residual)
+
+    @cached_property
+    def effects(self) -> dict[str, dict[str, float]]:
+        """Parameters by their public names, by effect."""
+        robot = self.conditions.robot
+        return _public(self.hypotheses, self.values, robot)
+
+    def parameters(self, k: int) -> list[tuple[str, float, float]]:
+        """Name, value and standard deviation of one hypothesis's parameters.
+
+        Args:
+            k: which hypothesis.
+
+        Returns:
+            Parameters by their public names.
+        """
+        begin = sum(len(h.slots) for h in self.hypotheses[:k])
+        h = self.hypotheses[k]
+        own = slice(begin, begin + len(h.slots))
+        x, C = self.values[own], self.covariance[own, own]
+        robot = self.conditions.robot
+        value = h.public(robot, x)
+        J = np.zeros((len(value), len(x)))
+        for i, slot in enumerate(h.slots):
+            step = _STEP * max(abs(x[i]), 1e-3 * slot.unknown.scale)
+            ends = []
+            for sign in (1.0, -1.0):
+                there = x.copy()
+                there[i] += sign * step
+                moved = h.public(robot, there)
+                ends.append(np.array([moved.get(name, np.nan) for name in value]))
+            J[:, i] = (ends[0] - ends[1]) / (2 * step)
+        std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
+        return [(n, v, float(s)) for (n, v), s in zip(value.items(), std, strict=True)]
+
+
+def _public(
+    members: Sequence[Hypothesis], values: NDArray, robot: object
+) -> dict[str, dict[str, float]]:
+    """Parameters of all members by effect; those of one effect join."""
+    found: dict[str, dict[str, float]] = {}
+    at = 0
+    for h in members:
+        own = h.public(robot, values[at : at + len(h.slots)])  # type: ignore[arg-type]
+        found.setdefault(h.effect, {}).update(own)
+        at += len(h.slots)
+    return found
+
+
+def refit(
+    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
+) -> Fit | None:
+    """Fit a set of hypotheses in the full model.
+
+    Args:
+        campaign: what was measured.
+        here: its conditions without the effects.
+        members: hypotheses of different effects.
+        start: where to begin, one unknown after the other.
+
+    Returns:
+        The fit, None if the model has no answer at the start.
+    """
+    slots = [slot for h in members for slot in h.slots]
+    lower = np.array([slot.unknown.lower for slot in slots])
+    upper = np.array([slot.unknown.upper for slot in slots])
+    x0 = np.clip(start, lower, upper)
+    size = np.array([
+        max(slot.unknown.scale, abs(x)) for slot, x in zip(slots, x0, strict=True)
+    ])
+    measured = whiten(campaign, campaign.measured)
+
+    def there(x: NDArray) -> Conditions:
+        effects: dict[str, Values] = dict(_public(members, x, here.robot))
+        return apply_effects(here, effects)
+
+    def left(scaled: NDArray) -> NDArray:
+        model = whiten(campaign, predict(there(scaled * size)).deviation)
+        return np.where(np.isfinite(model), measured - model, 1e3)
+
+    def slopes(scaled: NDArray) -> NDArray:
+        middle = left(scaled)
+        J = np.zeros((len(middle), len(scaled)))
+        for k in range(len(scaled)):
+            moved = scaled.copy()
+            step = _STEP if (moved[k] + _STEP) * size[k] <= upper[k] else -_STEP
+            moved[k] += step
+            J[:, k] = (left(moved) - middle) / step
+        return J
+
+    if not slots:
+        residual = left(x0)
+        return Fit(tuple(members), x0, np.zeros((0, 0)), residual, there(x0))
+    inside = np.clip(x0 / size, lower / size, upper / size)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = least_squares(
+            left, inside, jac=slopes, bounds=(lower / size, upper / size),
+            max_nfev=_MOST_CALLS, xtol=1e-8, ftol=1e-8, gtol=1e-10, x_scale="jac",
+        )  # fmt: skip
+    J = found.jac / size
+    scale = np.sqrt(np.einsum("ij,ij->j", J, J))
+    scale[scale == 0] = 1.0
+    C = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-12, hermitian=True)
+    x = found.x * size
+    return Fit(tuple(members), x, C / np.outer(scale, scale), found.fun, there(x))

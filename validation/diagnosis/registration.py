@@ -1,0 +1,98 @@
+"""Where the measuring device stands, found before anything else when it is not known.
+
+Sources:
+    Kabsch (1976), A solution for the best rotation to relate two sets of vectors, Acta
+    Crystallographica A32, 922.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from assembly.conditions import Conditions
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.registration import BASE
+from assembly.predict import predict
+from stiffness.reading import BadInput
+from stiffness.screws import rotation_matrix
+from validation.campaign import Campaign
+from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.refit import refit
+
+_FEWEST_POINTS = 3
+
+
+def device_frame(robot_unknowns: Conditions) -> Hypothesis:
+    """The hypothesis that the measuring frame is turned and shifted, the tool right.
+
+    Args:
+        robot_unknowns: conditions of the campaign's robot.
+
+    Returns:
+        Six unknowns, fitted in every model of a campaign whose device stands anywhere.
+    """
+    unknowns = LIBRARY["registration"].unknowns(robot_unknowns.robot)
+    slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
+    return Hypothesis("registration", (), tuple(slots))
+
+
+def register(campaign: Campaign, here: Conditions) -> Conditions:
+    """Conditions with the measuring frame where it fits the declared model best.
+
+    Args:
+        campaign: rows from which it is found.
+        here: all conditions to be registered; the first rows need not be the campaign's.
+
+    Returns:
+        The same conditions, registered.
+
+    Raises:
+        BadInput: too few full positions and rotations to find it from.
+    """
+    from validation.diagnosis.signatures import conditions_of
+
+    own = conditions_of(campaign)
+    start = _coarse(campaign, own)
+    own = apply_effects(own, {"registration": start})
+    here = apply_effects(here, {"registration": start})
+    frame = device_frame(own)
+    fine = refit(campaign, own, [frame], frame.start)
+    if fine is None:
+        return here
+    return apply_effects(here, {"registration": fine.effects["registration"]})
+
+
+def _coarse(campaign: Campaign, here: Conditions) -> dict[str, float]:
+    """A first guess: Kabsch's rotation of points, or the mean of rotations."""
+    model = predict(here).deviation
+    platform = here.postures.platform
+    nominal = platform[:, :3, 3] + platform[:, :3, :3] @ here.point
+    full = np.isfinite(campaign.measured[:, 3:]).all(axis=1)
+    full &= np.isfinite(model).all(axis=1)
+    turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)
+    turned &= np.isfinite(model).all(axis=1)
+    seen = (nominal + campaign.measured[:, 3:])[full]
+    thought = (nominal + model[:, 3:])[full]
+    if turned.any():
+        device = Rotation.from_rotvec(campaign.measured[turned, :3])
+        R = (device * Rotation.from_rotvec(model[turned, :3]).inv()).mean().as_matrix()
+    elif _spread(thought):
+        centred = thought - thought.mean(axis=0), seen - seen.mean(axis=0)
+        R = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
+    else:
+        raise BadInput(
+            f"{campaign.name}: registration is unknown, and there are neither rotations "
+            f"nor {_FEWEST_POINTS} measured points off one line; expected either"
+        )
+    shift = (seen - thought @ R.T).mean(axis=0) if len(seen) else np.zeros(3)
+    vector = Rotation.from_matrix(R).as_rotvec()
+    assert np.allclose(rotation_matrix(vector), R, atol=1e-9)
+    return dict(zip(BASE, np.concatenate([vector, shift]).tolist(), strict=True))
+
+
+def _spread(points: NDArray) -> bool:
+    """Whether points lie off one line."""
+    if len(points) < _FEWEST_POINTS:
+        return False
+    size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(size[1] > 1e-3 * size[0])
