@@ -1,0 +1,135 @@
+"""A four-anchor Hangprinter: its robot, and 41 samples to a campaign folder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from assembly.robot import Frame, Robot
+from assembly.robots.placing import (
+    Placed,
+    at,
+    ball_joint,
+    cardan_joint,
+    place_frames,
+)
+from examples.campaign_folder import data_folder, write_campaign
+
+NAME = "hangprinter"
+FILE = "hp4_force_series2.csv"
+LINES = ("A", "B", "C", "D")
+ANCHORS = np.array([
+    [0.0, -1.600, -0.110], [1.290, 1.240, -0.155],
+    [-1.410, 0.740, -0.150], [0.0, 0.0, 2.350],
+])  # fmt: skip
+ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # of the blocks
+GEAR = 255 / 20  # turns of the motor for one of the spool
+RADIUS = 0.075  # [m] of the spools
+CAMERA = 2e-3  # [m] one sigma of a position, estimated by the study
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What was recorded; k rows, a column for each line.
+
+    Attributes:
+        position: (k, 3) [m] of the effector, by camera.
+        spool: (k, 4) [rad] turn of each spool since the first sample.
+        force: (k, 4) [N] of each line.
+    """
+
+    position: NDArray
+    spool: NDArray
+    force: NDArray
+
+    def take(self, rows: NDArray) -> "Samples":
+        """Some of the rows."""
+        return Samples(self.position[rows], self.spool[rows], self.force[rows])
+
+
+def read_samples(data: Path | None = None) -> Samples:
+    """The 41 samples, in SI."""
+    path = data_folder(NAME, data) / FILE
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    where = np.column_stack([table[f"{axis}_mm"] for axis in "xyz"]) / 1e3
+    motor = np.column_stack([table[f"motor{line}_deg"] for line in LINES])
+    force = np.column_stack([table[f"force{line}_N"] for line in LINES])
+    return Samples(where, np.deg2rad(motor) / GEAR, force)
+
+
+def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
+    """Four taut lines from anchors to one point, each a driven strut.
+
+    Args:
+        anchors: (4, 3) [m].
+
+    Returns:
+        The robot at the origin; the coordinate of ``A.line`` is that line's length.
+        The platform, a point, may turn: give its rotation with its place.
+    """
+    placed: list[Placed] = []
+    for line, anchor in zip(LINES, anchors, strict=True):
+        placed += _line(line, anchor)
+    closures = tuple((f"{LINES[0]}.tip", f"{line}.tip") for line in LINES[1:])
+    text = "four lines to one point"
+    return Robot("hangprinter", "A.tip", place_frames(placed), closures, text)
+
+
+def _line(name: str, anchor: NDArray) -> Sequence[Placed]:
+    """A line from its anchor to the origin, between a cardan and a ball joint."""
+    length = float(np.linalg.norm(anchor))
+    along = -anchor / length
+    first = np.cross([1.0, 0.0, 0.0], along)
+    first = first / np.linalg.norm(first)
+    second = np.cross(along, first)
+    end, origin = f"{name}.cardan", np.zeros(3)
+    driven = Frame(
+        f"{name}.line", f"{end}_2", joint="prismatic", actuated=True, position=length
+    )
+    return [
+        *cardan_joint(end, "base", anchor, first, second),
+        (driven, at(anchor, along, first)),
+        *ball_joint(f"{name}.ball", driven.name, origin, first, second),
+        (Frame(f"{name}.tip", f"{name}.ball_3"), at(origin)),
+    ]
+
+
+def commanded(samples: Samples) -> NDArray:
+    """(k, 3) [m] where the firmware thinks the effector is: the point whose nominal
+    line lengths agree best with the motors."""
+    paid = RADIUS * samples.spool / ADVANTAGE
+    lengths = np.linalg.norm(ANCHORS, axis=1) + paid
+
+    def misfit(p: NDArray, row: NDArray) -> NDArray:
+        return np.linalg.norm(p - ANCHORS, axis=1) - row
+
+    fits = [
+        least_squares(misfit, p, args=(row,))
+        for p, row in zip(samples.position, lengths, strict=True)
+    ]
+    return np.array([fit.x for fit in fits])
+
+
+def convert(out: Path, data: Path | None = None) -> Path:
+    """Write the campaign folder: the pose commanded, the camera's deviation from it.
+
+    Args:
+        out: the folder.
+        data: where all measured data lie.
+
+    Returns:
+        The folder.
+    """
+    samples = read_samples(data)
+    pose = commanded(samples)
+    columns = {f"pose.t{a}": pose[:, k] for k, a in enumerate("xyz")}
+    columns |= {f"pose.r{a}": np.zeros(len(pose)) for a in "xyz"}
+    deviation = samples.position - pose
+    columns |= {f"meas.t{a}": deviation[:, k] for k, a in enumerate("xyz")}
+    for k, line in enumerate(LINES):
+        columns[f"cov.force_{line}"] = samples.force[:, k]
+        columns[f"cov.spool_{line}"] = samples.spool[:, k]
+    return write_campaign(out, cable_robot(), columns, (1.0, CAMERA))

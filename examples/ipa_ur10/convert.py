@@ -1,0 +1,141 @@
+"""IPA's UR10 under a laser tracker: two series of poses to campaign folders."""
+
+import csv
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from assembly.nominal import Target, follow
+from assembly.posture import home_posture
+from assembly.robot import Frame, Robot
+from assembly.robot_file import read_robot
+from examples.campaign_folder import (
+    base_pose,
+    data_folder,
+    deviation_columns,
+    write_campaign,
+)
+from stiffness.screws import rotation_vector, transform
+
+NAME = "ipa_ur10"
+SERIES = {
+    "A": "Series_A/measurements_grid.csv",
+    "B": "Series_B/measurements_joint_configurations.csv",
+}
+JOINTS = (
+    "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
+    "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
+)  # fmt: skip
+SIGMA = (4e-5, 1.2e-5)  # [rad], [m] medians of what series B states
+TMAC = 1.0  # [kg] of the tracker's target, a guess
+MOVED = 1e-3  # [rad] less is no motion, and the direction of the last one stays
+
+
+def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
+    """Write a campaign folder for each series.
+
+    Args:
+        out: folder of the campaigns.
+        data: where all measured data lie.
+
+    Returns:
+        The folders by series.
+    """
+    source = data_folder(NAME, data)
+    arm = read_robot(Path(__file__).parent / "ur10.toml")
+    folders = {}
+    tool = np.linalg.inv(_tool(source / "Series_A" / "Trafo_TM_F_init.txt"))
+    for series, file in SERIES.items():
+        table = read_series(source / file)
+        measured = measured_poses(table)
+        if series == "A":  # the target's axes, that no file states
+            T = _platform(with_target(arm, tool), table)
+            turn = base_pose(T, measured)[:3, :3] @ T[:, :3, :3]
+            relative = np.swapaxes(turn, 1, 2) @ measured[:, :3, :3]
+            tool[:3, :3] @= Rotation.from_matrix(relative).mean().as_matrix()
+        robot = with_target(arm, tool)
+        columns = {f"q.{name}": table[name] for name in JOINTS}
+        nominal = _platform(robot, table)
+        columns |= deviation_columns(nominal, measured, turn=True)
+        columns |= _covariates(table)
+        folders[series] = write_campaign(out / series, robot, columns, SIGMA)
+    return folders
+
+
+def read_series(path: Path) -> dict[str, NDArray]:
+    """Columns of a series in the order of measuring, units as in the file.
+
+    ``Timestamp`` becomes seconds since the first; a spreadsheet has rounded those of
+    series B away, whose rows are then numbered.
+    """
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file, delimiter=";")
+    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
+    stamps = columns.pop("Timestamp")
+    table = {
+        name: np.array([float(x.replace(",", ".")) for x in texts])
+        for name, texts in columns.items()
+    }
+    table["time"] = np.full(len(stamps), np.nan)
+    if stamps[0].isdigit():
+        times = [datetime.strptime(s, "%Y%m%d%H%M%S").timestamp() for s in stamps]
+        table["time"] = np.array(times) - min(times)
+        order = np.argsort(times, kind="stable")
+        table = {name: column[order] for name, column in table.items()}
+    return table
+
+
+def measured_poses(table: dict[str, NDArray]) -> NDArray:
+    """(k, 4, 4) of the target seen from the tracker; R = Rx Ry Rz, found by trying."""
+    where = np.column_stack([table[f"measurement_{a}"] for a in "xyz"]) / 1e3
+    angles = np.column_stack([table[f"measurement_r{a}"] for a in "xyz"])
+    turn = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
+    return transform(where, turn)
+
+
+def with_target(arm: Robot, tool: NDArray) -> Robot:
+    """The arm with the tracker's target on its flange."""
+    turn = rotation_vector(tool[:3, :3])
+    target = Frame("tmac", "flange", tool[:3, 3], turn, mass=TMAC)
+    return Robot("ur10", "tmac", (*arm.frames, target), (), arm.description)
+
+
+def _tool(path: Path) -> NDArray:
+    """(4, 4) of a file of 3 x 4 numbers in mm, its rotation made orthogonal."""
+    T = np.loadtxt(path)
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    return transform(T[:3, 3] / 1e3, U @ Vt)
+
+
+def _platform(robot: Robot, table: dict[str, NDArray]) -> NDArray:
+    """(k, 4, 4) nominal platform."""
+    q = np.zeros((len(table["time"]), len(robot.frames)))
+    for name in JOINTS:
+        q[:, robot.index(name)] = table[name]
+    home = home_posture(robot).coordinates
+    return follow(robot, home, Target(coordinates=q), steps=1).transforms[:, -1]
+
+
+def _covariates(table: dict[str, NDArray]) -> dict[str, NDArray]:
+    """Time, temperature, and for each joint the direction of its last motion."""
+    warm = table["measurement_temperature"]
+    columns = {"cov.temperature": warm - np.median(warm)}
+    if np.isfinite(table["time"]).all():
+        columns["cov.time"] = table["time"]
+    else:
+        columns["cov.row"] = np.arange(len(warm), dtype=float)
+    for name in JOINTS:
+        columns[f"cov.approach_{name}"] = last_direction(table[name])
+    return columns
+
+
+def last_direction(q: NDArray) -> NDArray:
+    """(k,) sign of the last motion of a joint before it came to rest; 0 at first."""
+    side = np.sign(np.where(np.abs(np.diff(q)) > MOVED, np.diff(q), 0.0))
+    moved = np.flatnonzero(side)
+    latest = np.searchsorted(moved, np.arange(len(side)), side="right") - 1
+    known = np.where(latest >= 0, side[moved[np.maximum(latest, 0)]], 0.0)
+    return np.concatenate([[0.0], known])

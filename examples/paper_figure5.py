@@ -1,0 +1,80 @@
+"""The paper's figure 5 from one sweep, in both sign conventions of its errors.
+
+Run ``python examples/paper_figure5.py``; with ``--step 0.05`` it takes a quarter of the
+time.  For each convention it writes a robot file with the errors of one draw, the data
+set of its maps and the figure, and prints least, median and largest values beside those
+of a reference made by another program (same draw for the positive errors, other signs).
+The figure alone is drawn again, without solving, by
+``forcefit assembly plot figure5_literal.nc -o figure5_literal.png``.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from assembly.dataset import open_dataset
+from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
+from assembly.maps import figure_of
+from assembly.robot_file import write_robot
+from assembly.robots import load_robot
+from assembly.sweep import run_sweep
+from assembly.sweep_request import ask_sweep
+from assembly.zone import ASSEMBLABLE
+
+FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
+LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] the paper's section IV
+MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
+# variable, factor, unit, reference: positive errors, random signs (another draw)
+ROWS = (
+    ("margin_free", 1, "-", (0.060, 2.76, 5.37), (0.071, 5.32, 8.66)),
+    ("margin", 1, "-", (13.2, 18.8, 22.8), (17.7, 20.7, 24.1)),
+    ("energy", 1, "J", (1.1e-3, 3.36, 14.7), (3.2e-3, 17.3, 67.1)),
+    ("rotation_error", 1e3, "mrad", (8.6, 12.7, 27.7), (24.5, 38.0, 66.3)),
+    ("translation_error", 1e3, "mm", (0.235, 0.823, 2.60), (0.49, 2.24, 7.76)),
+    ("rotation_error_play", 1e3, "mrad", (1.53, 1.74, 3.54), (1.53, 1.74, 3.54)),
+    ("translation_error_play", 1e3, "mm", (0.293, 0.332, 0.732), (0.293, 0.332, 0.732)),
+)
+
+
+def main():
+    """Solve, draw and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--step", type=float, default=0.025, help="of the grid [m]")
+    parser.add_argument("-o", "--output", type=Path, default=Path("."))
+    options = parser.parse_args()
+    step = options.step
+    x, z = (step * np.floor(end / step + 1e-9) for end in (0.65, 0.75))
+    grid = f"tx={-x:.9g}:{x:.9g}:{step},tz={-z:.9g}:0:{step}"
+    robot = load_robot("irsbot2")
+    frames = frames_named(robot, FRAMES)
+    for column, signs in enumerate(SIGNS):
+        base = options.output / f"figure5_{signs}"
+        errors = draw_errors(robot, ErrorDraw(frames, LEAST, MOST, 1, signs))
+        write_robot(robot.with_errors(errors), base.with_suffix(".toml"))
+        asked = ask_sweep(str(base.with_suffix(".toml")), grid=grid, play_alone=True)
+        run_sweep(asked, base.with_suffix(".nc"))
+        data = open_dataset(base.with_suffix(".nc"))
+        figure_of(data).savefig(base.with_suffix(".png"), dpi=150)
+        print_table(signs, data, column)
+
+
+def print_table(signs, data, column):
+    """Least, median and largest of each map, and the reference's."""
+    reached = data["status"] == "ok"
+    inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
+    print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % go "
+          "together by play with compliant joints free")  # fmt: skip
+    for name, factor, unit, *reference in ROWS:
+        values = data[name]
+        if "bound" in values.dims:
+            values = values.sel(bound="upper")
+        values = factor * values.values[np.isfinite(values.values)]
+        found = (values.min(), np.median(values), values.max())
+        said = " / ".join(f"{v:.3g}" for v in found)
+        expected = " / ".join(f"{v:.3g}" for v in reference[column])
+        print(f"  {name + ' [' + unit + ']':32s} {said:24s} reference {expected}")
+
+
+if __name__ == "__main__":
+    main()
