@@ -10,6 +10,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.registration import BASE
 from validation.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.registration import register
 from validation.diagnosis.signatures import Tangents, conditions_of, loaded_components
 from validation.repeats import slow_changes
 
@@ -50,8 +51,6 @@ def design_signatures(
     """
     here = conditions_of(campaign)
     if campaign.registration == "unknown":
-        from validation.diagnosis.registration import register
-
         here = register(campaign, here)
     tangents = Tangents(campaign, here)
     shown = _one_each(hypotheses(here, loaded_components(campaign)))

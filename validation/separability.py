@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 LIKE = 0.98  # cosine above which a design cannot separate
 SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
-_RANK = 1e-6  # relative singular value below which columns are one
+_RANK = 1e-3  # relative singular value below which columns are one: they are secants
 
 
 @dataclass(frozen=True, eq=False)
