@@ -16,7 +16,11 @@ OWNERS = {
     "meshio": ("stiffness/surface_files.py",),
     "gmsh": ("stiffness/surface_files.py",),
     "clarabel": ("assembly/conic.py",),
-    "cvxpy": ("assembly/reference.py",),
+    "cvxpy": (
+        "assembly/reference.py",
+        "assembly/allocation.py",
+        "assembly/worst_case.py",
+    ),
     "exudyn": ("validation/multibody.py",),
     "numba": (
         "assembly/compiled_reach.py",
@@ -34,7 +38,13 @@ OWNERS = {
         "assembly/hit_and_run.py",
         "assembly/householder.py",
     ),
-    "xarray": ("assembly/dataset.py", "stiffness/library.py"),
+    "xarray": (
+        "assembly/dataset.py",
+        "assembly/monte_carlo.py",
+        "assembly/importance.py",
+        "assembly/allocation.py",
+        "stiffness/library.py",
+    ),
     "h5netcdf": ("assembly/dataset.py",),
     "distributed": ("assembly/cluster.py",),
 }
