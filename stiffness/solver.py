@@ -4,9 +4,12 @@ MKL's PARDISO where its package is installed, else SciPy's SuperLU, which always
 but needs about ten times the time and twice the memory.
 """
 
+import os
 import warnings
 from functools import cache
+from importlib.metadata import PackageNotFoundError, files
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +26,28 @@ def solver_name() -> str:
     """``"PARDISO"`` or ``"SuperLU"``: what :func:`solve` uses on this machine."""
     if find_spec("pypardiso") is None:
         return "SuperLU"
+    # pypardiso looks for MKL in every folder below Python's, seconds at each solver
+    if library := _mkl():
+        os.environ.setdefault("PYPARDISO_MKL_RT", library)
     try:
         import pypardiso  # noqa: F401
     except (ImportError, OSError):
         return "SuperLU"
     return "PARDISO"
+
+
+def _mkl() -> str | None:
+    """MKL's library as its package lists it."""
+    try:
+        listed = files("mkl") or []
+    except PackageNotFoundError:
+        return None
+    found = [
+        str(f.locate()) for f in listed if f.name.startswith(("libmkl_rt.", "mkl_rt."))
+    ]
+    return next(
+        (f for f in found if Path(f).suffix != ".lib" and Path(f).exists()), None
+    )
 
 
 def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArray:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffness.beam import section_axes
 from stiffness.beam_stress import peak_beam_stress
-from stiffness.elements import Quadratic, node_gradients
+from stiffness.elements import Quadratic, node_gradients, triangle_areas
 from stiffness.estimate import PAIRS
 from stiffness.fea import Level, MeshedLink
 from stiffness.reading import BadInput
@@ -187,9 +187,12 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
 
 
 def _interface_radius(mesh: Quadratic, patch: int) -> float:
-    """[m] largest distance of an interface's nodes from their middle."""
-    points = mesh.nodes[np.unique(mesh.faces[mesh.patch == patch])]
-    return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+    """[m] largest distance of an interface's nodes from its area's middle."""
+    faces = mesh.faces[mesh.patch == patch]
+    N, area = triangle_areas(mesh, faces)
+    first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
+    points = mesh.nodes[np.unique(faces)]
+    return float(np.linalg.norm(points - first / area.sum(), axis=1).max())
 
 
 def _nodal_stresses(level: Level) -> NDArray:

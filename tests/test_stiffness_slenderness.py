@@ -1,0 +1,225 @@
+"""Beam beside finite elements over slenderness, and beams along curves from files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from stiffness.beam import beam_compliance, rectangular_section, round_section
+from stiffness.cli import app
+from stiffness.compare import compare_link
+from stiffness.curve import curve_compliance, curve_length
+from stiffness.curve_file import read_curve
+from stiffness.link import LinkStiffness
+from stiffness.options import numbers, wrench
+from stiffness.plot import plot_slenderness
+from stiffness.reading import BadInput
+from stiffness.results import sweep_text
+from stiffness.slenderness import fit_end_effect, sweep_slenderness
+
+MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
+
+
+def made_up(ratio, c, d, error=0.0):
+    """A bar and the same one stiffer by 1 + c / ratio + d / ratio^2."""
+    length = 0.02 * ratio
+    C = beam_compliance(length, round_section(0.02, 0.3), 6e10, 0.3)
+    ends = {"tip": [length, 0, 0], "base": [0, 0, 0]}
+    beam = LinkStiffness("beam", C, **ends)
+    factor = 1 + c / ratio + d / ratio**2
+    fea = LinkStiffness(
+        "fea", C / factor, **ends, stiffness_error=error * beam.stiffness
+    )
+    return compare_link(beam, fea, size=0.02)
+
+
+def diagonal_residual(sweep):
+    """Couplings, scaled by a diagonal that shear changes, are no plain series."""
+    return np.abs(np.diagonal(sweep.residual, axis1=1, axis2=2)).max()
+
+
+def test_the_fit_finds_what_was_put_in():
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20, 40)])
+    np.testing.assert_allclose(np.diag(sweep.end_effect), 0.2, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(sweep.second), 0.7, rtol=1e-9)
+    assert diagonal_residual(sweep) < 1e-12
+    assert "c = 0.200 0.200 0.200 (rotations)" in sweep.explanation
+
+
+def test_what_does_not_fade_is_left_over():
+    """A modulus 1 % too high is no end effect: most of it stays in the residual."""
+    found = []
+    for ratio in (5, 10, 20, 40):
+        one = made_up(ratio, 0.2, 0.0)
+        C = one.fea.compliance / 1.01
+        fea = LinkStiffness("fea", C, tip=one.fea.tip, base=one.fea.base)
+        found.append(compare_link(one.beam, fea, size=0.02))
+    sweep = fit_end_effect(found)
+    assert 0.004 < diagonal_residual(sweep) < 0.01
+    clean = fit_end_effect([made_up(r, 0.2, 0.0) for r in (5, 10, 20, 40)])
+    assert diagonal_residual(clean) < 1e-12
+
+
+def test_mesh_errors_are_told_in_c():
+    """0.1 % of the beam's K on both meshes; by hand, c = 2 y20 20 - y10 10."""
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7, error=1e-3) for r in (10, 20)])
+    expected = 1e-3 * (40 / (1 + 0.01 + 0.7 / 400) + 10 / (1 + 0.02 + 0.7 / 100))
+    assert np.diag(sweep.end_effect_error) == pytest.approx(expected, rel=1e-9)
+
+
+def test_table_and_picture_show_every_entry():
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20)])
+    text = sweep_text(sweep)
+    assert "RX" in text
+    assert "RY TZ" in text
+    assert text.count("\n") >= 7
+    axes = plot_slenderness(sweep).axes[0]
+    assert "L / r" in axes.get_xlabel()
+    assert axes.get_legend() is not None
+
+
+@pytest.mark.slow
+def test_a_round_bars_ends():
+    """Poisson's ratio 0: tension has no end effect at all, K_TZ = E A / L; with 0.3 a
+    held face stiffens bending by c = 0.2 (two converged references: 1.6 % at L / r =
+    11.3 beside Timoshenko's, of which 0.2 % is Cowper's shear factor)."""
+    sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, [6, 12, 24], accuracy=0.004)
+    assert sweep.end_effect[0, 0] == pytest.approx(0.19, abs=0.04)
+    assert abs(sweep.end_effect[2, 2]) < 0.02  # torsion of a round bar has none
+    assert np.abs(sweep.residual).max() < 0.004
+    none = sweep_slenderness({"radius": 0.02}, 6e10, 0.0, [6, 12], accuracy=0.01)
+    for comparison in none.comparisons:
+        assert abs(comparison.difference[5, 5]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--radius", "0.02", "--ratios", "5"], "found one length"),
+        (["--radius", "0.02", "--ratios", "5,x"], "--ratios: found '5,x'"),
+        (["--radius", "0.02", "--ratios", "5,5"], "5 is given twice"),
+        (["--radius", "0.02", "--ratios", "0,5"], "--ratios: found 0"),
+        (["--section", "width=1,height=1,web=.1,flange=.1"], "found a section of"),
+        (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
+        (["--section", "radius=1", "--radius", "1"], "--radius does not go with it"),
+        (["--section", "width=1"], "--section: found width, expected one of"),
+    ],
+)
+def test_slenderness_refuses_before_it_works(options, message):
+    with pytest.raises(BadInput) as caught:
+        CliRunner().invoke(
+            app, ["slenderness", *MATERIAL, *options], catch_exceptions=False
+        )
+    assert message in str(caught.value)
+
+
+def test_a_beam_that_ends_elsewhere_is_refused():
+    C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
+    one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
+    other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
+    with pytest.raises(BadInput, match="the surface's tip is at"):
+        compare_link(one, other, 0.02)
+
+
+def test_wrenches_and_numbers_as_people_write_them():
+    np.testing.assert_array_equal(wrench("-w", ["fx=1,mz=-2"]), [0, 0, -2, 1, 0, 0])
+    with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
+        wrench("--wrench", ["fq=1"])
+    assert numbers("--ratios", "20,5", "1") == [5.0, 20.0]
+
+
+# --- curves from files ---------------------------------------------------------------
+
+L_BRACKET = """
+[[piece]]
+end = [0, 0, 0.2]
+section = { width = 0.04, height = 0.05 }
+up = [0, 1, 0]
+[[piece]]
+end = [0.15, 0, 0.2]
+up = [0, 1, 0]
+"""
+
+
+def curve_file(tmp_path: Path, content: str) -> Path:
+    path = tmp_path / "curve.toml"
+    path.write_text(content)
+    return path
+
+
+def test_an_l_from_a_file_is_two_beams(tmp_path):
+    """The command prints what the function gives; length 0.35 m; Castigliano by hand
+    for a force along y at the tip: both legs bend, the first twists."""
+    path = curve_file(tmp_path, L_BRACKET)
+    result = CliRunner().invoke(
+        app, ["curve", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
+    )
+    C = np.array(json.loads(result.stdout)["compliance"])
+    pieces = read_curve(path, 0.3)
+    assert curve_length(pieces) == pytest.approx(0.35, rel=1e-12)
+    np.testing.assert_allclose(
+        C, curve_compliance(pieces, 6e10, 0.3, theory="euler"), rtol=1e-12, atol=1e-20
+    )
+    s = rectangular_section(0.04, 0.05, 0.3)
+    E, G, a, b = 6e10, 6e10 / 2.6, 0.2, 0.15
+    expected = (a**3 + b**3) / (3 * E * s.I_y) + a * b**2 / (G * s.J)
+    assert C[4, 4] == pytest.approx(expected, rel=1e-9)
+
+
+def test_tapers_and_arcs_from_a_file(tmp_path):
+    """A cone is stretched by L / (E pi r1 r2); a quarter circle ends on its axis."""
+    cone = """
+[[piece]]
+end = [0.3, 0, 0]
+section = { radius = 0.02 }
+tip_section = { radius = 0.01 }
+"""
+    C = curve_compliance(read_curve(curve_file(tmp_path, cone), 0.3), 6e10, 0.3)
+    assert C[3, 3] == pytest.approx(0.3 / (6e10 * np.pi * 0.02 * 0.01), rel=1e-9)
+    arc = """
+[[piece]]
+start = [0.1, 0, 0]
+center = [0, 0, 0]
+turn = [0, 0, 1.5707963267948966]
+section = { width = 0.01, height = 0.02, wall = 0.001 }
+"""
+    (piece,) = read_curve(curve_file(tmp_path, arc), 0.3)
+    np.testing.assert_allclose(piece.place(1.0), [0, 0.1, 0], atol=1e-15)
+    assert curve_length([piece]) == pytest.approx(np.pi * 0.05, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("[[piece]]", "[[pieces]]"), 'unknown key "pieces"; did you'),
+        (("section =", "sektion ="), "piece[1].section: missing"),
+        (("width", "widht"), 'piece[1].section: unknown "widht"; did you mean'),
+        (("height = 0.05", "height = -1"), "piece[1]: rectangular_section: height"),
+        (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece from start to end"),
+        (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
+        (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
+        (
+            ("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
+            "a taper has lengths of the same names",
+        ),
+    ],
+)
+def test_a_curve_file_that_is_none_is_refused(tmp_path, change, message):
+    path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
+    with pytest.raises(BadInput) as caught:
+        read_curve(path, 0.3)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
+    path = curve_file(tmp_path, L_BRACKET)
+    command = ["compare", "x.stl", "--base", "z=0", "--tip", "x=0.15", *MATERIAL]
+    with pytest.raises(BadInput, match="--curve: its file has the sections"):
+        CliRunner().invoke(
+            app,
+            [*command, "--curve", str(path), "--radius", "0.1"],
+            catch_exceptions=False,
+        )
