@@ -21,10 +21,12 @@ from assembly.cli import (
 from assembly.posture import Posture
 from stiffness.reading import BadInput
 from stiffness.writing import write_json
+from validation.diagnosis.cli import diagnose
 from validation.generator_cli import generate
 from validation.inspect_cli import inspect
 
 app = typer.Typer(no_args_is_help=True)
+app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
 
@@ -66,7 +68,11 @@ def crosscheck(
     load: LoadOption = None,
     gravity: GravityOption = None,
     scale: Annotated[
-        str, typer.Option(help="Factors on errors and load, largest first.")
+        str,
+        typer.Option(
+            help="Factors on errors and load; smaller ones are added where these "
+            "leave a check undecided."
+        ),
     ] = "1,0.5,0.25,0.125",
     links: Annotated[
         str, typer.Option(help="How the simulation models links: beam | spring | fem.")
@@ -82,6 +88,9 @@ def crosscheck(
     figure: Annotated[
         Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.0, help="[s] for each simulation.")
+    ] = 300.0,
 ) -> None:
     """Compare with a multibody simulation at several scales of the imperfections.
 
@@ -96,15 +105,13 @@ def crosscheck(
     g = parse_gravity(gravity)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
-    if clearances and g is not None:
-        raise BadInput("--gravity: not compared with --clearances")
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
     def compare(posture: Posture) -> Crosscheck | PlayCheck:
         if clearances:
-            return playcheck(posture, scales, wrench, links)
-        return compare_tight(posture, scales, wrench, links, g)
+            return playcheck(posture, scales, wrench, links, g, time_limit)
+        return compare_tight(posture, scales, wrench, links, g, time_limit)
 
     if grid is not None:
         _crosscheck_grid(robot, grid, compare, json)
@@ -141,3 +148,33 @@ def _crosscheck_grid(
         print(poses_text(rows))
     if not poses_table(rows)["passed"]:
         raise typer.Exit(1)
+
+
+@app.command()
+def validity(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    solids: Annotated[
+        bool,
+        typer.Option(
+            "--solids", help="Also mesh round beams as solids; minutes for each shape."
+        ),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """What the model's assumptions cost a robot at a pose: position, rotation, energy.
+
+    Linear closures, beams instead of solids, weight at the links' ends, disc and cone
+    instead of pins in two bushes; what exceeds 20 um or 1 % is marked.
+    """
+    from validation.validity import assumption_costs, costs_table, costs_text
+
+    posture = posture_of(robot, pose, joint)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    costs = assumption_costs(posture, wrench, g, solids)
+    write_json(costs_table(posture, costs), json)
+    if json != "-":
+        print(costs_text(posture, costs))

@@ -18,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.conditions import Conditions
-from assembly.effects import LIBRARY
+from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.predict import predict
 from validation.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
+from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import device_frame, register
 from validation.diagnosis.scoring import Scored, Screen, inclusion, posterior
@@ -35,12 +36,14 @@ from validation.diagnosis.signatures import (
     loaded_components,
     whiten,
 )
+from validation.diagnosis.structure import Trend, trends
 
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one stands against it
 _ROUNDS = 4  # of refitting and scoring again
 _LISTED = 0.02  # probability from which an alternative is listed
 _VISIBLE = 4.0  # squared whitened change of the readings
+_KINDS = 4  # sets of different effects that are refitted
 _NEAR = 6.0  # in score: sets this near the best are refitted too
 
 
@@ -83,6 +86,8 @@ class Diagnosis:
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
         residual_after: (R, 6) [rad, m] reading minus the best set's model.
         screen: the scored hypotheses of the last round.
+        trends: what the residual left varies with, if more than noise is left.
+        next: the measurement that would decide, if the verdict is ambiguous.
     """
 
     campaign: Campaign
@@ -103,6 +108,8 @@ class Diagnosis:
     residual_before: NDArray
     residual_after: NDArray
     screen: Screen
+    trends: tuple[Trend, ...]
+    next: NextMeasurement | None
 
 
 def diagnose(campaign: Campaign) -> Diagnosis:
@@ -135,11 +142,16 @@ def diagnose(campaign: Campaign) -> Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Selection:
-    """Sets of hypotheses with their scores, the best fitted in the full model."""
+    """Sets of hypotheses with their scores, the best fitted in the full model.
+
+    ``rival`` is the best fit of other effects than the best set's, None if no other
+    set is worth listing.
+    """
 
     screen: Screen
     sets: list[Scored]
     fit: Fit
+    rival: Fit | None
     unknowns: int
     tangents: Tangents
 
@@ -154,8 +166,8 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
     signatures = [tangents.at_start(h) for h in candidates]
     signatures = [s for s in signatures if _finite(s) and _shows(s)]
     project = _projector([tangents.at_start(h) for h in nuisance])
-    best: tuple[Hypothesis, ...] | None = None
-    for _ in range(_ROUNDS):
+    best: tuple[Hypothesis, ...] = ()
+    for turn in range(_ROUNDS):
         screen = Screen(
             project(tangents.residual[:, None])[:, 0],
             [_projected(s, project) for s in signatures],
@@ -163,31 +175,48 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
         sets = screen.search()
         # near rivals and their parts too: a tangent may flatter a set that is larger
         fits: dict[tuple[int, ...], Fit] = {}
-        for one in _worth_refitting(sets):
+        for one in _worth_refitting(screen, sets):
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
             fit = refit(campaign, here, [*nuisance, *members], start)
             if fit is not None:
                 fits[one.members] = fit
         sets = _with_fits(screen, sets, fits)
-        fit = fits[sets[0].members]
-        chosen = fit.hypotheses
-        if chosen == best:
+        chosen = fits[sets[0].members]
+        if turn and chosen.hypotheses == best:
             break
-        best = chosen
-        signatures = _about(tangents, signatures, fit, len(nuisance))
+        best = chosen.hypotheses
+        signatures = _about(tangents, signatures, chosen, len(nuisance))
     unknowns = sets[0].rank + 6 * len(nuisance)
-    return _Selection(screen, sets, fit, unknowns, tangents)
+    rival = _rival(screen, sets, fits)
+    return _Selection(screen, sets, chosen, rival, unknowns, tangents)
 
 
-def _worth_refitting(sets: Sequence[Scored]) -> list[Scored]:
-    """The best sets, and all their parts."""
+def _rival(
+    screen: Screen, sets: Sequence[Scored], fits: dict[tuple[int, ...], Fit]
+) -> Fit | None:
+    """The best fit of effects that do not contain the best set's, nor it them."""
+    own = {screen.effects[i] for i in sets[0].members}
+    for one in sets:
+        other = {screen.effects[i] for i in one.members}
+        if one.members in fits and not (own <= other or other <= own):
+            return fits[one.members]
+    return None
+
+
+def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
+    """The best sets, all their parts, and the best sets of other effects."""
     near = [s for s in sets[:6] if s.score > sets[0].score - _NEAR]
     parts = {
         tuple(i for i in s.members if i != left)
         for s in near
         for left in (None, *s.members)
     }
+    kinds: dict[frozenset[str], Scored] = {}
+    for s in sets:
+        kinds.setdefault(frozenset(screen.effects[i] for i in s.members), s)
+    others = list(kinds.values())[:_KINDS]
+    parts |= {s.members for s in others if s.score > sets[0].score - _NEAR}
     return [s for s in sets if s.members in parts]
 
 
@@ -201,7 +230,7 @@ def _start(one: Scored, members: Sequence[Hypothesis]) -> NDArray:
 def _with_fits(
     screen: Screen, sets: list[Scored], fits: dict[tuple[int, ...], Fit]
 ) -> list[Scored]:
-    """Sets with the scores of their refits, best first; a refit comes before the rest."""
+    """Sets with the scores of their refits; the best refit comes first."""
     scored = []
     for one in sets:
         fit = fits.get(one.members)
@@ -301,10 +330,16 @@ def _judge(
     probability = inclusion(found.screen, found.sets)
     best = tuple(sorted(found.screen.effects[i] for i in found.sets[0].members))
     verdict, claimed = _verdict(by_names, probability, lack)
-    after = _apply_to_all(here, found.fit)
+    after = apply_effects(here, found.fit.effects)
     measured = campaign.measured
     residual_before = measured - predict(here).deviation
     residual_after = measured - predict(after).deviation
+    left: tuple[Trend, ...] = ()
+    if verdict == "outside_library":
+        left = tuple(trends(fitting, here.take(used), residual_after[used]))
+    further = None
+    if verdict == "ambiguous" and found.rival is not None:
+        further = next_measurement(fitting, here.take(used), [found.fit, found.rival])
     held = ~parts.fitted & ~outliers
     if not held.any():
         held = used
@@ -319,6 +354,7 @@ def _judge(
         declared, _errors(campaign, residual_before, held),
         _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
         parts, outliers, here, residual_before, residual_after, found.screen,
+        left, further,
     )  # fmt: skip
 
 
@@ -347,13 +383,6 @@ def _verdict(
     if sure and not rivals and dict(sets).get(sure, 0.0) >= RIVAL:
         return "explained", sure
     return "ambiguous", ()
-
-
-def _apply_to_all(here: Conditions, fit: Fit) -> Conditions:
-    """All rows under the effects of a fit."""
-    from assembly.effects import apply_effects
-
-    return apply_effects(here, fit.effects)
 
 
 def _errors(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:

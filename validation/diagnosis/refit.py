@@ -16,6 +16,7 @@ from assembly.conditions import Conditions
 from assembly.effects import apply_effects
 from assembly.effects.effect import Values
 from assembly.predict import predict
+from assembly.robot import Robot
 from validation.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import whiten
@@ -50,8 +51,18 @@ class Fit:
     @cached_property
     def effects(self) -> dict[str, dict[str, float]]:
         """Parameters by their public names, by effect."""
-        robot = self.conditions.robot
-        return _public(self.hypotheses, self.values, robot)
+        return self.at(self.values)
+
+    def at(self, values: NDArray) -> dict[str, dict[str, float]]:
+        """Parameters by their public names, at other values of the unknowns.
+
+        Args:
+            values: one for each slot, one hypothesis after the other.
+
+        Returns:
+            By effect.
+        """
+        return _public(self.hypotheses, values, self.conditions.robot)
 
     def parameters(self, k: int) -> list[tuple[str, float, float]]:
         """Name, value and standard deviation of one hypothesis's parameters.
@@ -83,13 +94,13 @@ class Fit:
 
 
 def _public(
-    members: Sequence[Hypothesis], values: NDArray, robot: object
+    members: Sequence[Hypothesis], values: NDArray, robot: Robot
 ) -> dict[str, dict[str, float]]:
     """Parameters of all members by effect; those of one effect join."""
     found: dict[str, dict[str, float]] = {}
     at = 0
     for h in members:
-        own = h.public(robot, values[at : at + len(h.slots)])  # type: ignore[arg-type]
+        own = h.public(robot, values[at : at + len(h.slots)])
         found.setdefault(h.effect, {}).update(own)
         at += len(h.slots)
     return found

@@ -41,7 +41,7 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
 
     Args:
         campaign: rows from which it is found.
-        here: all conditions to be registered; the first rows need not be the campaign's.
+        here: all conditions to be registered, of these rows or of more.
 
     Returns:
         The same conditions, registered.
@@ -81,7 +81,7 @@ def _coarse(campaign: Campaign, here: Conditions) -> dict[str, float]:
         R = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
     else:
         raise BadInput(
-            f"{campaign.name}: registration is unknown, and there are neither rotations "
+            f"{campaign.name}: registration is unknown, and there are no rotations "
             f"nor {_FEWEST_POINTS} measured points off one line; expected either"
         )
     shift = (seen - thought @ R.T).mean(axis=0) if len(seen) else np.zeros(3)

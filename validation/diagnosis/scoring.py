@@ -145,7 +145,7 @@ class Screen:
         chosen = {own[0] for own in ways.values()}
         for own in ways.values():
             chosen.update(sorted(own, key=alone.index)[:_WAYS])
-        pairs = {*combinations(sorted(chosen), 2)}
+        pairs: set[tuple[int, ...]] = {*combinations(sorted(chosen), 2)}
         pairs |= {(i, j) for i in alone[:_BEST] for j in everyone if i != j}
         self._enlarge(found, pairs)
         for size in range(3, largest + 1):

@@ -1,0 +1,35 @@
+"""The command ``forcefit validation diagnose``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from assembly.cli import JsonOption
+from stiffness.writing import write_json
+from validation.inspect_cli import CampaignArgument
+
+
+def diagnose(
+    campaign: CampaignArgument,
+    json: JsonOption = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Also write a report, one HTML file.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Also write the robot with the effects found.")
+    ] = None,
+) -> None:
+    """Trace measured deviations to the effect that the declared model lacks.
+
+    The verdict is explained, none_needed, ambiguous or outside_library; errors before
+    and after are on rows that played no part in choosing or fitting.
+    """
+    from validation.campaign_file import read_campaign
+    from validation.diagnosis import results
+    from validation.diagnosis.diagnose import diagnose as trace
+
+    found = trace(read_campaign(campaign))
+    write_json(results.table(found), json)
+    if json != "-":
+        print(results.text(found))
