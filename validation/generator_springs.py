@@ -37,6 +37,7 @@ from validation.multibody import SimulationFailed
 
 _STEPS = 60
 _STILL = 1e-12  # [rad, m] of the last step
+_LOST = 1e3  # [rad, m] of a coordinate: the steps diverge
 _RANK = 1e-10  # singular values below it, relative, are of idle motions
 
 
@@ -103,6 +104,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
         move = np.einsum("kij,kj->ki", newton, residual)
         wrenches = wrenches + move[:, :size].reshape(wrenches.shape) / unit
         q[:, parts.passive] += move[:, size:]
+        if not np.abs(q).max() < _LOST:
+            break
         open_ = max(np.abs(left).max(initial=0), np.abs(move[:, size:]).max(initial=0))
         if still and open_ < _STILL:
             return [Rest(*one) for one in zip(ends[1], read[1], screws[1], strict=True)]

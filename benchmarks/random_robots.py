@@ -1,0 +1,203 @@
+"""Robots of random dimensions, with declared geometric errors, to be measured.
+
+Serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots, hexapods and delta
+robots: tight joints, some drives elastic, some rigid, bodies with a mass.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.posture import home_posture
+from assembly.robot import BeamLink, Frame, Robot
+from assembly.robots import delta, five_bar, hexapod, three_rrr
+from assembly.robots.delta import Parameters as Delta
+from assembly.robots.five_bar import Parameters as FiveBar
+from assembly.robots.hexapod import Parameters as Hexapod
+from assembly.robots.placing import drive_stiffness
+from assembly.robots.three_rrr import Parameters as ThreeRRR
+from validation.generator_design import Design, plan_campaign
+from validation.generator_effects import Machine
+from validation.generator_machine import simulate_readings
+from validation.generator_springs import rest_on_springs
+from validation.motion import turn_of
+from validation.multibody import SimulationFailed, without_clearance
+
+KINDS = ("arm", "arm", "arm", "3rrr", "five_bar", "hexapod", "delta")
+_MOST = 1.5e-3  # [rad, m] anywhere within reach
+_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] by declared errors, by the largest load
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A robot and how far it may be moved and loaded.
+
+    Attributes:
+        kind: which kind of robot.
+        robot: with its declared errors.
+        reach: [rad] largest change of a drive from home; 0.1 m for 1 rad if it slides.
+        load: [N] largest force.
+        point: (3,) [m] measured, platform axes.
+    """
+
+    kind: str
+    robot: Robot
+    reach: float
+    load: float
+    point: NDArray
+
+
+def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
+    """A random robot.
+
+    Args:
+        rng: of the draws.
+        kind: one of :data:`KINDS`; drawn if absent.
+
+    Returns:
+        The robot.
+    """
+    kind = kind or KINDS[rng.integers(len(KINDS))]
+    robot, reach = _BUILDERS[kind](rng)
+    robot = _with_masses(without_clearance(robot), rng)
+    errors = rng.uniform(-1, 1, (len(robot.frames), 6))
+    tight = robot.with_errors(0 * errors)
+    robot = robot.with_errors(errors * np.repeat([1e-4, 5e-5], 3))
+    excess = float((_moved(robot, [np.zeros(6)], tight) / _ALLOWED).max())
+    robot = robot.with_errors(robot.errors / max(excess, 1.0))
+    robot = replace(robot, name=kind, description="drawn at random")
+    point = rng.uniform(-0.05, 0.05, 3).round(3)
+    reach, load = _of_first_order(robot, point, reach, _largest_load(tight))
+    return Drawn(kind, robot, reach, load, point)
+
+
+def _of_first_order(
+    robot: Robot, point: NDArray, reach: float, load: float
+) -> tuple[float, float]:
+    """Reach [rad] and load [N] with which no deviation grows far: no singularities."""
+    for _ in range(8):
+        design = Design(configurations=30, rows=60, reach=reach, load=load)
+        rows = plan_campaign(robot, design, np.random.default_rng(0)).rows
+        try:
+            found = simulate_readings(robot, point, rows, program="springs")
+        except SimulationFailed:
+            found = np.full((1, 6), np.inf)
+        if np.abs(found).max() < _MOST:
+            break
+        reach, load = 0.75 * reach, 0.75 * load
+    return round(reach, 3), float(f"{load:.2g}")
+
+
+def _arm(rng: np.random.Generator) -> tuple[Robot, float]:
+    """Joints that turn about their neighbours' axis, or across it."""
+    count = int(rng.integers(3, 7))
+    elastic = rng.random() < 0.6
+    frames: list[Frame] = []
+    parent, radius = "base", rng.uniform(0.035, 0.055)
+    for k in range(count):
+        name, link, place, turn = f"j{k + 1}", None, np.zeros(3), np.zeros(3)
+        if k:
+            link = _tube(radius)
+            place = rng.uniform(0.15, 0.4) * _direction(rng)
+            turn = rng.choice([-1, 0, 1]) * np.pi / 2 * np.eye(3)[rng.integers(2)]
+            if k == 1:  # otherwise all axes may be parallel
+                turn = np.array([np.pi / 2, 0, 0])
+        K = drive_stiffness(2e5 * 0.65**k) if elastic else None
+        frames.append(
+            Frame(
+                name, parent, place.round(4), turn, joint="revolute", actuated=True,
+                joint_stiffness=K, link=link,
+            )
+        )  # fmt: skip
+        parent, radius = name, 0.87 * radius
+    end = rng.uniform(0.08, 0.2) * _direction(rng)
+    frames.append(Frame("tool", parent, end.round(4), link=_tube(radius)))
+    return Robot("arm", "tool", tuple(frames)), 0.8
+
+
+def _direction(rng: np.random.Generator) -> NDArray:
+    """(3,) unit vector, rather across the joint's axis than along it."""
+    vector = rng.normal(size=3) * [1, 1, 0.5]
+    return vector / np.linalg.norm(vector)
+
+
+def _tube(radius: float) -> BeamLink:
+    section = {"radius": round(radius, 4), "inner_radius": round(radius - 0.005, 4)}
+    return BeamLink(section, 70e9, 0.33, density=2700.0)
+
+
+def _about(rng: np.random.Generator, value: float) -> float:
+    """A number within 20 %."""
+    return float(value * rng.uniform(0.8, 1.2))
+
+
+def _three_rrr(rng: np.random.Generator) -> tuple[Robot, float]:
+    P = ThreeRRR()
+    leg = replace(P.leg, near=_about(rng, P.leg.near), far=_about(rng, P.leg.far))
+    robot = three_rrr(replace(P, leg=_driven(leg, rng)))
+    return robot, 0.15
+
+
+def _five_bar(rng: np.random.Generator) -> tuple[Robot, float]:
+    P = FiveBar()
+    arm = _about(rng, P.leg.near)
+    leg = replace(P.leg, near=arm, far=_about(rng, arm))
+    robot = five_bar(replace(P, leg=_driven(leg, rng), base=_about(rng, P.base)))
+    return robot, 0.15
+
+
+def _driven(leg, rng: np.random.Generator):
+    """A planar leg with a drive of another stiffness."""
+    return replace(leg, drive=_about(rng, 3 * leg.drive))
+
+
+def _hexapod(rng: np.random.Generator) -> tuple[Robot, float]:
+    P = Hexapod()
+    P = replace(P, height=_about(rng, P.height), radius=_about(rng, 0.011))
+    return hexapod(P), 0.15
+
+
+def _delta(rng: np.random.Generator) -> tuple[Robot, float]:
+    P = Delta()
+    size = _about(rng, 1.0)
+    P = replace(P, arm=size * P.arm, rod=size * P.rod, home=size * P.home)
+    return delta(P), 0.25
+
+
+_BUILDERS = {
+    "arm": _arm,
+    "3rrr": _three_rrr,
+    "five_bar": _five_bar,
+    "hexapod": _hexapod,
+    "delta": _delta,
+}
+
+
+def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
+    """Bodies of some mass at beams' ends and at the platform."""
+    heavy = []
+    for frame in robot.frames:
+        if frame.name == robot.platform or isinstance(frame.link, BeamLink):
+            frame = replace(frame, mass=round(rng.uniform(0.1, 1.0), 2))
+        heavy.append(frame)
+    return replace(robot, frames=tuple(heavy))
+
+
+def _largest_load(tight: Robot) -> float:
+    """[N] under which the platform gives way by about what is allowed at home."""
+    pushes = [np.eye(6)[k] for k in (3, 4, 5)]
+    softest = (_moved(tight, pushes, tight) / _ALLOWED).max()
+    return float(f"{np.clip(1 / softest, 0.5, 400):.2g}")
+
+
+def _moved(robot: Robot, pushes: list[NDArray], tight: Robot) -> NDArray:
+    """(k, 2) [rad, m] how far pushes move the home platform."""
+    home = home_posture(tight)
+    names = [frame.name for frame in robot.frames]
+    q = dict(zip(names, home.coordinates.tolist(), strict=True))
+    rests = rest_on_springs([Machine(robot, q, push) for push in pushes])
+    T = np.array([r.transforms[robot.index(robot.platform)] for r in rests])
+    turns = [np.linalg.norm(turn_of(R @ home.platform[:3, :3].T)) for R in T[:, :3, :3]]
+    shifts = np.linalg.norm(T[:, :3, 3] - home.platform[:3, 3], axis=1)
+    return np.column_stack([turns, shifts])
