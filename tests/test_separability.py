@@ -64,13 +64,14 @@ def test_nuisances_take_what_they_can_imitate(rng):
     np.testing.assert_array_equal(found.visible, [True, True, False])
 
 
-def test_what_is_too_small_to_be_seen_is_in_no_class(rng):
-    """2 sigma in all rows together; it would be a twin if it were larger."""
+def test_what_is_too_small_to_be_seen_may_be_larger_than_thought(rng):
+    """2 sigma in all rows together does not show; a twin it is at any size."""
     line = rng.normal(size=(30, 1))
     line /= np.linalg.norm(line)
-    found = compare_signatures({"a": 2 * line, "b": 50 * line})
-    np.testing.assert_array_equal(found.visible, [False, True])
-    assert found.classes() == []
+    found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
+    np.testing.assert_array_equal(found.visible, [False, True, False])
+    np.testing.assert_array_equal(found.traced, [True, True, False])
+    assert found.classes() == [("a", "b")]
 
 
 def test_unknowns_that_do_the_same_are_counted_once():

@@ -109,7 +109,7 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
         (R,) int.
     """
     table = np.column_stack([np.asarray(c, dtype=float) for c in columns])
-    table = np.round(table / step) + 0.0  # no negative zero
+    table = np.round(table / step)
     _, first, number = np.unique(
         np.nan_to_num(table, nan=np.inf), axis=0, return_index=True, return_inverse=True
     )

@@ -131,8 +131,8 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was ever applied: compliance (drives, base, links, contacts), "
-            "play taken up by a load and a wrong load cannot be found or excluded."
+            "No load was ever applied: compliance and play show at most through the "
+            "machine's own weight and inner forces, a wrong load not at all."
         )
         return [Remark("load", LOST, text)]
     found = []

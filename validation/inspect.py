@@ -78,13 +78,19 @@ class Inspection:
         s = self.separability
         for i, name in enumerate(s.names):
             found[name] = {
-                "testable": bool(s.visible[i]),
+                "testable": bool(s.traced[i]),
+                "shows": bool(s.visible[i]),
+                "shows_at": self._shows_at(i) if s.traced[i] else None,
                 "strength": s.strength[i],
                 "left_by_registration": s.left[i],
                 "unknowns": s.unknowns[i],
                 "rank": s.rank[i],
             }
         return found
+
+    def _shows_at(self, i: int) -> float:
+        """Factor on plausible sizes at which an effect would stand out of the noise."""
+        return SEEN / (self.separability.strength[i] * self.separability.left[i])
 
     def text(self) -> str:
         """The same for people."""
@@ -114,15 +120,17 @@ class Inspection:
         lines = ["Effects, at plausible sizes, in this design:"]
         shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
         lines.append(f"  would show: {', '.join(shown) or 'none'}")
+        small = s.traced & ~s.visible
         weak = [
-            f"{n} ({size:.1f} sigma)"
-            for n, size, seen in zip(
-                s.names, s.strength * s.left, s.visible, strict=True
-            )
-            if not seen
+            f"{n} (at {self._shows_at(i):.2g} times that size)"
+            for i, n in enumerate(s.names)
+            if small[i]
         ]
         if weak:
-            lines.append(f"  too small to show (< {SEEN:g} sigma): {', '.join(weak)}")
+            lines.append(f"  would show only if larger: {', '.join(weak)}")
+        none = [n for n, traced in zip(s.names, s.traced, strict=True) if not traced]
+        if none:
+            lines.append(f"  leaves no trace: {', '.join(none)}")
         for name, why in self.signatures.untestable.items():
             lines.append(f"  not testable: {name}: {why}")
         for group in s.classes():

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 LIKE = 0.98  # cosine above which a design cannot separate
 SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
+TRACE = 1e-3  # [sigma] a signature shorter than this is none
 _RANK = 1e-3  # relative singular value below which columns are one: they are secants
 
 
@@ -57,6 +58,11 @@ class Separability:
         """(m,) bool: would stand out of the noise at a plausible size."""
         return self.strength * self.left >= SEEN
 
+    @property
+    def traced(self) -> NDArray:
+        """(m,) bool: would show if it were large enough."""
+        return (self.strength * self.left >= TRACE) & (self.rank > 0)
+
     def classes(self) -> list[tuple[str, ...]]:
         """Effects that imitate each other, wholly and both ways.
 
@@ -64,7 +70,7 @@ class Separability:
             Classes of two and more; a verdict can only name the class.
         """
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
-        alike &= np.outer(self.visible, self.visible)
+        alike &= np.outer(self.traced, self.traced)
         waiting = list(range(len(self.names)))
         found = []
         while waiting:
@@ -81,7 +87,7 @@ class Separability:
     def imitated(self) -> list[tuple[str, str]]:
         """Pairs (a, b): whatever a does b can do as well, but not the other way."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
-        one_way &= np.outer(self.visible, self.visible)
+        one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
