@@ -14,6 +14,7 @@ from assembly.robots.placing import (
     at,
     ball_joint,
     cardan_joint,
+    drive_stiffness,
     place_frames,
 )
 from examples.campaign_folder import data_folder, write_campaign
@@ -28,6 +29,7 @@ ANCHORS = np.array([
 ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # of the blocks
 GEAR = 255 / 20  # turns of the motor for one of the spool
 RADIUS = 0.075  # [m] of the spools
+STIFFNESS = 1e4  # [N/m] of every line; only their being equal matters here
 CAMERA = 2e-3  # [m] one sigma of a position, estimated by the study
 
 
@@ -87,8 +89,9 @@ def _line(name: str, anchor: NDArray) -> Sequence[Placed]:
     second = np.cross(along, first)
     end, origin = f"{name}.cardan", np.zeros(3)
     driven = Frame(
-        f"{name}.line", f"{end}_2", joint="prismatic", actuated=True, position=length
-    )
+        f"{name}.line", f"{end}_2", joint="prismatic", actuated=True, position=length,
+        joint_stiffness=drive_stiffness(STIFFNESS, "prismatic"),
+    )  # fmt: skip
     return [
         *cardan_joint(end, "base", anchor, first, second),
         (driven, at(anchor, along, first)),
@@ -98,8 +101,7 @@ def _line(name: str, anchor: NDArray) -> Sequence[Placed]:
 
 
 def commanded(samples: Samples) -> NDArray:
-    """(k, 3) [m] where the firmware thinks the effector is: the point whose nominal
-    line lengths agree best with the motors."""
+    """(k, 3) [m] where the motors think the effector is: nominal lines agree best."""
     paid = RADIUS * samples.spool / ADVANTAGE
     lengths = np.linalg.norm(ANCHORS, axis=1) + paid
 

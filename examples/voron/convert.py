@@ -50,7 +50,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
             warm = table[f"{name}_t"]
             columns[f"cov.{name}_temperature"] = warm - warm[0]
         folders[run] = write_campaign(
-            out / run, robot, columns, (1.0, SIGMA), registration="unknown"
+            out / run, robot, columns, (1.0, SIGMA), registration="known"
         )
     return folders
 
