@@ -106,7 +106,7 @@ def _targets(robot: Robot, grid: str | None, poses: Path | None) -> Targets:
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Values by path; each is refused if a robot file could not say it."""
+    """Values by path; refused if a robot file could not say the least and largest."""
     found: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -124,7 +124,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
         values = np.concatenate(parts)
         if len(np.unique(values)) < len(values):
             raise BadInput(f"--vary {path}: found a value twice")
-        for value in values.tolist():
+        for value in (float(values.min()), float(values.max())):
             design.check({path: value})
         found[path] = values
     return found
