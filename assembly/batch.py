@@ -15,7 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.conic import SolverFailed
-from assembly.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.energy import (
+    Assembly,
+    CannotAssemble,
+    solve_assembly,
+    without_own_springs,
+)
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
@@ -92,6 +97,7 @@ def minimise_energies(
     transforms: ArrayLike,
     errors: ArrayLike | None = None,
     mismatch: ArrayLike = 0.0,
+    compliant: str = "elastic",
 ) -> Energies:
     """Close a manipulator at least energy, problem (22), at many points.
 
@@ -101,6 +107,8 @@ def minimise_energies(
             :attr:`~assembly.posture.Posture.transforms`.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        compliant: ``"elastic"``, or ``"hinged"``: compliant joints turn freely about
+            their own axis, see :func:`assembly.closure.virtual_joints`.
 
     Returns:
         Energies, screws and certificates, in the order given.
@@ -123,7 +131,7 @@ def minimise_energies(
         raise ValueError("minimise_energies: transforms or errors are not all finite")
     all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
-    joints, structure = _structure(robot)
+    joints, structure = structure_of(robot, compliant)
     nu, nq = joints.cones.shape[1], joints.free.shape[1]
     out = Answers(
         np.zeros(count, dtype=np.int64),
@@ -142,7 +150,8 @@ def minimise_energies(
         # one robot for all where the errors are its own: its columns are kept
         here = all_errors[i if len(all_errors) > 1 else 0]
         own = robot if np.array_equal(here, robot.errors) else robot.with_errors(here)
-        _solve_slowly(Posture(own, np.full(n, np.nan), T[i], float(off[i])), answers, i)
+        posture = Posture(own, np.full(n, np.nan), T[i], float(off[i]))
+        _solve_slowly(posture, compliant, answers, i)
     return answers
 
 
@@ -154,7 +163,7 @@ def _excess(clearances: NDArray, starts: NDArray) -> NDArray:
     return np.maximum(0.0, sizes.max(axis=1) - 1.0)
 
 
-def _solve_slowly(posture: Posture, answers: Energies, i: int) -> None:
+def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -> None:
     """Row i of the answers by the slower road."""
     a = answers
     for values in (a.energy, a.bound, a.energy_without_play, a.platform_screw,
@@ -163,6 +172,8 @@ def _solve_slowly(posture: Posture, answers: Energies, i: int) -> None:
         values[i] = np.nan
     try:
         one = solve_assembly(posture)
+        if compliant == "hinged":
+            one = without_own_springs(one)
     except CannotAssemble as error:
         a.status[i], a.reason[i] = "cannot assemble", str(error)
         return
@@ -236,7 +247,7 @@ def zone_margins(
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     count, n = len(T), len(robot.frames)
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
-    joints, structure = _structure(robot, compliant)
+    joints, structure = structure_of(robot, compliant)
     margin, bound = np.full(count, np.nan), np.full(count, np.nan)
     road, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
     own = None if errors is None else np.array(errors, dtype=float)
@@ -263,10 +274,18 @@ def zone_margins(
 
 
 @lru_cache(maxsize=32)
-def _structure(
+def structure_of(
     robot: Robot, compliant: str = "elastic"
 ) -> tuple[VirtualJoints, "Structure"]:
-    """The robot as the compiled road reads it."""
+    """What may move, and the robot as the compiled roads read it.
+
+    Args:
+        robot: any.
+        compliant: as for :func:`assembly.closure.virtual_joints`.
+
+    Returns:
+        The columns; the same as arrays.
+    """
     from assembly.compiled_reduction import Structure
 
     joints = virtual_joints(robot, compliant)
@@ -282,7 +301,9 @@ def _structure(
     keys, starts = np.unique(key[order], return_index=True)
     cone_frame, cones = _own_columns(joints.cones)
     free_frame, free = _own_columns(joints.free)
-    bounds = clearance_bounds(robot, compliant)[:, [0, 0, 1, 2, 2, 3]]
+    turns = compliant in {"free", "hinged"}
+    bounds = clearance_bounds(robot, "free" if turns else "elastic")
+    bounds = bounds[:, [0, 0, 1, 2, 2, 3]]
     free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     limit = bounds[free_frame, free_axis]

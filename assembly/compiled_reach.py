@@ -29,6 +29,27 @@ MOST_SUPPORTS = 400
 _RANK = 1e-10  # as in assembly.reduction
 _UNBOUNDED = 1e-8  # as in assembly.pose_error
 _CLEAR = 10.0  # what is within this factor of a threshold decides nothing
+_APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
+
+
+class Loads(NamedTuple):
+    """What (22) says of k points' clearances.
+
+    Attributes:
+        structure: the robot as (22) saw it.
+        multipliers: (k, 6 closures) of the scaled closures.
+        clearances: (k, nu) in units of these cones.
+        energy: (k,) [J].
+        without_play: (k,) [J] energy if every clearance stayed at zero.
+        cone_of: (cones,) the cone here of each cone of the robot that is asked about.
+    """
+
+    structure: Structure
+    multipliers: NDArray
+    clearances: NDArray
+    energy: NDArray
+    without_play: NDArray
+    cone_of: NDArray
 
 
 class Bounds(NamedTuple):
@@ -54,7 +75,7 @@ class Bounds(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def bound_all(
     s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray, clearances: NDArray,
-    loaded: NDArray, offset: NDArray, tolerance: NDArray, out: Bounds,
+    loads: Loads, offset: NDArray, tolerance: NDArray, out: Bounds,
 ) -> None:  # fmt: skip
     """Bracket the largest pose errors of all points that are not handed back yet.
 
@@ -64,7 +85,7 @@ def bound_all(
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         centre: (k, 6) [rad, m] platform screws of (22) at the platform's origin.
         clearances: (k, nu) of (22), in these cones.
-        loaded: (k, cones) bool, clearances that are held.
+        loads: which of them are held.
         offset: (3,) [m] from the platform's origin to the point asked about.
         tolerance: (2,) [rad, m] asked of upper minus lower bounds.
         out: arrays to fill; rows whose road is HANDED_BACK are left out.
@@ -73,10 +94,11 @@ def bound_all(
     for i in range(len(T)):
         if out.road[i] != SOLVED:
             continue
+        decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
         found, body = body_of(
-            s, T[i], mismatch[i], centre[i], clearances[i], loaded[i], offset
+            s, T[i], mismatch[i], centre[i], clearances[i], loaded, offset
         )
-        if not found:
+        if not (decided and found):
             out.road[i] = HANDED_BACK
             continue
         for half in range(2):
@@ -90,6 +112,45 @@ def bound_all(
             else:
                 out.translation[i] = search.bounds
                 out.translation_screw[i] = search.best
+
+
+@njit(cache=True, error_model="numpy")
+def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
+    """Which clearances press on their bound, as in :mod:`assembly.pose_error`.
+
+    Load times slack is about the solver's gap, so one of the two is nearly zero.
+
+    Args:
+        loads: what (22) says.
+        P: (n, 6, 6) unit screws of every frame at the platform.
+        point: which one.
+
+    Returns:
+        Whether that is clear of all; (cones,) bool.
+    """
+    h, wrench = loads.structure, loads.multipliers[point]
+    energy = loads.energy[point]
+    scale = max(energy, 1e-9 * loads.without_play[point], 1e-300)
+    loaded, decided = np.zeros(len(loads.cone_of), np.bool_), True
+    for c in range(len(loaded)):
+        push, size = 0.0, 0.0
+        own = loads.cone_of[c]
+        for i in range(h.starts[own], h.starts[own + 1]):
+            j, pull = h.cone_frame[i], 0.0
+            for k in range(h.patterns.shape[1]):
+                sign = h.patterns[h.pattern_of[j], k]
+                if sign != 0.0:
+                    for a in range(6):
+                        pull += sign * wrench[6 * k + a] * P[j, h.cone_axis[i], a]
+            push += (pull * h.cone_size[i]) ** 2
+            size += loads.clearances[point, i] ** 2
+        load = np.sqrt(push) / scale
+        slack = max(0.0, 1.0 - np.sqrt(size))
+        loaded[c] = load > slack and load > 1e-9
+        apart = load > _APART * slack or slack > _APART * load
+        # written so that what is not a number is not clear
+        decided = decided and (apart or max(load, slack) <= 1e-9)
+    return decided, loaded
 
 
 @njit(cache=True, error_model="numpy")

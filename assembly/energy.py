@@ -270,6 +270,12 @@ def solve_with(
     )  # fmt: skip
 
 
+def without_own_springs(answer: Assembly) -> Assembly:
+    """The least energy when compliant joints turn freely about their own axis."""
+    joints = virtual_joints(answer.posture.robot, "hinged")
+    return solve_with(answer.linearisation, joints, answer.load, answer.forces)
+
+
 def _minimise(small: Reduction) -> LeastEnergy:
     """Least energy of a reduced problem; infeasible ones are named."""
     if small.inconsistent:

@@ -158,7 +158,7 @@ def advance(body: Body, search: Search) -> int:
         if search.counts[1] >= search.counts[4]:
             return GAVE_UP
         height, v, pulls, n = support(
-            body, search.part, search.direction, search.tolerance
+            body, search.part, search.direction, _SHARE * search.tolerance
         )
         screw = screw_at(body, v)
         reached = 0.0

@@ -12,7 +12,7 @@ budget   everything that closes with at most (1 + eta) times the least energy
 
 The set of platform screws is convex; its farthest one is bracketed by
 :mod:`assembly.farthest`, compiled.  What that solver cannot certify is asked of
-Clarabel.  :func:`assembly.batch.bound_pose_errors` does many postures at once.
+Clarabel.  :func:`assembly.batch_error.bound_pose_errors` does many postures at once.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from scipy.linalg import svd
 from assembly.clearance import has_bounded_motion
 from assembly.closure import VirtualJoints, virtual_joints
 from assembly.conic import cone_sizes, into_cones, minimise_energy
-from assembly.energy import Assembly, solve_with
+from assembly.energy import Assembly, without_own_springs
 from assembly.reduction import NOISE, complement
 from stiffness.screws import skew
 
@@ -245,7 +245,7 @@ class _Moving:
         if self.reading == "free":
             # turning about the own axis costs nothing here: only what stays loaded
             # without those soft springs is held
-            holder = _without_own_springs(self.answer)
+            holder = without_own_springs(self.answer)
         return loaded_cones(holder, self.joints)
 
     @cached_property
@@ -306,12 +306,6 @@ def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:
     # push times slack is about the solver's gap: one of the two is nearly zero
     scale = max(answer.energy, 1e-9 * answer.energy_without_play, 1e-300)
     return ((push > scale * slack) & (push > 1e-9 * scale))[joints.group]
-
-
-def _without_own_springs(answer: Assembly) -> Assembly:
-    """The least energy when compliant joints turn freely about their own axis."""
-    joints = virtual_joints(answer.posture.robot, "hinged")
-    return solve_with(answer.linearisation, joints, answer.load, answer.forces)
 
 
 def _farthest(
