@@ -1,6 +1,8 @@
 """Campaign folders: what must load does, what must not says why in one line."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -266,3 +268,24 @@ def test_a_robot_file_that_is_wrong_is_named_itself(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
+
+
+def test_the_files_of_the_docs_are_read(tmp_path):
+    """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+    docs = Path(__file__).parents[1] / "docs" / "campaigns.md"
+    blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
+    assert len(blocks) == 2
+    (tmp_path / "campaign.toml").write_text("".join(blocks), encoding="utf-8")
+    (tmp_path / "measurements.csv").write_text(
+        "id;pose.tx;pose.tz;load.fx;meas.tx;meas.ry;cov.time\n"
+        "a;100;-500;0,01;0,25;0,1;2\n"
+    )
+    campaign = read_campaign(tmp_path)
+    assert campaign.robot.name == load_robot("irsbot2").name
+    platform = campaign.transforms[0, campaign.robot.index(campaign.robot.platform)]
+    np.testing.assert_allclose(platform[[0, 2], 3], [0.1, -0.5], atol=1e-9)
+    assert campaign.loads[0, 3] == pytest.approx(10.0)
+    assert campaign.measured[0, 3] == pytest.approx(2.5e-4)
+    assert campaign.measured[0, 1] == pytest.approx(math.radians(0.1))
+    assert campaign.covariates["time"][0] == 120
+    np.testing.assert_array_equal(campaign.sigma[0], [1e-5] * 3 + [5e-6] * 3)
