@@ -48,7 +48,7 @@ def main() -> None:
         print(
             f"{name:10} {links:7} {sum(a.passed for a in answers):2}/{len(answers)}   "
             f"{min(slopes):.4f} {max(slopes):.4f}   "
-            f"{max(max(a.limits.values()) for a in answers):.1e}  "
+            f"{max(c.value for a in answers for c in a.limits.values()):.1e}  "
             f"{np.median(left['rotation']):.1e} {max(left['rotation']):.1e}  "
             f"{np.median(left['translation']):.1e} {max(left['translation']):.1e}   "
             f"{np.median(linear):.1e} {max(linear):.1e}; "

@@ -30,9 +30,9 @@ def validity_figure(rows: list[dict]) -> Figure:
     ):
         panel = axes[i, j]
         mine = [r for r in rows if r["robot"] == name and r["assumption"] == what]
+        unit = 1e3 if label.startswith("errors") else 1.0
         for k, case in enumerate(dict.fromkeys(r["case"] for r in mine)):
             chosen = [r for r in mine if r["case"] == case]
-            unit = 1e3 if label.startswith("errors") else 1.0
             x = unit * np.array([r["x"] for r in chosen])
             for kind, limit in LIMITS.items():
                 y = np.array([r[kind] for r in chosen]) / limit
@@ -45,6 +45,9 @@ def validity_figure(rows: list[dict]) -> Figure:
         panel.axhspan(1, 1e4, color="C3", alpha=0.08)
         panel.axhline(1, color="C3", lw=1)
         panel.set(title=f"{name} {title}", xlabel=label, ylim=(1e-3, 1e3))
+        ticks = list(dict.fromkeys(unit * r["x"] for r in mine))
+        panel.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        panel.set_xticks([], minor=True)
         panel.grid(visible=True, alpha=0.3)
         panel.legend(fontsize=6)
     for panel in axes[:, 0]:
@@ -69,7 +72,7 @@ def pose_figure(maps: dict[str, dict]) -> Figure:
         kinds = [(a, k) for a in ("closures", "discs") for k in range(2)]
         for panel, (what, k) in zip(axes[i], kinds, strict=True):
             kind = list(LIMITS)[k]
-            values = found[what][..., k] / LIMITS[kind]
+            values = np.maximum(found[what][..., k] / LIMITS[kind], 1e-2)
             image = panel.pcolormesh(
                 found["x"], found["z"], values, cmap="coolwarm",
                 norm=LogNorm(1e-2, 1e2), shading="nearest",

@@ -14,8 +14,8 @@ from assembly.robot_file import write_robot
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
 from validation.cli import app
-from validation.comparison import extrapolate, fit_slope
 from validation.crosscheck import crosscheck, try_crosscheck
+from validation.limits import extrapolate, fit_slope
 
 pytestmark = pytest.mark.exudyn
 
@@ -68,7 +68,7 @@ def test_the_pose_difference_of_the_papers_robot_falls_as_the_square(posture):
         assert slope == pytest.approx(2.0, abs=0.1)
     # what is left of the limits is of the order of the product of the scales, 1/64,
     # of a fourth-order term: far below the bound
-    assert max(answer.limits.values()) < 2e-5
+    assert max(check.value for check in answer.limits.values()) < 2e-5
 
 
 @pytest.mark.slow
@@ -95,17 +95,17 @@ def test_finite_rotations_explain_the_whole_difference(posture):
 
 def test_a_difference_that_finite_rotations_leave_fails(posture, monkeypatch):
     """The exact model given errors one per cent too large; the others' agree."""
-    import validation.comparison
+    import validation.pair
 
-    right = validation.comparison.solve_exact
+    right = validation.pair.solve_exact
 
     def wrong(place, *_):
         robot = place.robot.with_errors(1.01 * place.robot.errors)
         return right(replace(place, robot=robot))
 
-    monkeypatch.setattr(validation.comparison, "solve_exact", wrong)
+    monkeypatch.setattr(validation.pair, "solve_exact", wrong)
     answer = crosscheck(posture, links="spring")
-    failed = [name for name, (value, bound) in answer.checks.items() if value > bound]
+    failed = [name for name, check in answer.checks.items() if check.verdict == "fails"]
     assert failed == [
         "rotation that finite rotations do not explain",
         "translation that finite rotations do not explain",
@@ -137,7 +137,35 @@ def test_weight_is_the_same_on_both_sides(links):
     light = crosscheck(posture, links=links)
     moved = answer.pairs[0].linear.platform_screw - light.pairs[0].linear.platform_screw
     assert np.abs(moved[3:]).max() > 1e-5
-    assert ("energy" in answer.limits) == (links == "spring")
+    assert (answer.pairs[0].between > 0) == (links == "beam")
+
+
+def test_two_scales_at_full_errors_are_made_enough(irsbot2):
+    """At this pose the two alone say slope 2.2: smaller ones are added, and it holds.
+
+    A half per cent in the links' stiffness is found on the same two.
+    """
+    at = place_robot(
+        drawn(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
+    )
+    answer = crosscheck(at, (1.0, 0.5))
+    assert answer.passed, answer.text()
+    assert answer.asked == 2
+    assert len(answer.pairs) > 2
+    table = answer.table()
+    assert [entry["scale"] for entry in table["scales"]] == [1.0, 0.5]
+    assert table["added_scales"][0]["scale"] == 0.25
+    assert table["verdict"] == "passed"
+
+
+@pytest.mark.parametrize(
+    "name", ["lever arm one per cent short", "links half a per cent stiff"]
+)
+def test_two_scales_find_a_broken_term_too(irsbot2, name, monkeypatch):
+    MUTATIONS[name](monkeypatch)
+    at = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
+    answer, _ = try_crosscheck(at, (1.0, 0.5), LOAD)
+    assert answer is None or answer.table()["verdict"] == "failed"
 
 
 def test_clearances_are_left_out_on_both_sides():
@@ -380,11 +408,10 @@ def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
     found = json.loads(target.read_text())
     assert found["passed"] is True
     assert found["slope"] is None
-    assert len(found["optimality_gaps"]) == 2
+    assert [entry["scale"] for entry in found["scales"]] == [0.5, 0.25]
+    assert len(found["optimality_gaps"]) == 2 + len(found["added_scales"])
     refused = run(str(file), "--clearances", "--figure", "slope.png")
     assert isinstance(refused.exception, BadInput)
-    refused = run(str(file), "--clearances", "--gravity", "z=-9.81")
-    assert "--gravity: not compared with --clearances" in str(refused.exception)
 
 
 def test_the_command_fails_with_status_1(monkeypatch):

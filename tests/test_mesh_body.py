@@ -12,7 +12,7 @@ from stiffness.condense import condense
 from stiffness.elements import assemble, lame, quadratic
 from stiffness.reading import BadInput
 from tests.solids_for_tests import box_solid
-from validation.comparison import link_models
+from validation.link_models import link_models
 from validation.crosscheck import crosscheck
 from validation.exudyn_parts import MeshBody, Solid
 from validation.motion import placement

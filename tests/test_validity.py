@@ -1,20 +1,25 @@
 """What the model's assumptions cost, against closed forms and the simulation."""
 
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from assembly.closure import virtual_joints
 from assembly.energy import solve_assembly
 from assembly.links import link_compliance
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robot_file import write_robot
 from assembly.robots import load_robot
 from assembly.zone import zone_margin
 from tests.robots_for_tests import NUMBERS, irsbot2_with
+from validation.assumptions import assumption_costs
 from validation.bushes import bush_joints, bush_margin, solve_bushes
+from validation.cli import app
 from validation.round_bars import bar_compliance, bar_stiffness, with_bars
 from validation.spread_weight import energy_between_ends
 from validation.validity import (
@@ -181,7 +186,7 @@ def test_a_link_with_its_own_stiffness_costs_nothing(posture):
 
 def test_linear_closures_cost_the_square_of_the_errors(posture):
     """Position falls by four as errors and clearances are halved."""
-    from validation.comparison import scaled
+    from validation.pair import scaled
 
     full, half = closure_cost(posture), closure_cost(scaled(posture, 0.5))
     assert full.position / half.position == pytest.approx(4, rel=0.1)
@@ -221,3 +226,35 @@ def test_a_thick_bar_is_stiffer_than_its_beam_because_its_ends_are_held(posture)
     turned = replace(thick, rotation=np.zeros(3), translation=[0, 0.452, 0])
     values = np.linalg.eigvalsh(bar_stiffness(turned, C))
     np.testing.assert_allclose(values, np.linalg.eigvalsh(K), rtol=1e-6)
+
+
+def test_the_command_says_which_assumptions_matter(tmp_path):
+    """Disc and cone do on the paper's robot; what was not asked for says why."""
+    target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
+    words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]
+    said = CliRunner().invoke(app, [*words, "--json", str(target)])
+    assert said.exit_code == 0, said.output
+    costs = json.loads(target.read_text())["costs"]
+    assert set(costs["linear closures"]) == {
+        "rotation", "position", "energy", "matters"
+    }  # fmt: skip
+    assert costs["disc and cone, not two bushes"]["matters"]
+    assert "--solids" in costs["beams, not solids"]["reason"]
+    assert "no beam with a density" in costs["weight at the links' ends"]["reason"]
+    assert "beyond 20 um or 1 %" in said.output
+
+
+def test_all_assumptions_are_known_where_they_mean_something(posture, monkeypatch):
+    """Heavy round bars, meshed; the mesh is a stand-in here."""
+    import validation.assumptions
+
+    beam = link_compliance(
+        Frame("f", translation=[0, 0, 1], link=BeamLink({"radius": 0.1}, 1.0, 0.3))
+    )
+    monkeypatch.setattr(validation.assumptions, "bar_compliance", lambda *_: beam)
+    heavy = replace(posture, robot=with_bars(posture.robot, 10.0, 2700.0))
+    costs = assumption_costs(heavy, gravity=[0, 0, -9.81], solids=True)
+    assert all(isinstance(cost, Cost) for cost in costs.values())
+    # the built-in robot's beams are Euler's; shear is what the stand-in adds
+    assert 0 < costs["beams, not solids"].energy < 0.1

@@ -170,7 +170,7 @@ def validity(
     Linear closures, beams instead of solids, weight at the links' ends, disc and cone
     instead of pins in two bushes; what exceeds 20 um or 1 % is marked.
     """
-    from validation.validity import assumption_costs, costs_table, costs_text
+    from validation.assumptions import assumption_costs, costs_table, costs_text
 
     posture = posture_of(robot, pose, joint)
     wrench, g = parse_load(load), parse_gravity(gravity)

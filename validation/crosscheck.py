@@ -31,31 +31,36 @@ from assembly.conic import SolverFailed
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
-from validation.comparison import (
+from validation.limits import (
     FLOOR,
     HALVES,
-    LIMIT_TOLERANCE,
-    SCALES,
-    Pair,
-    check_scales,
-    check_table,
-    check_text,
-    exact_answer,
     fit_slope,
     limit_difference,
-    link_models,
-    scaled,
+    slope_check,
     spring_limits,
 )
+from validation.link_models import link_models
 from validation.multibody import (
+    TIME_LIMIT,
     SimulationFailed,
     simulate_assembly,
     without_clearance,
+)
+from validation.pair import Pair, exact_answer, scaled
+from validation.spread_weight import energy_between_ends
+from validation.verdict import (
+    SCALES,
+    Check,
+    compare_scales,
+    comparison_table,
+    comparison_text,
+    verdict,
 )
 
 Answer = TypeVar("Answer")
 SLOPE_TOLERANCE = 0.1  # of the pose difference, around 2
 EXPLAINED_TOLERANCE = 0.02  # of the pose difference, with springs as links
+ELEMENTS = 4  # of each beam in the simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +73,7 @@ class Crosscheck:
         links: how the simulation modelled links, ``"beam"`` or ``"spring"``.
         gravity: (3,) [m/s^2] at scale 1, base axes.
         pairs: one for each scale, largest first.
+        asked: how many of the scales were asked for; smaller ones were added to tell.
     """
 
     posture: Posture
@@ -75,6 +81,7 @@ class Crosscheck:
     links: str
     gravity: NDArray
     pairs: tuple[Pair, ...]
+    asked: int
 
     @property
     def scales(self) -> NDArray:
@@ -124,7 +131,7 @@ class Crosscheck:
         return answer
 
     @cached_property
-    def limits(self) -> dict[str, float]:
+    def limits(self) -> dict[str, Check]:
         """Difference of each quantity, extrapolated to no error, relative to its size.
 
         Screws and wrenches are compared by halves, each relative to the largest among
@@ -143,19 +150,20 @@ class Crosscheck:
         return limits | spring_limits(self.posture.robot, self.pairs, spread)
 
     @cached_property
-    def checks(self) -> dict[str, tuple[float, float]]:
-        """What must hold: by name a value and its bound."""
+    def checks(self) -> dict[str, Check]:
+        """What must hold, by name."""
         slopes = {
-            f"slope of {name} from 2": (abs(slope - 2.0), SLOPE_TOLERANCE)
-            for name, slope in self.slopes.items()
-            if not math.isnan(slope)
+            f"slope of {name} from 2": slope_check(
+                self.scales, values, FLOOR[name], 2.0, SLOPE_TOLERANCE
+            )
+            for name, values in self.differences.items()
+            if not math.isnan(self.slopes[name])
         }
-        limits = {
-            f"limit of {name}": (value, LIMIT_TOLERANCE)
-            for name, value in self.limits.items()
-        }
+        limits = {f"limit of {name}": check for name, check in self.limits.items()}
         shares = {
-            f"{name} that finite rotations do not explain": (share, EXPLAINED_TOLERANCE)
+            f"{name} that finite rotations do not explain": Check(
+                share, EXPLAINED_TOLERANCE
+            )
             for name, share in self.unexplained.items()
             if self.links == "spring" and not math.isnan(share)
         }
@@ -164,26 +172,18 @@ class Crosscheck:
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
-        return all(value <= bound for value, bound in self.checks.values())
+        return verdict(self) == "passed"
 
     def table(self) -> dict[str, Any]:
         """Everything ``validation crosscheck`` reports, keys of the public format."""
-        return {
-            "robot": self.posture.robot.name,
-            "status": "ok",
-            "pose": self.posture.pose(),
-            "load": self.load,
-            "gravity": self.gravity,
-            "links": self.links,
+        own = {
             "clearances": "left out on both sides",
-            "scales": [pair.table(self.posture.robot) for pair in self.pairs],
             "slope": self.slope,
             "slopes": self.slopes,
-            "limits": self.limits,
+            "limits": {name: check.value for name, check in self.limits.items()},
             "unexplained": self.unexplained,
-            "checks": check_table(self.checks),
-            "passed": self.passed,
         }
+        return comparison_table(self, own)
 
     def header(self) -> list[str]:
         """Names of the columns of :meth:`rows`."""
@@ -204,7 +204,7 @@ class Crosscheck:
                 f"{turn:.3e}",
                 f"{shift:.3e}",
                 f"{pair.simulated.energy:.6g}",
-                f"{pair.linear.energy:.6g}",
+                f"{pair.linear_energy:.6g}",
             ]
             for pair, (turn, shift) in zip(self.pairs, differences, strict=True)
         ]
@@ -218,7 +218,7 @@ class Crosscheck:
         if shares:
             left = ", ".join(shares)
             lines.append(f"left against the model with finite rotations: {left}")
-        return check_text(lines, self)
+        return comparison_text(lines, self)
 
 
 def crosscheck(
@@ -227,18 +227,21 @@ def crosscheck(
     load: ArrayLike | None = None,
     links: str = "beam",
     gravity: ArrayLike | None = None,
+    time_limit: float = TIME_LIMIT,
 ) -> Crosscheck:
     """Solve a robot with both models at several scales of its errors.
 
     Args:
         posture: where the robot stands; its clearances are left out.
-        scales: at least two different factors on errors and load, > 0.
+        scales: at least two different factors on errors and load, > 0; smaller ones
+            are added where these leave a check undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"beam"``: beams bend geometrically exactly; ``"spring"``: every link
             is its K_E in the simulation too, which checks everything but the beams;
             ``"fem"``: meshed links are solids in floating frames.
         gravity: (3,) [m/s^2] base axes; beams with a density and bodies with a mass
             then have weight on both sides (the exact model has none and is left out).
+        time_limit: [s] for each simulation.
 
     Returns:
         Both answers at every scale, and the verdict.
@@ -249,20 +252,27 @@ def crosscheck(
         CannotAssemble: the virtual-joint model has none.
         FreeMotion: the load drives a motion that nothing resists.
     """
-    factors = check_scales(scales)
     tight = replace(posture, robot=without_clearance(posture.robot))
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     models = link_models(tight.robot, links)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
-    pairs = []
-    for s in factors:
+    between = 0.0
+    if links != "spring":
+        between = energy_between_ends(tight, g, ELEMENTS)
+
+    def solve(s: float) -> Pair:
         linear = solve_assembly(scaled(tight, s), s * wrench, gravity=s * g)
         simulated = simulate_assembly(
-            tight, s, load=s * wrench, gravity=s * g, **vars(models)
-        )
+            tight, s, load=s * wrench, gravity=s * g, elements=ELEMENTS,
+            time_limit=time_limit, **vars(models),
+        )  # fmt: skip
         exact = None if g.any() else exact_answer(linear)
-        pairs.append(Pair(s, linear, simulated, exact))
-    return Crosscheck(tight, wrench, links, g, tuple(pairs))
+        return Pair(s, linear, simulated, exact, s**2 * between)
+
+    def judge(pairs: tuple[Pair, ...], asked: int) -> Crosscheck:
+        return Crosscheck(tight, wrench, links, g, pairs, asked)
+
+    return compare_scales(scales, solve, judge)
 
 
 def attempt(
@@ -293,11 +303,7 @@ def attempt(
 
 
 def try_crosscheck(
-    posture: Posture,
-    scales: Sequence[float] = SCALES,
-    load: ArrayLike | None = None,
-    links: str = "beam",
-    gravity: ArrayLike | None = None,
+    posture: Posture, scales: Sequence[float] = SCALES, load: ArrayLike | None = None
 ) -> tuple[Crosscheck | None, dict[str, Any]]:
     """A cross-check, or why there is none; see :func:`attempt` and :func:`crosscheck`.
 
@@ -305,11 +311,8 @@ def try_crosscheck(
         posture: where the robot stands.
         scales: factors on errors and load.
         load: (6,) [N m, N] on the platform.
-        links: how the simulation models links.
-        gravity: (3,) [m/s^2] base axes.
 
     Returns:
         The cross-check or None, and the failure or nothing.
     """
-    name = posture.robot.name
-    return attempt(name, lambda: crosscheck(posture, scales, load, links, gravity))
+    return attempt(posture.robot.name, lambda: crosscheck(posture, scales, load))

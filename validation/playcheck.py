@@ -24,20 +24,20 @@ from assembly.energy import solve_assembly
 from assembly.links import link_compliance
 from assembly.posture import Posture
 from assembly.reduction import reduce_problem
-from validation.comparison import (
-    LIMIT_TOLERANCE,
+from validation.crosscheck import ELEMENTS
+from validation.limits import extrapolate, limit_difference, limit_of
+from validation.link_models import link_models
+from validation.multibody import TIME_LIMIT, simulate_assembly
+from validation.pair import Pair, exact_answer, scaled
+from validation.spread_weight import energy_between_ends
+from validation.verdict import (
     SCALES,
-    Pair,
-    check_scales,
-    check_table,
-    check_text,
-    exact_answer,
-    extrapolate,
-    limit_difference,
-    link_models,
-    scaled,
+    Check,
+    compare_scales,
+    comparison_table,
+    comparison_text,
+    verdict,
 )
-from validation.multibody import simulate_assembly
 
 PLAY_TOLERANCE = 0.02  # relative, of limits: contacts yield and are smoothed
 FLOOR_ENERGY = 1e-4  # [J] at scale 1: what the springs that centre the play may store
@@ -51,13 +51,17 @@ class PlayCheck:
         posture: nominal.
         load: (6,) [N m, N] on the platform at scale 1, base axes.
         links: how the simulation modelled links, ``"beam"`` or ``"spring"``.
+        gravity: (3,) [m/s^2] at scale 1, base axes.
         pairs: one for each scale, largest first.
+        asked: how many of the scales were asked for; smaller ones were added to tell.
     """
 
     posture: Posture
     load: NDArray
     links: str
+    gravity: NDArray
     pairs: tuple[Pair, ...]
+    asked: int
 
     @property
     def scales(self) -> NDArray:
@@ -73,19 +77,20 @@ class PlayCheck:
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
     @cached_property
-    def limits(self) -> dict[str, float]:
+    def limits(self) -> dict[str, Check]:
         """Relative differences extrapolated to no imperfection."""
-        squares = self.scales**2
-        ours = np.array([pair.linear.energy for pair in self.pairs])
+        ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
-        floor = FLOOR_ENERGY * LIMIT_TOLERANCE  # of a size of at least FLOOR_ENERGY
+        gap = limit_of(self.scales**2, self.gaps)
         return {
-            "energy": limit_difference(self.scales, ours, theirs, 2, floor),
+            "energy": limit_difference(
+                self.scales, ours, theirs, 2, 0.0, PLAY_TOLERANCE, FLOOR_ENERGY
+            ),
             "spring deformation": self._strain_limit(),
-            "optimality gap": float(abs(extrapolate(squares, self.gaps))),
+            "optimality gap": Check(gap[0], PLAY_TOLERANCE, gap[1]),
         }
 
-    def _strain_limit(self) -> float:
+    def _strain_limit(self) -> Check:
         """All springs' difference in the norm of their energy: what bears load."""
         frames = self.posture.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
@@ -96,17 +101,26 @@ class PlayCheck:
             if frame.joint_stiffness is not None:
                 given = frame.joint_stiffness
                 K["joint_screws"][i] = np.where(np.isfinite(given), given, 0.0)
-        cost = 0.0
-        for kind, stiffness in K.items():
-            left = np.array([
+        first = self.pairs[0]
+        energy = max(first.linear.energy / first.scale**2, FLOOR_ENERGY)
+
+        def size(screws: dict[str, NDArray]) -> float:
+            cost = sum(
+                np.einsum("ni,nij,nj", s, K[kind], s) / 2 for kind, s in screws.items()
+            )
+            return float(np.sqrt(cost / energy))
+
+        left = {
+            kind: np.array([
                 (getattr(p.simulated, kind) - getattr(p.linear, kind)) / p.scale
                 for p in self.pairs
             ])
-            screws = extrapolate(self.scales, left)
-            cost += np.einsum("ni,nij,nj", screws, stiffness, screws) / 2
-        first = self.pairs[0]
-        energy = max(first.linear.energy / first.scale**2, FLOOR_ENERGY)
-        return float(np.sqrt(cost / energy))
+            for kind in K
+        }
+        limit = {kind: extrapolate(self.scales, v) for kind, v in left.items()}
+        fewer = {kind: extrapolate(self.scales[1:], v[1:]) for kind, v in left.items()}
+        change = {kind: limit[kind] - fewer[kind] for kind in K}
+        return Check(size(limit), PLAY_TOLERANCE, 2 * size(change))
 
     @cached_property
     def energies(self) -> dict[str, NDArray]:
@@ -118,43 +132,35 @@ class PlayCheck:
         for pair in self.pairs:
             least = FLOOR_ENERGY * pair.scale**2
             for name, answer in (("linear", pair.linear), ("exact", pair.exact)):
-                known = math.nan if answer is None else answer.energy
+                known = math.nan if answer is None else answer.energy + pair.between
                 difference = pair.simulated.rigid_energy - known
                 sides[name].append(difference / max(known, least))
         return {name: np.array(values) for name, values in sides.items()}
 
-    @property
-    def checks(self) -> dict[str, tuple[float, float]]:
-        """What must hold: by name a value and its bound."""
-        checks = {f"limit of {k}": (v, PLAY_TOLERANCE) for k, v in self.limits.items()}
+    @cached_property
+    def checks(self) -> dict[str, Check]:
+        """What must hold, by name."""
+        checks = {f"limit of {name}": check for name, check in self.limits.items()}
         exact = abs(float(self.energies["exact"][0]))
         if self.links == "spring" and not math.isnan(exact):
-            checks["energy against finite rotations"] = (exact, PLAY_TOLERANCE)
+            checks["energy against finite rotations"] = Check(exact, PLAY_TOLERANCE)
         return checks
 
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
-        return all(value <= bound for value, bound in self.checks.values())
+        return verdict(self) == "passed"
 
     def table(self) -> dict[str, Any]:
         """Everything the command reports, keys of the public format."""
-        robot = self.posture.robot
-        return {
-            "robot": robot.name,
-            "status": "ok",
-            "pose": self.posture.pose(),
-            "load": self.load,
-            "links": self.links,
+        own = {
             "clearances": "on both sides; poses are not unique and not judged",
-            "scales": [pair.table(robot) for pair in self.pairs],
             "slope": None,
             "optimality_gaps": self.gaps,
             "relative_energy_differences": self.energies,
-            "limits": self.limits,
-            "checks": check_table(self.checks),
-            "passed": self.passed,
+            "limits": {name: check.value for name, check in self.limits.items()},
         }
+        return comparison_table(self, own)
 
     def header(self) -> list[str]:
         """Names of the columns of :meth:`rows`."""
@@ -183,7 +189,7 @@ class PlayCheck:
 
     def text(self) -> str:
         """A table and the verdict for people, without colours."""
-        return check_text([f"{self.posture.robot.name}, with clearances"], self)
+        return comparison_text([f"{self.posture.robot.name}, with clearances"], self)
 
 
 def optimality_gap(pair: Pair) -> float:
@@ -212,14 +218,20 @@ def playcheck(
     scales: Sequence[float] = SCALES,
     load: ArrayLike | None = None,
     links: str = "beam",
+    gravity: ArrayLike | None = None,
+    time_limit: float = TIME_LIMIT,
 ) -> PlayCheck:
     """Solve a robot with clearances with both models at several scales.
 
     Args:
         posture: where the robot stands.
-        scales: at least two different factors on errors, clearances and load, > 0.
+        scales: at least two different factors on errors, clearances and load, > 0;
+            smaller ones are added where these leave a check undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"beam"``, ``"spring"`` or ``"fem"``, as for a cross-check.
+        gravity: (3,) [m/s^2] base axes; weight acts on both sides (the exact model has
+            none and is left out).
+        time_limit: [s] for each simulation.
 
     Returns:
         Both answers at every scale, and the verdict.
@@ -231,11 +243,21 @@ def playcheck(
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     models = link_models(posture.robot, links)
-    pairs = []
-    for s in check_scales(scales):
-        linear = solve_assembly(scaled(posture, s), s * wrench)
+    g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
+    between = 0.0
+    if links != "spring":
+        between = energy_between_ends(posture, g, ELEMENTS)
+
+    def solve(s: float) -> Pair:
+        linear = solve_assembly(scaled(posture, s), s * wrench, gravity=s * g)
         simulated = simulate_assembly(
-            posture, s, load=s * wrench, clearances=True, **vars(models)
-        )
-        pairs.append(Pair(s, linear, simulated, exact_answer(linear)))
-    return PlayCheck(posture, wrench, links, tuple(pairs))
+            posture, s, load=s * wrench, gravity=s * g, elements=ELEMENTS,
+            clearances=True, time_limit=time_limit, **vars(models),
+        )  # fmt: skip
+        exact = None if g.any() else exact_answer(linear)
+        return Pair(s, linear, simulated, exact, s**2 * between)
+
+    def judge(pairs: tuple[Pair, ...], asked: int) -> PlayCheck:
+        return PlayCheck(posture, wrench, links, g, pairs, asked)
+
+    return compare_scales(scales, solve, judge)

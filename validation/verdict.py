@@ -1,0 +1,204 @@
+"""Verdicts of comparisons: what must hold, and scales enough to tell whether it does.
+
+At large errors and few scales a limit is not known to its bound: what looks wrong may
+be of higher order, and what is wrong may hide behind it.  Then smaller scales are
+added, each half of the last, until every check is decided: a wrong term of first order
+stays, all others fade.  Nothing fails on fewer than four scales.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.posture import Posture
+from stiffness.reading import BadInput
+from validation.pair import Pair
+
+SCALES = (1.0, 0.5, 0.25, 0.125)
+_FEWEST, _MOST = 4, 6  # scales on which a check may fail; at which none is added
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something that must not exceed a bound.
+
+    Attributes:
+        value: best estimate, >= 0.
+        bound: on it.
+        unsure: what the value is not known to.
+    """
+
+    value: float
+    bound: float
+    unsure: float = 0.0
+
+    @property
+    def verdict(self) -> str:
+        """``"ok"``, ``"fails"``, or ``"undecided"`` if it is not known well enough."""
+        if self.value - self.unsure > self.bound:
+            return "fails"
+        known = self.value <= self.bound and self.unsure <= self.bound
+        return "ok" if known else "undecided"
+
+
+class Comparison(Protocol):
+    """Two models at several scales, and what was concluded."""
+
+    @property
+    def posture(self) -> Posture:
+        """Where the robot stands."""
+
+    @property
+    def load(self) -> NDArray:
+        """(6,) [N m, N] on the platform at scale 1."""
+
+    @property
+    def gravity(self) -> NDArray:
+        """(3,) [m/s^2] at scale 1."""
+
+    @property
+    def links(self) -> str:
+        """How the simulation modelled links."""
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """One for each scale, largest first."""
+
+    @property
+    def asked(self) -> int:
+        """How many of the scales were asked for; the others were added."""
+
+    @property
+    def checks(self) -> dict[str, Check]:
+        """What must hold, by name."""
+
+    def header(self) -> list[str]:
+        """Names of columns."""
+
+    def rows(self) -> list[list[str]]:
+        """Cells, one row for each scale."""
+
+
+Answer = TypeVar("Answer", bound=Comparison)
+
+
+def verdict(answer: Comparison) -> str:
+    """``"passed"``, ``"failed"``, or ``"not decided"`` on the scales there are."""
+    found = {check.verdict for check in answer.checks.values()}
+    if found <= {"ok"}:
+        return "passed"
+    if "fails" in found and len(answer.pairs) >= _FEWEST:
+        return "failed"
+    return "not decided"
+
+
+def compare_scales(
+    scales: Sequence[float],
+    solve: Callable[[float], Pair],
+    judge: Callable[[tuple[Pair, ...], int], Answer],
+) -> Answer:
+    """Solve at several scales, and at smaller ones until the verdict is decided.
+
+    Args:
+        scales: factors on all imperfections, at least two different ones.
+        solve: both models at a scale.
+        judge: makes an answer of pairs, largest scale first, and the number of those
+            asked for.
+
+    Returns:
+        The answer, decided or on six scales at least.
+
+    Raises:
+        BadInput: fewer than two scales, or one that is not finite and > 0.
+    """
+    factors = check_scales(scales)
+    pairs = [solve(scale) for scale in factors]
+    while True:
+        answer = judge(tuple(pairs), len(factors))
+        if verdict(answer) != "not decided" or len(pairs) >= _MOST:
+            return answer
+        pairs.append(solve(pairs[-1].scale / 2))
+
+
+def check_scales(scales: Sequence[float]) -> list[float]:
+    """Scales from which a slope can be read, largest first.
+
+    Args:
+        scales: factors on errors, clearances and load.
+
+    Returns:
+        Those that differ, sorted.
+
+    Raises:
+        BadInput: fewer than two, or one that is not finite and > 0.
+    """
+    factors = sorted({float(s) for s in scales}, reverse=True)
+    if len(factors) < 2 or not all(0 < s < np.inf for s in factors):
+        raise BadInput(
+            f"scale: found {list(scales)}, expected at least two different factors > 0"
+        )
+    return factors
+
+
+def comparison_table(answer: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
+    """A comparison as plain values, keys of the public format.
+
+    Args:
+        answer: what was found.
+        more: what is its kind's own.
+
+    Returns:
+        ``scales`` holds those asked for, ``added_scales`` the others.
+    """
+    robot = answer.posture.robot
+    tables = [pair.table(robot) for pair in answer.pairs]
+    found = verdict(answer)
+    return {
+        "robot": robot.name,
+        "status": "ok",
+        "pose": answer.posture.pose(),
+        "load": answer.load,
+        "gravity": answer.gravity,
+        "links": answer.links,
+        "scales": tables[: answer.asked],
+        "added_scales": tables[answer.asked :],
+        **more,
+        "checks": {
+            name: {
+                "value": check.value,
+                "tolerance": check.bound,
+                "uncertainty": check.unsure,
+                "passed": check.verdict == "ok",
+            }
+            for name, check in answer.checks.items()
+        },
+        "verdict": found,
+        "passed": found == "passed",
+    }
+
+
+def comparison_text(lines: list[str], answer: Comparison) -> str:
+    """A comparison for people.
+
+    Args:
+        lines: to begin with.
+        answer: what was found.
+
+    Returns:
+        These lines, the table, every check and the verdict, without colours.
+    """
+    table = [answer.header(), *answer.rows()]
+    lines = lines + ["  ".join(f"{cell:>26}" for cell in row) for row in table]
+    words = {"ok": "ok", "fails": "FAILS", "undecided": "NOT DECIDED"}
+    for name, check in answer.checks.items():
+        word = words[check.verdict]
+        lines.append(f"{name}: {check.value:.1e} (bound {check.bound:g}) {word}")
+    added = len(answer.pairs) - answer.asked
+    if added:
+        lines.append(f"scales added to tell: {added}")
+    ends = {"passed": "passed", "failed": "FAILED", "not decided": "NOT DECIDED: the "
+            "errors are too large for these scales; ask for smaller ones"}  # fmt: skip
+    return "\n".join([*lines, ends[verdict(answer)]])
