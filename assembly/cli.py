@@ -36,6 +36,13 @@ GravityOption = Annotated[
     list[str] | None,
     typer.Option("--gravity", help="Gravity in base axes [m/s^2], such as z=-9.81."),
 ]
+UnderOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--under",
+        help="What the robot's effects depend on: temperature=5,time=0,approach=1.",
+    ),
+]
 JsonOption = Annotated[
     str | None,
     typer.Option("--json", help="Write results as JSON to a file; - is stdout."),
@@ -100,6 +107,21 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
     )
 
 
+def parse_covariates(texts: list[str] | None) -> dict[str, float]:
+    """Covariates from ``--under``.
+
+    Args:
+        texts: such as ``["temperature=5,approach=1"]``.
+
+    Returns:
+        Numbers by name.
+
+    Raises:
+        BadInput: not of that form.
+    """
+    return parse_assignments(texts, "--under") if texts else {}
+
+
 @contextmanager
 def progress_bars() -> Generator[Any, None, None]:
     """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each."""
@@ -141,14 +163,20 @@ def solve(
     joint: JointOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
+    under: UnderOption = None,
     json: JsonOption = None,
 ) -> None:
     """Close the robot at least energy: pose error, energy, wrenches, zone margin."""
+    from assembly.effects.acting import act
     from assembly.results import solution_of, solution_text
 
-    results = solution_of(
-        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity)
-    )
+    acting = act(
+        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under),
+    )  # fmt: skip
+    results = solution_of(acting.posture, acting.load, acting.gravity)
+    if results["status"] == "ok" and acting.conditions.reads_otherwise:
+        results["reading"] = acting.reading(results["platform_screw"])
     write_json(results, json)
     if json != "-":
         print(solution_text(results))

@@ -85,6 +85,11 @@ class Conditions:
         return len(self.transforms)
 
     @property
+    def reads_otherwise(self) -> bool:
+        """Whether the device reads something else than the platform's pose."""
+        return bool(self.base.any() or self.tool.any() or np.any(self.reading))
+
+    @property
     def postures(self) -> Posture:
         """All nominal postures in one, its arrays with R rows."""
         worst = float(np.max(self.mismatch, initial=0.0))

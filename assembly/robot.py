@@ -7,7 +7,7 @@ deformation; then the joint's own motion about or along its z carries the childr
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -201,6 +201,8 @@ class Robot:
         frames: all frames.
         closures: pairs of frames that must coincide once assembled.
         description: one line.
+        effects: parameters of the effects that the machine is known to have, by name;
+            see :mod:`assembly.effects`.
     """
 
     name: str
@@ -208,6 +210,7 @@ class Robot:
     frames: tuple[Frame, ...]
     closures: tuple[tuple[str, str], ...] = ()
     description: str = ""
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", parents_first(self.frames))

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effect_file import read_effects
 from assembly.joint_file import LARGEST_LENGTH, read_clearance, read_joint_stiffness
 from assembly.link_file import link_table, read_link
 from assembly.link_span import with_spans
@@ -88,6 +90,7 @@ def declared_robot(root: Table, name: str) -> Robot:
         raise root.bad("description", f"found {found}, expected a string")
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
+    effects = root.tables("effect")
     root.finish()
     if not 0 < len(tables[0]) <= _MOST_FRAMES:
         found = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -98,6 +101,7 @@ def declared_robot(root: Table, name: str) -> Robot:
     _check_known(root, "platform", platform, names)
     try:
         robot = Robot(name, platform, frames, closures, description)
+        robot = replace(robot, effects=read_effects(effects, robot))
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -220,8 +224,10 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     """
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
+    effects = table.pop("effect", [])
     lines = [f"{k} = {_toml(v)}" for k, v in table.items()]
-    for kind, tables in (("frame", frames), ("closure", closures)):
+    kinds = {"frame": frames, "closure": closures, "effect": effects}
+    for kind, tables in kinds.items():
         for inner in tables:
             said = (f"{k} = {_toml(v)}" for k, v in inner.items())
             lines += ["", f"[[{kind}]]", *said]
@@ -245,6 +251,11 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.effects:
+        table["effect"] = [
+            {"name": name, "parameters": dict(values)}
+            for name, values in robot.effects.items()
+        ]
     return table
 
 

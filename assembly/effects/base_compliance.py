@@ -64,6 +64,7 @@ BASE_COMPLIANCE = Effect(
     apply=_apply,
     unit=_unit,
     frames=None,
+    components=tuple(f"stiffness.{axis}" for axis in _AXES),
     unknowns=lambda robot: tuple(
         Unknown(f"compliance.{axis}", 1e-6, 0.0, 1.0) for axis in _AXES
     ),

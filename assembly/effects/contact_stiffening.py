@@ -49,6 +49,7 @@ CONTACT_STIFFENING = Effect(
     apply=_apply,
     unit=_unit,
     frames=drives,
+    components=("coefficient", "exponent"),
     unknowns=lambda robot: (
         Unknown("give", 1e-6, 0.0, 1.0),
         Unknown("exponent", 0.5, 1.05, 6.0, scan=(1.5, 2.0, 3.0)),

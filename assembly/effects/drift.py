@@ -32,6 +32,7 @@ DRIFT = Effect(
     apply=_apply,
     unit=_unit,
     frames=None,
+    components=(*_AMPLITUDE, "time_constant"),
     unknowns=lambda robot: (
         *(Unknown(name, 1e-5) for name in _AMPLITUDE),
         Unknown("time_constant", 1000.0, 1.0, 1e9, scan=_SCAN, scan_by="time"),

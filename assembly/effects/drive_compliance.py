@@ -36,6 +36,7 @@ DRIVE_COMPLIANCE = Effect(
     apply=_apply,
     unit=_unit,
     frames=drives,
+    components=("",),
     unknowns=lambda robot: (Unknown("compliance", 1e-6, 0.0, 1.0),),
     public=_public,
     linear=False,

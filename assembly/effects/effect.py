@@ -49,6 +49,8 @@ class Effect:
             their public names (``<frame>``, ``<frame>.<component>`` or plain).
         unit: of a parameter: of the robot and the parameter's public name.
         frames: frames of a robot at which it can act; None if it acts at none.
+        components: public parameters below a frame's name (``""``: the name itself), or
+            in all.
         unknowns: what is to be fitted: at each frame, or in all.
         public: parameters by their public names, from unknowns by theirs (a frame's
             name, a dot, the unknown's name).
@@ -62,6 +64,7 @@ class Effect:
     apply: Callable[[Conditions, Values], Conditions]
     unit: Callable[[Robot, str], str]
     frames: Callable[[Robot], tuple[str, ...]] | None
+    components: tuple[str, ...]
     unknowns: Callable[[Robot], tuple[Unknown, ...]]
     public: Callable[[Robot, Values], dict[str, float]] = _as_they_are
     needs: tuple[str, ...] = ()

@@ -40,6 +40,7 @@ ENCODER_ECCENTRICITY = Effect(
     apply=_apply,
     unit=lambda robot, name: "rad",
     frames=turning_drives,
+    components=("amplitude", "phase"),
     unknowns=lambda robot: (Unknown("sine", 1e-4), Unknown("cosine", 1e-4)),
     public=_public,
 )

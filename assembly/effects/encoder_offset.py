@@ -17,5 +17,6 @@ ENCODER_OFFSET = Effect(
     apply=_apply,
     unit=own_unit,
     frames=drives,
+    components=("",),
     unknowns=lambda robot: (Unknown("", 1e-4),),
 )

@@ -9,7 +9,12 @@ from assembly.robot import Frame, Robot
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
     """Joints that move with a spring along their own z: elastic drives, compliant."""
-    return tuple(f.name for f in robot.frames if f.joint != "fixed" and _springy(f))
+    softened = robot.effects.get("drive_compliance", {})
+    return tuple(
+        f.name
+        for f in robot.frames
+        if f.joint != "fixed" and (_springy(f) or f.name in softened)
+    )
 
 
 def _springy(frame: Frame) -> bool:
@@ -37,6 +42,7 @@ FRICTION_HYSTERESIS = Effect(
     apply=_apply,
     unit=_unit,
     frames=elastic_joints,
+    components=("",),
     unknowns=lambda robot: (Unknown("", 1.0),),
     needs=("approach",),
 )

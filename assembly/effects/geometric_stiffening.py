@@ -10,5 +10,6 @@ GEOMETRIC_STIFFENING = Effect(
     apply=lambda here, values: replace(here, exact=True),
     unit=lambda robot, name: "1",
     frames=None,
+    components=(),
     unknowns=lambda robot: (),
 )

@@ -46,6 +46,7 @@ JOINT_CLEARANCE = Effect(
     apply=_apply,
     unit=_unit,
     frames=moving_joints,
+    components=_KINDS,
     unknowns=lambda robot: (
         Unknown("radial", 2e-5, 0.0, 1e-2, 2e-5),
         Unknown("axial", 2e-5, 0.0, 1e-2, 2e-5),

@@ -17,5 +17,6 @@ LINK_LENGTH = Effect(
     apply=_apply,
     unit=lambda robot, name: "m",
     frames=beams,
+    components=("",),
     unknowns=lambda robot: (Unknown("", 1e-4),),
 )

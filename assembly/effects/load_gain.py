@@ -29,6 +29,7 @@ LOAD_GAIN = Effect(
     apply=_apply,
     unit=_unit,
     frames=None,
+    components=("factor", *_OFFSET),
     unknowns=lambda robot: (
         Unknown("factor", 0.1, 0.0, 10.0, 1.0), *(Unknown(n, 1.0) for n in _OFFSET),
     ),

@@ -41,6 +41,7 @@ MODULUS_SCALE = Effect(
     apply=_apply,
     unit=lambda robot, name: "1",
     frames=links,
+    components=("",),
     unknowns=lambda robot: (Unknown("softer", 0.1, -0.9, 20.0),),
     public=_public,
     linear=False,

@@ -32,5 +32,6 @@ REGISTRATION = Effect(
     apply=_apply,
     unit=_unit,
     frames=None,
+    components=BASE + TOOL,
     unknowns=lambda robot: tuple(Unknown(name, 1e-4) for name in BASE + TOOL),
 )

@@ -21,5 +21,6 @@ SELF_WEIGHT = Effect(
     apply=_apply,
     unit=lambda robot, name: "m/s^2",
     frames=None,
+    components=_AXES,
     unknowns=lambda robot: tuple(Unknown(a, 9.81, -20.0, 20.0) for a in _AXES),
 )

@@ -20,6 +20,7 @@ THERMAL_EXPANSION = Effect(
     apply=_apply,
     unit=lambda robot, name: "1/K",
     frames=beams,
+    components=("",),
     unknowns=lambda robot: (Unknown("", 1e-5, -5e-4, 5e-4),),
     needs=("temperature",),
 )

@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 from assembly.cli import JsonOption
-from stiffness.writing import write_json
+from assembly.robot_file import write_robot
+from stiffness.reading import BadInput
+from stiffness.writing import check_writable, write_json
 from validation.inspect_cli import CampaignArgument
 
 
@@ -29,7 +31,16 @@ def diagnose(
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
 
+    for path in (report, save):
+        if path is not None:
+            check_writable(path)
     found = trace(read_campaign(campaign))
     write_json(results.table(found), json)
     if json != "-":
         print(results.text(found))
+    if save is not None:
+        if found.verdict != "explained":
+            raise BadInput(
+                f"--save {save}: not written, the verdict is {found.verdict}"
+            )
+        write_robot(results.corrected(found), save)

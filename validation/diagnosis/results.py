@@ -1,9 +1,11 @@
 """A diagnosis for machines, and the honest sentence for people."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from assembly.effects import LIBRARY
+from assembly.robot import Robot
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
 
@@ -80,6 +82,16 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
             ],
         })
     return shown
+
+
+def corrected(found: Diagnosis) -> Robot:
+    """The declared robot with the effects found beside any it had."""
+    robot = found.campaign.robot
+    merged = {name: dict(values) for name, values in robot.effects.items()}
+    for name, values in found.fit.effects.items():
+        if name in found.claimed:
+            merged[name] = {**merged.get(name, {}), **values}
+    return replace(robot, effects=merged)
 
 
 def _errors(errors: Errors) -> dict[str, float]:

@@ -10,7 +10,7 @@ o       ``offset``     (N,)       change of the model that no unknown scales
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +57,9 @@ def conditions_of(campaign: Campaign) -> Conditions:
     for k, axis in enumerate("xyz"):
         gravity[:, k] = known.get(f"gravity.{axis}", 0.0)
     worst = float(np.max(campaign.mismatch, initial=0.0))
-    return as_declared(
-        Posture(campaign.robot, campaign.coordinates, campaign.transforms, worst),
+    robot = replace(campaign.robot, effects={})
+    declared = as_declared(
+        Posture(robot, campaign.coordinates, campaign.transforms, worst),
         campaign.loads,
         mismatch=campaign.mismatch,
         point=campaign.reference_point,
@@ -67,6 +68,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
         time=known.get("time", np.nan),
         approach=known.get("approach", np.nan),
     )
+    return apply_effects(declared, campaign.robot.effects)
 
 
 def loaded_components(campaign: Campaign) -> list[str]:

@@ -1,0 +1,87 @@
+"""A robot file's effects, at work in one situation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.conditions import Conditions, as_declared
+from assembly.effects import LIBRARY, apply_effects
+from assembly.posture import Posture
+from assembly.predict import assemble_row, read
+from stiffness.reading import BadInput, nearest
+
+COVARIATES = ("temperature", "time", "approach")
+
+
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """One situation with the effects of the robot's file.
+
+    Attributes:
+        posture: of the robot as the effects make it: its errors, springs, clearances,
+            and a foundation if it has one.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes, None without weight.
+        conditions: all of that, and what the measuring device adds.
+    """
+
+    posture: Posture
+    load: NDArray
+    gravity: NDArray | None
+    conditions: Conditions
+
+    def reading(self, platform_screw: ArrayLike) -> NDArray:
+        """(6,) [rad, m] what a device reads of a platform screw."""
+        return read(self.conditions, np.array(platform_screw, dtype=float)[None])[0]
+
+
+def act(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    covariates: Mapping[str, float] | None = None,
+) -> Acting:
+    """Put the effects of a robot's file to work.
+
+    Args:
+        posture: where the robot stands, as declared.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
+        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
+
+    Returns:
+        The situation; without effects, what was given.
+
+    Raises:
+        BadInput: an effect needs a covariate that is not given, or asks for finite
+            motions, which belong to ``exact``.
+    """
+    given = dict(covariates or {})
+    for name in given:
+        if name not in COVARIATES:
+            hint = nearest(name, COVARIATES)
+            raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
+    effects = posture.robot.effects
+    for name in effects:
+        for needed in LIBRARY[name].needs:
+            if needed not in given:
+                raise BadInput(
+                    f'{posture.robot.name}: effect "{name}" depends on {needed}; '
+                    f"expected --under {needed}=NUMBER"
+                )
+    plain = replace(posture, robot=replace(posture.robot, effects={}))
+    declared = as_declared(
+        plain,
+        load,
+        mismatch=posture.mismatch,
+        gravity=np.zeros(3) if gravity is None else gravity,
+        **given,
+    )
+    here = apply_effects(declared, effects)
+    g = here.gravity[0] if here.gravity.any() else None
+    where = assemble_row(here, 0).posture if here.laws else here.posture(0)
+    if not effects:
+        where = posture
+    return Acting(where, here.load_at_origin()[0], g, here)
