@@ -155,9 +155,9 @@ def scaled(difference, K):
     return difference / np.outer(size, size)
 
 
-def reference(name, orders):
+def reference(name, orders, finer):
     """K of the highest order and how far the one before is from it."""
-    mesh, solid = netgen_mesh(name)
+    mesh, solid = netgen_mesh(name, finer=finer)
     print(f"{name}: {mesh.ne} elements, {solid.mass:.9g} m^3", flush=True)
     last = None
     for order in orders:
@@ -177,11 +177,12 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("links", nargs="*", default=list(LINKS))
     parser.add_argument("--orders", default="3,4,5")
+    parser.add_argument("--finer", type=float, default=1.0, help="meshes, by this")
     asked = parser.parse_args()
     path = HERE / "stiffness_references.json"
-    stored = json.loads(path.read_text()) if path.exists() else {}
     for name in asked.links:
         orders = [int(p) for p in asked.orders.split(",")]
-        K, step = reference(name, orders)
+        K, step = reference(name, orders, asked.finer)
+        stored = json.loads(path.read_text()) if path.exists() else {}
         stored[name] = {"stiffness": K.tolist(), "last_step": step}
         path.write_text(json.dumps(stored, indent=1) + "\n")

@@ -1,0 +1,179 @@
+"""What K_E costs beside NGSolve and CalculiX, at errors against one reference.
+
+``python benchmarks/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on the path)
+
+Every case is a process of its own; its processor time (children and imports counted)
+and its largest memory are the machine's own account of it, so that other load on the
+machine does not enter.  True errors are against ``stiffness_references.json``.
+
+- ours: from the STL surface to K with its error estimate, mesher counted, no cache;
+- NGSolve: from the exact geometry, curved; order and mesh picked by hand, no estimate;
+- CalculiX: one load case of six on our last mesh, which it is given; its own solver.
+"""
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+BORE = "bore=0,0,{}/0,1,0/0.011"
+INTERFACES = {
+    "distal_plain": ("z=0", "z=0.452"),
+    "l_bracket": ("z=0", "x=0.15"),
+    "distal_forks": (BORE.format(0), BORE.format(0.452)),
+}
+CASES = [
+    "ours distal_plain 0.01", "ours distal_plain 0.002", "ours distal_plain 0.001",
+    "ngsolve distal_plain 2 0 1", "ngsolve distal_plain 3 0 1",
+    "ngsolve distal_plain 3 0 2", "ngsolve distal_plain 4 1 1",
+    "ccx distal_plain 0.01", "ccx distal_plain 0.002",
+    "ours l_bracket 0.01", "ours l_bracket 0.002", "ours l_bracket 0.001",
+    "ngsolve l_bracket 3 0 1", "ngsolve l_bracket 3 0 2", "ngsolve l_bracket 4 1 1",
+    "ccx l_bracket 0.01", "ccx l_bracket 0.002",
+    "ours distal_forks 0.02", "ours distal_forks 0.005",
+    "ngsolve distal_forks 2 0 2", "ngsolve distal_forks 3 0 1",
+    "ngsolve distal_forks 3 0 1.7", "ngsolve distal_forks 4 1 1",
+    "ccx distal_forks 0.02",
+]  # fmt: skip
+
+
+def true_error(name, K):
+    """Largest entry of K - K_ref over sqrt(K_ii K_jj)."""
+    stored = json.loads((HERE / "stiffness_references.json").read_text())
+    K, exact = np.asarray(K), np.array(stored[name]["stiffness"])
+    size = np.sqrt(np.diag(exact))
+    return float(np.abs((K - exact) / np.outer(size, size)).max())
+
+
+def solved(name, accuracy, folder):
+    """Our link and its finest mesh."""
+    from stiffness.fea import Material, solve_link
+    from stiffness.interface import parse_interface
+    from stiffness.surface import read_surface
+
+    surface = read_surface(HERE.parent / "meshes" / f"{name}.stl")
+    faces = [parse_interface(text) for text in INTERFACES[name]]
+    material = [Material(60e9, 0.3)]
+    return solve_link(surface, *faces, material, accuracy=accuracy, cache=Path(folder))
+
+
+def ours(name, accuracy):
+    """From the surface to K."""
+    with tempfile.TemporaryDirectory() as folder:
+        link = solved(name, float(accuracy), folder).link
+    estimate = link.relative_error_estimate
+    return link.stiffness.tolist(), link.mesh["unknowns"], estimate
+
+
+def ngsolve(name, order, layers, finer):
+    """From the exact geometry to K."""
+    sys.path.insert(0, str(HERE))
+    import stiffness_references as references
+
+    mesh, _ = references.netgen_mesh(name, int(layers), float(finer))
+    mesh.Curve(int(order))
+    K, unknowns = references.stiffness(mesh, int(order), references.LINKS[name][1])
+    return K.tolist(), unknowns, None
+
+
+def ccx(name, accuracy):
+    """One load case on our mesh; only CalculiX itself is counted."""
+    with tempfile.TemporaryDirectory() as folder:
+        answer = solved(name, float(accuracy), folder)
+        mesh = answer.level.mesh
+        tip = np.unique(mesh.faces[mesh.patch == 1])
+        base = np.unique(mesh.faces[mesh.patch == 0])
+        lines = ["*NODE, NSET=ALL"]
+        lines += [f"{k}, " + ", ".join(f"{v:.15g}" for v in p)
+                  for k, p in enumerate(mesh.nodes, 1)]  # fmt: skip
+        lines.append("*ELEMENT, TYPE=C3D10, ELSET=SOLID")
+        lines += [f"{k}, " + ", ".join(str(n + 1) for n in cell)
+                  for k, cell in enumerate(mesh.cells, 1)]  # fmt: skip
+        for word, nodes in (("TIP", tip), ("BASE", base)):
+            lines += [f"*NSET, NSET={word}", *(f"{n + 1}," for n in nodes)]
+        lines += ["*MATERIAL, NAME=M", "*ELASTIC", "60e9, 0.3",
+                  "*SOLID SECTION, ELSET=SOLID, MATERIAL=M",
+                  "*STEP", "*STATIC", "*BOUNDARY", "BASE, 1, 3, 0",
+                  "TIP, 1, 1, 1", "TIP, 2, 3, 0",
+                  "*NODE PRINT, NSET=TIP, TOTALS=ONLY", "RF", "*END STEP"]  # fmt: skip
+        Path(folder, "job.inp").write_text("\n".join(lines) + "\n")
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(
+            ["ccx", "job"], cwd=folder, check=True, capture_output=True, timeout=1800
+        )
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        numbers = Path(folder, "job.dat").read_text().split()
+    force = float(numbers[-3])
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    ratio = force / answer.link.stiffness[3, 3] - 1
+    print(f"ccx / ours - 1 of K_TX on the same mesh: {ratio:.1e}", file=sys.stderr)
+    return answer.link.stiffness.tolist(), answer.link.mesh["unknowns"], seconds
+
+
+def run_case(words):
+    """One case in this process, as JSON on its last line."""
+    start = time.monotonic()
+    kind, name, *options = words
+    K, unknowns, extra = {"ours": ours, "ngsolve": ngsolve, "ccx": ccx}[kind](
+        name, *options
+    )
+    uses = [
+        resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    ]
+    seconds = sum(u.ru_utime + u.ru_stime for u in uses)
+    memory = uses[1 if kind == "ccx" else 0].ru_maxrss / 1e6
+    found = {
+        "case": " ".join(words),
+        "unknowns": unknowns,
+        "true_error": true_error(name, K),
+        "estimate": extra if kind == "ours" else None,
+        "seconds": extra if kind == "ccx" else seconds,
+        "memory": memory,
+        "wall": time.monotonic() - start,
+    }
+    print(json.dumps(found))
+
+
+def main(cases):
+    """Run the cases one after the other and print a row for each."""
+    print(
+        "case                            unknowns  true error  estimate  CPU s     GB"
+    )
+    for case in cases:
+        if case.startswith("ccx") and shutil.which("ccx") is None:
+            print(f"{case}: no ccx on the path")
+            continue
+        command = [sys.executable, __file__, "--case", *case.split()]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if run.returncode:
+            print(
+                f"{case:30} failed: {run.stderr.strip().splitlines()[-1:]}", flush=True
+            )
+            continue
+        r = json.loads(run.stdout.strip().splitlines()[-1])
+        estimate = f"{100 * r['estimate']:.3f} %" if r["estimate"] else "-"
+        print(
+            f"{case:30} {r['unknowns']:9d} {100 * r['true_error']:9.4f} % "
+            f"{estimate:>9} "
+            f"{r['seconds']:6.1f} {r['memory']:6.2f}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--case", nargs="+", help=argparse.SUPPRESS)
+    parser.add_argument("cases", nargs="*", help='such as "ours distal_plain 0.001"')
+    asked = parser.parse_args()
+    if asked.case:
+        run_case(asked.case)
+    else:
+        main(asked.cases or CASES)
