@@ -1,7 +1,7 @@
 """With clearances: how often the simulation converges, how long, and how near it is.
 
-Run ``python benchmarks/crosscheck_play.py [draws]``; 120 draws of each robot take
-several minutes and print a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/crosscheck_play.py [draws [robot ...]]``; 120 draws of each robot
+take several minutes and print a table of ``docs/crosscheck.md``.
 """
 
 import sys
@@ -37,7 +37,7 @@ def main() -> None:
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 120
     print("robot      converged  seconds, median and most   energy against exact, "
           "median, 90 %, most   against linear")  # fmt: skip
-    for name in ("irsbot2", "hexapod", "three_rrr"):
+    for name in sys.argv[2:] or ("irsbot2", "hexapod", "three_rrr"):
         seconds, exact, linear, converged = [], [], [], 0
         for seed in range(draws):
             case = posture(name, seed)

@@ -1,10 +1,11 @@
 """Slopes, limits and what finite rotations leave, over poses and draws.
 
-Run ``python benchmarks/crosscheck_slopes.py``; it takes a minute or two and prints the
-tables of ``docs/crosscheck.md``.
+Run ``python benchmarks/crosscheck_slopes.py [robot ...]``; it takes a minute or two and
+prints the tables of ``docs/crosscheck.md``.
 """
 
 import itertools
+import sys
 import time
 
 import numpy as np
@@ -34,8 +35,8 @@ def main() -> None:
     """Print one row for each robot and kind of link."""
     print("robot      links   passed  slope            limit    left rotation    "
           "left translation  energy, linear and exact   seconds")  # fmt: skip
-    for name, links in itertools.product(("irsbot2", "hexapod", "three_rrr"),
-                                         ("beam", "spring")):  # fmt: skip
+    names = sys.argv[1:] or ("irsbot2", "hexapod", "three_rrr")
+    for name, links in itertools.product(names, ("beam", "spring")):
         started = time.perf_counter()
         answers = [crosscheck(posture, links=links) for posture in postures(name)]
         seconds = (time.perf_counter() - started) / len(answers)
