@@ -1,0 +1,83 @@
+"""The costs of ``crosscheck_validity.py`` once more, by the multibody simulation.
+
+Run ``python benchmarks/validity_simulated.py``: some two minutes; it prints the last
+table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts at nine
+nodes of each beam, a pin presses against two bushes as two contacts.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from crosscheck_validity import GRAVITY, POSES, free_of_errors, postures
+
+from assembly.energy import solve_assembly
+from assembly.exact import solve_exact
+from assembly.posture import Posture
+from validation.bushes import solve_bushes
+from validation.multibody import simulate_assembly
+from validation.spread_weight import energy_between_ends
+
+ELEMENTS = 8  # of each beam under its weight
+
+
+def closures(at: Posture) -> tuple[float, ...]:
+    """[um] [%] simulation against the linear and the exact model."""
+    found, exact = simulate_assembly(at), solve_exact(at)
+    costs = []
+    for model in (exact.linear, exact):
+        shift = (found.platform_screw - model.platform_screw)[3:]
+        energy = found.energy / model.energy - 1
+        costs += [1e6 * float(np.linalg.norm(shift)), 100 * abs(energy)]
+    return tuple(costs)
+
+
+def weights(at: Posture) -> tuple[float, ...]:
+    """[um] [%] against the ends' equivalents, [%] with what is between them."""
+    found = simulate_assembly(at, gravity=GRAVITY, elements=ELEMENTS)
+    ends = solve_assembly(at, gravity=GRAVITY)
+    shift = (found.platform_screw - ends.platform_screw)[3:]
+    whole = ends.energy + energy_between_ends(at, GRAVITY, ELEMENTS)
+    return (
+        1e6 * float(np.linalg.norm(shift)),
+        100 * abs(1 - ends.energy / found.energy),
+        100 * abs(1 - whole / found.energy),
+    )
+
+
+def discs(at: Posture) -> tuple[float, ...]:
+    """[%] what bushes cost more by cones, and by contacts at a sixteenth of all."""
+    by_cones = solve_bushes(at).energy / solve_assembly(at).energy
+    disc, bushes = (
+        simulate_assembly(at, 1 / 16, clearances=True, bushes=b).rigid_energy
+        for b in (False, True)
+    )
+    return 100 * (by_cones - 1), 100 * (bushes / disc - 1)
+
+
+def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """What is compared, and the numbers of four cases or so."""
+    for ratio in (None, 40.0):
+        said = "as built" if ratio is None else "L / r = 40"
+        for at in postures(name, ratio)[::5]:
+            yield f"closures, {said}", closures(at)
+    for ratio in (10.0, 40.0):
+        for at in free_of_errors(postures(name, ratio))[:3]:
+            yield f"weight, L / r = {ratio:g}", weights(at)
+    for at in postures(name, play=True)[::5]:
+        yield "bushes", discs(at)
+
+
+def main() -> None:
+    """One row for each comparison: medians and largest."""
+    for name in POSES:
+        rows: dict[str, list[tuple[float, ...]]] = {}
+        for what, numbers in cases(name):
+            rows.setdefault(what, []).append(numbers)
+        for what, found in rows.items():
+            columns = np.transpose(found)
+            cells = [f"{np.median(c):.3g} ({c.max():.3g})" for c in columns]
+            print(f"| {name} | {what} |", " | ".join(cells), "|", flush=True)
+
+
+if __name__ == "__main__":
+    main()
