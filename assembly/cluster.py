@@ -8,8 +8,11 @@ thread, and points do not depend on their neighbours.
 """
 
 import pickle
+import signal
+import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib.metadata import version
 from itertools import islice
@@ -55,16 +58,28 @@ def cluster_solver(
             with _connected(scheduler) as client:
                 yield from _spread(client, sweep, iter(blocks), report)
             return
-        with (
-            LocalCluster(
+        with _without_interrupts():
+            here = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True,
                 dashboard_address=None, silence_logs=50,
-            ) as cluster,
-            Client(cluster) as client,
-        ):  # fmt: skip
+            )  # fmt: skip
+        with here as cluster, Client(cluster) as client:
             yield from _spread(client, sweep, iter(blocks), report)
 
     return solve
+
+
+@contextmanager
+def _without_interrupts() -> Generator[None, None, None]:
+    """Processes started meanwhile ignore Ctrl-C: it is the sweep's to stop them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _connected(address: str) -> "distributed.Client":

@@ -191,8 +191,9 @@ def start_command(folder, *words):
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(tmp_path):
-    run = start_command(tmp_path)
+@pytest.mark.parametrize("words", [[], ["--workers", "1"]])
+def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(tmp_path, words):
+    run = start_command(tmp_path, *words)
     os.killpg(next(run).pid, signal.SIGINT)
     status, said = next(run)
     assert status == 130
