@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.robot import BeamLink
 from validation.generator import Synthetic
-from validation.generator_effects import SCREW, WRENCH, own_compliance
+from validation.generator_effects import SCREW, WRENCH, Row, own_compliance
 from validation.generator_machine import Hidden, simulate_readings
 
 SAME = 10.0  # left of a chi square below which noise hides the difference
@@ -100,7 +100,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     """(rows, 6, parameters) by effect."""
-    robot, rows = campaign.robot, campaign.plan.rows
+    robot, rows, lab = campaign.robot, campaign.plan.rows, _Lab(campaign)
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
@@ -108,11 +108,9 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
         name: np.array([row.covariates[name] for row in rows])[:, None]
         for name in ("temperature", "time", "approach")
     }
-    offsets = {n: _still(campaign, "encoder_offset", {n: _STEP}, _STEP) for n in drives}
-    lengths = [_still(campaign, "link_length", {f.name: _STEP}, _STEP) for f in beams]
-    softer = {
-        n: _each(campaign, "drive_compliance", {n: _SOFT}, 1 / _SOFT) for n in drives
-    }
+    offsets = {n: lab.still("encoder_offset", n, _STEP) for n in drives}
+    lengths = [lab.still("link_length", f.name, _STEP) for f in beams]
+    softer = {n: lab.each("drive_compliance", n, _SOFT, 1 / _SOFT) for n in drives}
     yield "encoder_offset", _columns(list(offsets.values()))
     angles = {n: np.array([[row.coordinates[n]] for row in rows]) for n in turning}
     yield (
@@ -137,23 +135,19 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     yield (
         "base_compliance",
         _columns([
-            _each(campaign, "base_compliance", {f"stiffness.{k}": _SOFT}, 1 / _SOFT)
+            lab.each("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
             for k in SCREW
         ]),
     )
     yield (
         "modulus_scale",
-        _columns([
-            _each(campaign, "modulus_scale", {f.name: 0.99}, 0.01) for f in beams
-        ]),
+        _columns([lab.each("modulus_scale", f.name, 0.99, 0.01) for f in beams]),
     )
     yield (
         "self_weight",
-        _columns([
-            _still(campaign, "self_weight", {f"g.{k}": 1.0}, 1.0) for k in "xyz"
-        ]),
+        _columns([lab.still("self_weight", f"g.{k}", 1.0) for k in "xyz"]),
     )
-    pushed = [_still(campaign, "load_gain", {f"offset.{k}": 1.0}, 1.0) for k in WRENCH]
+    pushed = [lab.still("load_gain", f"offset.{k}", 1.0) for k in WRENCH]
     loads = np.array([row.load for row in rows])
     recorded = [k for k in range(6) if loads[:, k].any()]
     gain = sum(loads[:, [k]] * pushed[k] for k in range(6))
@@ -161,7 +155,7 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     yield (
         "registration",
         _columns([
-            _still(campaign, "registration", {key: _STEP}, _STEP)
+            lab.still("registration", key, _STEP)
             for key in (*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz")
         ]),
     )
@@ -176,29 +170,30 @@ def _columns(screws: Sequence[NDArray]) -> NDArray:
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
-def _each(
-    campaign: Synthetic, name: str, parameters: dict[str, float], step: float
-) -> NDArray:
-    """(rows, 6) what an effect adds for a unit of its parameter."""
-    return _difference(campaign, list(campaign.plan.rows), name, parameters) / step
+class _Lab:
+    """A campaign's robot without what is hidden, and its readings without noise."""
 
+    def __init__(self, campaign: Synthetic) -> None:
+        self._robot, self._point = campaign.robot, campaign.reference_point
+        self._of = campaign.plan.configuration
+        self._rows = list(campaign.plan.rows)
+        first = np.unique(self._of, return_index=True)[1]
+        self._unloaded = [replace(self._rows[i], load=np.zeros(6)) for i in first]
+        self._loaded_readings = self._read(self._rows, ())
+        self._unloaded_readings = self._read(self._unloaded, ())
 
-def _still(
-    campaign: Synthetic, name: str, parameters: dict[str, float], step: float
-) -> NDArray:
-    """The same of an effect that no load changes: once for each configuration."""
-    first = np.unique(campaign.plan.configuration, return_index=True)[1]
-    rows = [replace(campaign.plan.rows[i], load=np.zeros(6)) for i in first]
-    added = _difference(campaign, rows, name, parameters) / step
-    return added[campaign.plan.configuration]
+    def _read(self, rows: list[Row], effects: Sequence[Hidden]) -> NDArray:
+        return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
+    def each(self, name: str, key: str, value: float, step: float) -> NDArray:
+        """(rows, 6) what an effect adds for a unit of its parameter."""
+        found = self._read(self._rows, [Hidden(name, {key: value})])
+        return (found - self._loaded_readings) / step
 
-def _difference(
-    campaign: Synthetic, rows: list, name: str, parameters: dict[str, float]
-) -> NDArray:
-    case = campaign.robot, campaign.reference_point, rows
-    with_it = simulate_readings(*case, [Hidden(name, parameters)], "springs")
-    return with_it - simulate_readings(*case, program="springs")
+    def still(self, name: str, key: str, step: float) -> NDArray:
+        """The same of an effect that no load changes: once for each configuration."""
+        found = self._read(self._unloaded, [Hidden(name, {key: step})])
+        return ((found - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:

@@ -74,16 +74,20 @@ def simulate_readings(
     changing = [effect for effect in effects if effect.name in _ALL_CHANGES]
     used = sorted({c for e in changing for c in _ALL_COVARIATES.get(e.name, ())})
     machines: dict[tuple, Machine] = {}
-    keys = []
+    nominal: dict[tuple, NDArray] = {}
+    keys: list[tuple] = []
     for row in rows:
+        place = tuple(row.coordinates.values())
         conditions = tuple(row.covariates[name] for name in used)
-        keys.append((*row.coordinates.values(), row.load.tobytes(), *conditions))
+        keys.append((place, row.load.tobytes(), *conditions))
         if keys[-1] not in machines:
             machines[keys[-1]] = _machine(pointed, row, changing)
+        if place not in nominal:
+            nominal[place] = nominal_pose(pointed, row)
     poses = rest_poses(list(machines.values()), program, update)
     known = dict(zip(machines, poses, strict=True))
     return np.array([
-        _read(known[key], nominal_pose(pointed, row), row, effects)
+        _read(known[key], nominal[key[0]], row, effects)
         for key, row in zip(keys, rows, strict=True)
     ])
 

@@ -1,0 +1,326 @@
+"""Confusion matrix of the diagnosis over random campaigns with hidden effects.
+
+    python benchmarks/diagnosis_confusion.py FOLDER --count 200      # make, diagnose
+    python benchmarks/diagnosis_confusion.py FOLDER --score          # what is there
+
+Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
+one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
+one that the design cannot tell from another.  The data come from the simulation's side
+(``validation.generator``); what else would explain them as well is worked out there too
+(``validation.generator_equivalents``).  FOLDER keeps campaigns, truths and answers, so
+that a run can be stopped and taken up again.
+
+Counted as right: a definite verdict with the hidden effects or a set that explains the
+data as well.  A false claim is a definite verdict with any other set.
+"""
+
+import argparse
+import json
+import shutil
+import time
+import traceback
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from random_robots import draw_robot
+
+from stiffness.reading import BadInput
+from stiffness.writing import plain, write_json
+from validation.generator import Noise, Synthetic, generate_campaign, write_campaign
+from validation.generator_design import Design
+from validation.generator_draws import NotApplicable, draw_effect
+from validation.generator_effects import LIBRARY, Parameters
+from validation.generator_equivalents import SAME, Alternative, alternatives
+from validation.generator_machine import Hidden
+from validation.generator_outside import OUTSIDE
+from validation.generator_truth import truth_of
+from validation.multibody import SimulationFailed
+
+MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
+STRENGTHS = (2.0, 5.0, 9.0)
+TRIES = 12  # draws of a case until its robot can have the effects
+FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
+VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
+WITHIN_90 = 1.645  # [-] standard deviations
+VERDICTS = ("explained", "none_needed", "ambiguous", "outside_library")
+
+
+def draw_case(seed: int) -> tuple[str, Synthetic]:
+    """Kind and campaign of a case; draws again what a robot cannot have."""
+    for attempt in range(TRIES):
+        rng = np.random.default_rng([seed, attempt])
+        kind = str(rng.choice(list(MIX), p=list(MIX.values())))
+        try:
+            campaign = _measure(kind, rng)
+        except (NotApplicable, SimulationFailed, BadInput):
+            continue
+        if campaign.sigma[3] >= FINE:
+            return kind, campaign
+    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+
+
+def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
+    """A campaign of a kind."""
+    names = _effects(kind, rng)
+    drawn = draw_robot(rng, "arm" if "joint_clearance" in names else None)
+    robot, load = drawn.robot, drawn.load
+    design = Design(
+        reach=drawn.reach,
+        load=load,
+        humidity="_humidity" in names or rng.random() < 0.3,
+        temperature="around" if "_quadratic_temperature" in names else "swing",
+    )
+    wanted = {name: float(rng.choice(STRENGTHS)) for name in names}
+    if "geometric_stiffening" in names:  # first of all it needs large errors
+        robot = robot.with_errors(30 * robot.errors)
+    if kind != "confounded":
+        return generate_campaign(
+            robot, wanted, design, Noise(), drawn.point, int(rng.integers(2**31)),
+            "springs",
+        )  # fmt: skip
+    # a beam that is longer, or warmer by always the same: nothing can tell them apart
+    hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
+    fixed = Design(reach=drawn.reach, load=load, temperature="constant")
+    return generate_campaign(
+        robot, [(hidden, wanted[names[0]])], fixed, Noise(), drawn.point,
+        int(rng.integers(2**31)), "springs",
+    )  # fmt: skip
+
+
+def _effects(kind: str, rng: np.random.Generator) -> list[str]:
+    """Names of what is hidden."""
+    library = list(LIBRARY)
+    if kind == "none":
+        return []
+    if kind == "outside":
+        return [str(rng.choice(list(OUTSIDE)))]
+    if kind == "confounded":
+        return [str(rng.choice(["thermal_expansion", "link_length"]))]
+    if kind == "single":
+        return [str(rng.choice(library))]
+    library.remove("geometric_stiffening")
+    return [str(n) for n in rng.choice(library, 2, replace=False)]
+
+
+def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
+    """Parameters at a single beam."""
+    given = dict(draw_effect(name, robot, 1.0, rng).parameters)
+    first = str(rng.choice(list(given)))
+    return {first: given[first]}
+
+
+def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
+    """The truth, with every set that explains the data as well."""
+    names = sorted(effect.name for effect in campaign.effects)
+    rivals = alternatives(campaign, 2 if len(names) == 2 else 1) if names else []
+    same = {
+        tuple(sorted(_plain(one)))
+        for one in rivals
+        if one.left < SAME and tuple(sorted(_plain(one))) != tuple(names)
+    }
+    # nothing at all is a rival too, if the effects hardly show
+    unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
+    accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
+    verdict = "ambiguous" if kind == "confounded" else None
+    truth = truth_of(campaign, verdict, accept)
+    if kind == "outside":
+        least = rivals[0].left if rivals else np.inf
+        truth["accept_effects"] = [[]]
+        truth["hidden_from_library"] = least
+        truth["accept_verdicts"] = ["outside_library"]
+        if least < VISIBLE:  # a public effect does nearly the same
+            truth["accept_verdicts"] = list(VERDICTS)
+            truth["accept_effects"] += [_plain(one) for one in rivals[:4]]
+    truth["kind"] = kind
+    truth["alternatives"] = [
+        {"names": list(one.names), "parameters": one.parameters, "left_chi2": one.left}
+        for one in rivals[:8]
+    ]
+    return truth
+
+
+def _plain(one: Alternative) -> list[str]:
+    """Names without the time constants of drifts."""
+    return [name.partition("(")[0] for name in one.names]
+
+
+def make(folder: Path, seed: int) -> None:
+    """Write a case's campaign and truth, unless it is there."""
+    name = f"c{seed:04d}"
+    if (folder / "truths" / f"{name}.json").exists():
+        return
+    kind, campaign = draw_case(seed)
+    shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
+    write_campaign(campaign, folder / "campaigns" / name)
+    truth = plain(truth_with_rivals(kind, campaign))
+    write_json({name: truth}, str(folder / "truths" / f"{name}.json"))
+
+
+def answer(folder: Path, seed: int) -> None:
+    """Diagnose a case and write the answer, unless it is there."""
+    from validation.campaign_file import read_campaign
+    from validation.diagnosis import diagnose
+    from validation.diagnosis.results import table
+
+    name = f"c{seed:04d}"
+    target = folder / "answers" / f"{name}.json"
+    if target.exists():
+        return
+    started = time.perf_counter()
+    try:
+        said = table(diagnose(read_campaign(folder / "campaigns" / name)))
+    except Exception:  # a crash is an answer too, and is counted
+        said = {"verdict": "crashed", "why": traceback.format_exc()}
+    said["seconds"] = time.perf_counter() - started
+    write_json(said, str(target))
+
+
+def score(folder: Path) -> dict[str, Any]:
+    """Everything that is asked of the answers in a folder.
+
+    Args:
+        folder: with truths and answers.
+
+    Returns:
+        Plain values; see the head of this file.
+    """
+    confusion: dict[str, Counter] = defaultdict(Counter)
+    outcome: dict[str, Counter] = defaultdict(Counter)
+    inside: list[bool] = []
+    ratios: list[float] = []
+    brier: list[float] = []
+    seconds: list[float] = []
+    wrong: list[str] = []
+    for path in sorted((folder / "answers").glob("*.json")):
+        said = json.loads(path.read_text())
+        truth = json.loads((folder / "truths" / path.name).read_text())[path.stem]
+        names = sorted(effect["name"] for effect in truth["effects"])
+        result = _judge(truth, said)
+        strength = min(truth["contribution_rms"].values(), default=0.0)
+        for group in (truth["kind"], f"{truth['kind']} {_band(strength)}", "all"):
+            outcome[group][result] += 1
+        confusion["+".join(names) or "none"][_told(said)] += 1
+        seconds.append(said.get("seconds", 0.0))
+        if result in ("false claim", "false outside", "crashed", "missed"):
+            claimed = "+".join(sorted(e["name"] for e in said.get("effects", [])))
+            sizes = {k: round(v, 1) for k, v in truth["contribution_rms"].items()}
+            wrong.append(
+                f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
+                f"{said['verdict']} {claimed}: {result}"
+            )
+        if result == "right" and said["verdict"] == "explained":
+            ratios.append(said["error"]["after"]["normalised"])
+            inside += _inside(truth, said)
+        probabilities = said.get("probabilities") or {}
+        if probabilities and truth["kind"] in ("single", "pair", "none"):
+            squares = [(p - (n in names)) ** 2 for n, p in probabilities.items()]
+            brier.append(float(np.mean(squares)))
+    return {
+        "outcome": {k: dict(v) for k, v in sorted(outcome.items())},
+        "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
+        "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
+        "after_over_noise": _spread(ratios),
+        "brier": _spread(brier),
+        "seconds": _spread(seconds),
+        "wrong": wrong,
+    }
+
+
+def _judge(truth: dict, said: dict) -> str:
+    """right, abstained, false claim, false outside, missed or crashed."""
+    verdict = said["verdict"]
+    if verdict == "crashed":
+        return "crashed"
+    claimed = sorted(effect["name"] for effect in said.get("effects", []))
+    accepted = [sorted(names) for names in truth["accept_effects"]]
+    loose = len(truth["accept_verdicts"]) == len(VERDICTS)
+    if verdict == "ambiguous":
+        return "right" if verdict in truth["accept_verdicts"] else "abstained"
+    if verdict == "outside_library":
+        outside = truth["kind"] == "outside"
+        return "right" if outside else "false outside"
+    if verdict == "none_needed":
+        fine = truth["kind"] == "none" or loose or [] in accepted
+        return "right" if fine and truth["kind"] != "outside" or loose else "missed"
+    if truth["kind"] == "outside":
+        return "right" if loose and claimed in accepted else "false claim"
+    return "right" if claimed in accepted and claimed else "false claim"
+
+
+def _told(said: dict) -> str:
+    """What was claimed, in a word."""
+    if said["verdict"] == "explained":
+        return "+".join(sorted(effect["name"] for effect in said["effects"]))
+    return str(said["verdict"])
+
+
+def _band(strength: float) -> str:
+    """Of a strength in sigmas, the weakest of what is hidden."""
+    return (
+        "none"
+        if not strength
+        else min(
+            ("2x", "5x", "9x"),
+            key=lambda band: abs(np.log(strength / float(band[:-1]))),
+        )
+    )
+
+
+def _inside(truth: dict, said: dict) -> list[bool]:
+    """For every parameter found: is the truth within the 90 % interval?"""
+    known = {
+        (effect["name"], parameter["name"]): parameter["value"]
+        for effect in truth["effects"]
+        for parameter in effect["parameters"]
+    }
+    inside = []
+    for effect in said["effects"]:
+        for parameter in effect["parameters"]:
+            key = effect["name"], parameter["name"]
+            if key in known and parameter["std"]:
+                away = abs(parameter["value"] - known[key])
+                inside.append(away <= WITHIN_90 * parameter["std"])
+    return inside
+
+
+def _spread(values: list[float]) -> dict[str, float | int]:
+    """Median, 90 % and number."""
+    if not values:
+        return {"count": 0}
+    return {
+        "median": float(np.median(values)),
+        "p90": float(np.quantile(values, 0.9)),
+        "mean": float(np.mean(values)),
+        "count": len(values),
+    }
+
+
+def main() -> None:
+    """Make, diagnose, score."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--step", type=int, default=1, help="for several at a time")
+    parser.add_argument("--make", action="store_true", help="make campaigns only")
+    parser.add_argument("--score", action="store_true", help="score answers only")
+    asked = parser.parse_args()
+    for name in ("campaigns", "truths", "answers"):
+        (asked.folder / name).mkdir(parents=True, exist_ok=True)
+    if not asked.score:
+        for seed in range(asked.first, asked.first + asked.count, asked.step):
+            started = time.perf_counter()
+            make(asked.folder, seed)
+            if not asked.make:
+                answer(asked.folder, seed)
+            print(f"case {seed}: {time.perf_counter() - started:.0f} s", flush=True)
+    if not asked.make:
+        found = score(asked.folder)
+        write_json(found, str(asked.folder / "score.json"))
+        print(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
