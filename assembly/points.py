@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch import Energies, minimise_energies, zone_margins
+from assembly.batch_error import bound_pose_errors
 from assembly.closure import closure_signs
 from assembly.conic import SolverFailed
-from assembly.energy import CannotAssemble, solve_assembly
+from assembly.energy import CannotAssemble
 from assembly.exact import solve_exact
 from assembly.nominal import size_of
-from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture, place_many, place_many_joints
 from assembly.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.robot import Robot
@@ -185,13 +185,14 @@ def _solve_reached(
     if question.wrenches:
         out["wrench"][at] = _wrenches(question, robot, T, energies)[good]
     if question.play_alone:
-        _bound_play(perfect, postures, found, rows)
-    if question.reading is None and not question.linearisation:
-        return
-    for i in good:
-        here = robot if errors is None else robot.with_errors(errors[i])
-        one = Posture(here, postures[i].coordinates, T[i], float(off[i]))
-        _solve_closely(question, one, found, int(rows[i]))
+        _bound_play(perfect, T, off, found, rows)
+    if question.reading is not None and good:
+        _bound(question, robot, T, errors, off, energies, found, rows)
+    if question.linearisation:
+        for i in good:
+            here = robot if errors is None else robot.with_errors(errors[i])
+            one = Posture(here, postures[i].coordinates, T[i], float(off[i]))
+            _compare_finite(one, found, int(rows[i]))
 
 
 def _note_singularities(
@@ -203,9 +204,10 @@ def _note_singularities(
     near = find_singularities(robot, T[[run.start for run in runs]])
     names = near.names(robot, question.near)
     distances = np.stack([getattr(near, kind) for kind in KINDS], axis=1)
+    condition = near.condition
     for i, run in enumerate(runs):
         found.records["singular_distance"][rows[run]] = distances[i]
-        found.records["condition"][rows[run]] = near.condition[i]
+        found.records["condition"][rows[run]] = condition[i]
         if names[i]:
             found.texts["near_singularity"].update(
                 dict.fromkeys(rows[run].tolist(), names[i])
@@ -226,47 +228,46 @@ def _wrenches(
     return np.einsum("kfji,kfj->kfi", paths, at_platform)
 
 
+def _bound(
+    question: Question, robot: Robot, T: NDArray, errors: NDArray | None, off: NDArray,
+    energies: Energies, found: Found, rows: NDArray,
+) -> None:  # fmt: skip
+    """Bounds of (27) where (22) has an answer; their failure is the point's."""
+    bounds = bound_pose_errors(
+        robot, T, question.reading or "", errors, off, energies
+    )  # fmt: skip
+    out = found.records
+    for i in np.flatnonzero(out["status"][rows] == 0).tolist():
+        row = int(rows[i])
+        if bounds.status[i] != "ok":
+            _fail(found, range(row, row + 1), bounds.status[i], bounds.reason[i])
+            continue
+        out["rotation_error"][row] = bounds.rotation_error[i]
+        out["translation_error"][row] = bounds.translation_error[i]
+
+
 def _bound_play(
-    perfect: Robot, postures: list[Posture], found: Found, rows: NDArray
+    perfect: Robot, T: NDArray, off: NDArray, found: Found, rows: NDArray
 ) -> None:
     """Bounds of (27) by play alone, once a posture."""
-    done: dict[int, tuple] = {}
-    for row, posture in zip(rows.tolist(), postures, strict=True):
-        if id(posture) not in done:
-            one = Posture(
-                perfect, posture.coordinates, posture.transforms, posture.mismatch
-            )
-            try:
-                bounds = bound_pose_error(solve_assembly(one), "frozen")
-                done[id(posture)] = bounds.rotation_error, bounds.translation_error
-            except (SolverFailed, CannotAssemble) as error:
-                found.texts["reason"].setdefault(row, f"play alone: {error}")
-                done[id(posture)] = (np.nan, np.nan), (np.nan, np.nan)
-        rotation, translation = done[id(posture)]
-        found.records["rotation_error_play"][row] = rotation
-        found.records["translation_error_play"][row] = translation
+    runs = list(_runs(T.reshape(len(T), -1)))
+    starts = [run.start for run in runs]
+    bounds = bound_pose_errors(perfect, T[starts], "frozen", None, off[starts])
+    for i, run in enumerate(runs):
+        found.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
+        found.records["translation_error_play"][rows[run]] = bounds.translation_error[i]
+        if bounds.status[i] != "ok":
+            for row in rows[run].tolist():
+                reason = f"play alone: {bounds.reason[i]}"
+                found.texts["reason"].setdefault(row, reason)
 
 
-def _solve_closely(
-    question: Question, posture: Posture, found: Found, row: int
-) -> None:
-    """What is found at one point at a time: (27), finite motions."""
+def _compare_finite(posture: Posture, found: Found, row: int) -> None:
+    """What the linear closures cost at a point."""
     out = found.records
-    one = range(row, row + 1)
     try:
-        answer = solve_assembly(posture)
-        if question.reading is not None:
-            bounds = bound_pose_error(answer, question.reading)
-            out["rotation_error"][row] = bounds.rotation_error
-            out["translation_error"][row] = bounds.translation_error
+        gap = solve_exact(posture).linearisation_error
     except (SolverFailed, CannotAssemble) as error:
-        _fail(found, one, "solver failed", str(error))
-        return
-    if not question.linearisation:
-        return
-    try:
-        gap = solve_exact(posture, None, answer).linearisation_error
-    except SolverFailed as error:
         # the linear answer stands: only what it is worth is not known
         found.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
