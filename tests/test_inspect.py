@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
 from tests.test_cli import run  # noqa: F401
+from validation.campaign_counts import correlation
 from validation.campaign_file import read_campaign
-from validation.design_remarks import correlation, remarks_on
+from validation.design_remarks import remarks_on
 from validation.design_signatures import design_signatures
 from validation.inspect import inspect_campaign
 from validation.measuring_order import revisits
@@ -133,6 +134,18 @@ def test_noise_beside_the_stated_sigma_is_said(rng):
     assert any("Repeats scatter only 0." in t for t in texts(quiet))
 
 
+def test_suspects_in_a_row_are_hardly_mistakes(rng):
+    """Six readings 30 sigma off at once, or spread over the session."""
+    for rows, sentence in (
+        (range(10, 16), "suspects careful: Readings far from their repeats follow"),
+        (range(3, 60, 10), None),
+    ):
+        measured = rng.normal(size=(60, 6)) * 1e-5
+        measured[list(rows), 4] += 3e-4 * rng.choice([1, -1], 6)
+        found = [t for t in texts(sound(rng, measured=measured)) if "suspects" in t]
+        assert [t.startswith(sentence or "?") for t in found] == [True] * bool(sentence)
+
+
 def test_rounded_readings_are_seen(rng):
     rounded = (
         np.round(rng.normal(size=(60, 6)) * 1e-5, 4)
@@ -232,8 +245,8 @@ def test_the_command_writes_everything(tmp_path, rng, run):  # noqa: F811
     assert found["loads"]["levels"] == 2
     assert found["loads"]["configurations_under_several"] == 12
     assert found["repeats"] | {"span": 0} == {
-        "sets": 24, "rows": 48, "adjacent": found["repeats"]["adjacent"], "span": 0,
-        "order": "interleaved",
+        "sets": 24, "rows": 48, "others": 0, "span": 0, "order": "interleaved",
+        "adjacent": found["repeats"]["adjacent"],
     }  # fmt: skip
     low, high = found["noise"]["interval"]
     assert low < found["noise"]["ratio"] < high

@@ -154,6 +154,8 @@ def test_the_order_of_repeats_is_seen(rng):
     mixed = campaign_of(readings, repeat=pairs)
     assert revisits(mixed, mixed.repeat).order == "mixed"
     assert revisits(row, np.arange(60)).order == "none"
+    assert revisits(row, np.zeros(60)).order == "all"
+    assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
 
 
 def test_time_goes_before_the_order_of_the_file(rng):

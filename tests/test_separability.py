@@ -71,6 +71,7 @@ def test_what_is_too_small_to_be_seen_may_be_larger_than_thought(rng):
     found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
     np.testing.assert_array_equal(found.visible, [False, True, False])
     np.testing.assert_array_equal(found.traced, [True, True, False])
+    np.testing.assert_allclose(found.shows_at, [1.5, 0.06, np.inf])
     assert found.classes() == [("a", "b")]
 
 

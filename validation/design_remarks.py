@@ -1,43 +1,22 @@
-"""What a campaign's design can and cannot tell, in plain words.
+"""What a campaign's design can and cannot tell, in plain words."""
 
-A remark is either something lost (no analysis can bring it back), something to be
-careful about, or something that is as it should be.
-"""
-
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from stiffness.reading import quoted
 from validation.campaign import LOAD, READING, Campaign
 from validation.campaign_checks import extent_of
+from validation.campaign_counts import correlation
 from validation.measuring_order import Revisits
+from validation.remark import CAREFUL, FINE, LOST, Remark
+from validation.repeat_remarks import on_repeats
 from validation.repeats import RepeatNoise
 
-LOST, CAREFUL, FINE = "lost", "careful", "fine"
 _EXPANSION = 2.4e-5  # [1/K] aluminium, about the most a machine's body expands
 _TOGETHER = 0.9  # correlation above which two covariates tell one story
-_FEW = 20  # degrees of freedom below which noise is known worse than to +-30 %
-_SELDOM = 1e-3  # chance below which something is no coincidence
 _UNIT = 0.02  # of the robot: larger deviations are hardly manufacturing errors
-
-
-@dataclass(frozen=True)
-class Remark:
-    """One sentence on a design.
-
-    Attributes:
-        about: its subject.
-        weight: ``"lost"``, ``"careful"`` or ``"fine"``.
-        text: the sentence.
-    """
-
-    about: str
-    weight: str
-    text: str
 
 
 def remarks_on(
@@ -57,7 +36,8 @@ def remarks_on(
     found = [
         *_on_readings(campaign), *_on_configurations(campaign, visits),
         *_on_loads(campaign), *_on_temperature(campaign), *_on_approach(campaign),
-        *_on_time(campaign), *_on_covariates(campaign), *_on_repeats(repeats, noise),
+        *_on_time(campaign), *_on_covariates(campaign),
+        *on_repeats(campaign, repeats, noise),
     ]  # fmt: skip
     return sorted(found, key=lambda r: (LOST, CAREFUL, FINE).index(r.weight))
 
@@ -240,61 +220,6 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
             )
             found.append(Remark("covariates", CAREFUL, text))
     return found
-
-
-def _on_repeats(repeats: Revisits, noise: RepeatNoise | None) -> list[Remark]:
-    """What the repeats say about the noise."""
-    if noise is None:
-        text = (
-            "Nothing was measured twice: the noise cannot be checked, and whether the "
-            "best model fits is judged by the stated sigma alone."
-        )
-        return [Remark("repeats", LOST, text)]
-    found = []
-    if repeats.order == "back to back":
-        text = (
-            "Repeats were measured in a row: slow drift does not show in them, the "
-            "noise looks too small and a sound model then looks wrong."
-        )
-        found.append(Remark("repeats", CAREFUL, text))
-    elif repeats.order == "mixed":
-        text = "Only some repeats are spread over the session: drift shows in part."
-        found.append(Remark("repeats", CAREFUL, text))
-    else:
-        found.append(Remark("repeats", FINE, "Repeats are spread over the session."))
-    if noise.degrees < _FEW:
-        text = f"Few repeats: {noise.degrees} degrees of freedom in all."
-        found.append(Remark("repeats", CAREFUL, text))
-    low, high = noise.interval
-    size = f"{noise.ratio:.2f} times the stated sigma ({low:.2f} ... {high:.2f})"
-    squares = noise.degrees * noise.ratio**2
-    if chi2.sf(squares, noise.degrees) < _SELDOM:
-        text = (
-            f"Repeats scatter {size}: sigma is stated too small, or something that is "
-            "not recorded changes in between."
-        )
-        found.append(Remark("repeats", CAREFUL, text))
-    elif chi2.cdf(squares, noise.degrees) < _SELDOM:
-        text = (
-            f"Repeats scatter only {size}: sigma is stated too large, or repeats share "
-            "an error."
-        )
-        found.append(Remark("repeats", CAREFUL, text))
-    for name, chance in noise.taken_out.items():
-        if chance < _SELDOM:
-            text = (
-                f"Repeats change with {name}: noise alone would look so with a chance "
-                f"of {chance:.1g}."
-            )
-            found.append(Remark("repeats", CAREFUL, text))
-    return found
-
-
-def correlation(x: NDArray, y: NDArray) -> float:
-    """Of two columns; 0 if one of them does not vary."""
-    x, y = x - x.mean(), y - y.mean()
-    size = float(np.linalg.norm(x) * np.linalg.norm(y))
-    return float(x @ y) / size if size > 0 else 0.0
 
 
 def _in_both(configuration: NDArray, side: NDArray) -> int:

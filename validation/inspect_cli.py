@@ -21,10 +21,11 @@ def inspect(campaign: CampaignArgument, json: JsonOption = None) -> None:
     """
     from validation.campaign_file import read_campaign
     from validation.inspect import inspect_campaign
+    from validation.inspect_text import inspection_text
 
     data = read_campaign(campaign)
     with progress_bars() as update:
         found = inspect_campaign(data, lambda done, n: update("effects", done, n))
     write_json(found.table(), json)
     if json != "-":
-        print(found.text())
+        print(inspection_text(found))

@@ -22,20 +22,27 @@ class Revisits:
     Attributes:
         sets: kinds that were measured more than once.
         rows: rows in these sets.
+        others: rows of no set.
         adjacent: share of the revisits that follow the visit before directly.
         span: median time from the first to the last visit, as a share of the session.
     """
 
     sets: int
     rows: int
+    others: int
     adjacent: float
     span: float
 
     @property
     def order(self) -> str:
-        """``"interleaved"``, ``"back to back"``, ``"mixed"`` or ``"none"``."""
+        """``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"``, ``"none"``.
+
+        All: the whole campaign is one set.
+        """
         if self.sets == 0:
             return "none"
+        if self.sets == 1 and self.others == 0:
+            return "all"
         if self.adjacent >= _MOST:
             return "back to back"
         if self.adjacent <= _FEW and self.span >= _SHORT:
@@ -67,8 +74,10 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
             adjacent += int((np.diff(visits) == 1).sum())
             spans.append(np.ptp(clock[kinds == kind]))
     if not spans:
-        return Revisits(0, 0, 0.0, 0.0)
-    return Revisits(len(spans), rows, adjacent / steps, float(np.median(spans)))
+        return Revisits(0, 0, len(kinds), 0.0, 0.0)
+    return Revisits(
+        len(spans), rows, len(kinds) - rows, adjacent / steps, float(np.median(spans))
+    )
 
 
 def session_clock(campaign: Campaign) -> NDArray:

@@ -31,7 +31,7 @@ from validation.campaign import READING, Campaign
 from validation.measuring_order import session_clock
 
 _LEVEL = 0.01  # chance that a sound campaign has a suspect row
-_SHARE = 0.1  # of the rows that may be suspect
+MOST = 20  # suspects that are looked for
 _RANK = 1e-9  # relative singular value below which columns are one
 
 
@@ -105,7 +105,7 @@ def repeat_noise(
             return None
         fit = _Fit(campaign, cells, slow)
         suspect = fit.suspect()
-        if suspect is None or len(out) >= _SHARE * len(campaign):
+        if suspect is None or len(suspects) == MOST:
             return fit.noise(suspects)
         suspects.append(suspect)
         out.update(suspect.rows)

@@ -63,6 +63,12 @@ class Separability:
         """(m,) bool: would show if it were large enough."""
         return (self.strength * self.left >= TRACE) & (self.rank > 0)
 
+    @property
+    def shows_at(self) -> NDArray:
+        """(m,) factor on plausible sizes that stands out of the noise; inf: none."""
+        size = np.where(self.traced, self.strength * self.left, 0.0)
+        return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
+
     def classes(self) -> list[tuple[str, ...]]:
         """Effects that imitate each other, wholly and both ways.
 
