@@ -2,8 +2,9 @@
 
     python -m examples.ipa_ur10.study [--data DIR] [-o ipa_ur10_study]
 
-Fitted on the first half in time of series A, scored on the second half, and on series B
-(measured months later) after a new base and tool from its first 200 rows.
+Fitted on the first half in time of series A and scored on its second half; fitted on
+all of it and scored on series B, measured months later, with a new base and tool from
+the first 200 rows there.
 """
 
 import re
@@ -202,7 +203,8 @@ def main() -> None:
     steps, found = [], {}
     for step in ladder(spread):
         fit = found[step.name] = fit_step(step, train)
-        left = (residuals(fit, train), residuals(fit, test), transfer(fit, B))
+        whole = transfer(fit_step(step, A), B)
+        left = (residuals(fit, train), residuals(fit, test), whole)
         steps.append({
             "model": step.name,
             "position": [rms_position(r) for r in left],
