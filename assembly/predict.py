@@ -22,9 +22,9 @@ from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
-from assembly.resting_play import taken_up
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
+from assembly.resting_play import taken_up
 from stiffness.screws import rotation_matrix, rotation_vector
 
 _STEPS = 100
@@ -89,10 +89,11 @@ def read(here: Conditions, screws: NDArray) -> NDArray:
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
     arm = R @ here.point
-    seen = np.einsum("rij,rj->ri", turn, R @ (here.point + here.tool))
-    shift = screws[:, 3:] + seen - arm
+    swung = np.einsum("rij,rj->ri", turn - np.eye(3), R @ (here.point + here.tool))
+    shift = screws[:, 3:] + swung + R @ here.tool
     base = rotation_matrix(here.base[:3])
-    where = (p + arm + shift) @ base.T + here.base[3:] - (p + arm)
+    # the device's turn acts on the place itself; without one nothing is rounded off
+    where = (p + arm) @ (base - np.eye(3)).T + shift @ base.T + here.base[3:]
     turned = rotation_vector(base @ turn) if here.base[:3].any() else screws[:, :3]
     return np.concatenate([turned, where], axis=1) + here.reading
 
