@@ -175,7 +175,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(sizes) if away is None else away
     held = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[held]).query(mesh.nodes)[0]
-    far = gap >= distance
+    far = gap >= distance * (1 - 1e-9)  # a layer of nodes at just that distance
     if not far.any():
         raise BadInput(
             f"stress: nothing of the link is {distance:.4g} m away from its "

@@ -8,8 +8,10 @@ from stiffness.elements import lame, quadratic
 from stiffness.estimate import error_matrices
 from stiffness.fea import Level, MeshedLink
 from stiffness.link import LinkStiffness, inverted
+from stiffness.plot import plot_stress
 from stiffness.reading import BadInput
-from stiffness.stress import stress_influence, von_mises
+from stiffness.results import stress_results, stress_text
+from stiffness.stress import peak_stress, stress_influence, von_mises
 from tests.solids_for_tests import bar_solid
 
 R, L = 0.04, 0.4
@@ -89,3 +91,53 @@ def test_the_region_is_stated_and_the_edge_kept_out(solved):
     assert "at least 0.04 m away" in stress.region
     with pytest.raises(BadInput, match="nothing of the link is 1 m away"):
         stress_influence(solved, away=1.0)
+
+
+def test_the_peak_has_the_beams_beside_it(solved):
+    """A sideways force: at the section nearest to the base the region ends on, M = F
+    (L - away); the whole beam's is F L.  Mesh 2 %, as above."""
+    load = [0, 0, 0, 1e3, 0, 0]
+    peak = peak_stress(solved, load, section={"radius": R})
+    assert peak.away == pytest.approx(R, rel=1e-6)
+    assert peak.beam_whole == pytest.approx(1e3 * L * R / SECOND, rel=1e-6)
+    stress, place = peak.beam
+    assert stress == pytest.approx(1e3 * (L - R) * R / SECOND, rel=1e-6)
+    assert np.abs(place) == pytest.approx([R, 0, R], abs=1e-6)
+    assert peak.von_mises == pytest.approx(stress, rel=0.02)
+    assert np.linalg.norm(peak.place[:2]) == pytest.approx(R, rel=1e-6)
+
+
+def test_the_beam_is_read_in_the_links_axes(solved):
+    """Torsion about the link's z, and a moment at the tip that is the base's too."""
+    twist = peak_stress(solved, [0, 0, 50, 0, 0, 0], section={"radius": R})
+    expected = np.sqrt(3) * 50 * R / (2 * SECOND)
+    assert twist.beam[0] == pytest.approx(expected, rel=1e-9)
+    assert twist.von_mises == pytest.approx(expected, rel=0.02)
+    plate = {"width": 0.02, "height": 0.05}
+    bent = [peak_stress(solved, m, section=plate, up=[0, 1, 0]) for m in
+            ([50, 0, 0, 0, 0, 0], [0, 50, 0, 0, 0, 0])]  # fmt: skip
+    # up is y: a moment about x bends the height, about y the width
+    assert bent[0].beam[0] == pytest.approx(50 * 6 / (0.02 * 0.05**2), rel=1e-9)
+    assert bent[1].beam[0] == pytest.approx(50 * 6 / (0.05 * 0.02**2), rel=1e-9)
+
+
+def test_a_section_of_constants_is_refused_before_the_work(solved):
+    section = {"area": 1.0, "I_y": 1.0, "I_z": 1.0, "J": 1.0}
+    with pytest.raises(BadInput, match="says nothing of its outer fibres"):
+        peak_stress(solved, np.ones(6), section=section)
+
+
+def test_the_report_and_the_picture_say_where(solved):
+    peak = peak_stress(solved, [0, 0, 0, 1e3, 0, 0], section={"radius": R})
+    text = stress_text(peak)
+    assert "at least 0.04 m away from both interfaces" in text
+    assert "beam, whole length: 7.958 MPa" in text  # 400 N m over 5.027e-5 m^3
+    results = stress_results(peak)
+    assert results["beam"]["von_mises_whole_length"] == peak.beam_whole
+    everywhere = stress_influence(solved, away=0.0)
+    assert len(everywhere.places) == len(solved.level.mesh.nodes)
+    ends = solved.link.base, solved.link.tip
+    axes = plot_stress(everywhere, peak, *ends, {"radius": R}).axes[0]
+    line = axes.get_lines()[-1]
+    assert line.get_ydata()[0] * 1e6 == pytest.approx(peak.beam_whole)
+    assert line.get_ydata()[-1] < line.get_ydata()[0]
