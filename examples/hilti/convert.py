@@ -15,6 +15,7 @@ from assembly.nominal import Target, follow
 from assembly.posture import home_posture
 from assembly.robot import Frame, Robot
 from examples.campaign_folder import (
+    base_pose,
     data_folder,
     deviation_columns,
     write_campaign,
@@ -25,6 +26,7 @@ NAME = "hilti_trailblazer"
 FILES = ("flat", "pallet", "orthogonal_wood")
 SEGMENTS = {"column_middle_joint": -0.706, "column_top_joint": -0.736}  # [m] README
 ARM = tuple(f"dsr_joint{k}" for k in range(1, 7))
+G = 9.80665  # [m/s^2]
 SIGMA = 0.75e-3  # [m] of the total station, an axis
 STATIONING = ("stationing_measurements", "evaluation_measurements")
 
@@ -113,11 +115,21 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
     for name in ("stationing", "height", "space"):
         columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
     for place in ("base", "column"):
-        accel = np.array([row[f"tilt_sensor_{place}_accel"] for row in rows])
-        up = accel / np.linalg.norm(accel, axis=1)[:, None]
+        up = _up(rows, place)
         for k, axis in enumerate("xyz"):
             columns[f"cov.up_{place}_{axis}"] = up[:, k]
+    # the total station's z is vertical; the accelerometer follows it from row to row
+    rocking = _up(rows, "base") - _up(rows, "base").mean(axis=0)
+    vertical = base_pose(T, measured)[2, :3] + rocking
+    for k, axis in enumerate("xyz"):
+        columns[f"cov.gravity.{axis}"] = -G * vertical[:, k]
     return write_campaign(folder, robot, columns, (1.0, SIGMA))
+
+
+def _up(rows: list[dict], place: str) -> NDArray:
+    """(k, 3) unit vector up, as an accelerometer sees it in its own axes."""
+    accel = np.array([row[f"tilt_sensor_{place}_accel"] for row in rows])
+    return accel / np.linalg.norm(accel, axis=1)[:, None]
 
 
 def _rows(content: dict) -> list[dict]:

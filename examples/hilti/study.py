@@ -21,7 +21,7 @@ from examples.calibration import (
     residuals,
     rows_of,
 )
-from examples.hilti.convert import ARM, FILES, SEGMENTS, convert
+from examples.hilti.convert import ARM, FILES, SEGMENTS, G, convert
 from examples.study_output import (
     arguments,
     print_table,
@@ -30,7 +30,6 @@ from examples.study_output import (
 )
 from validation.campaign_file import read_campaign
 
-G = 9.80665  # [m/s^2]
 LOWER, UPPER = SEGMENTS
 REACH = {LOWER: 1.448, UPPER: 1.414}  # [m] overlap at zero, README of the data
 TAKEN_UP = 20.0  # [N m] beyond which the column's play lies on one side

@@ -31,6 +31,7 @@ JOINTS = (
 )  # fmt: skip
 SIGMA = (4e-5, 1.2e-5)  # [rad], [m] medians of what series B states
 TMAC = 1.0  # [kg] of the tracker's target, a guess
+EVERY = 40  # row goes into the small campaigns
 MOVED = 1e-3  # [rad] less is no motion, and the direction of the last one stays
 
 
@@ -38,7 +39,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
     """Write a campaign folder for each series.
 
     Args:
-        out: folder of the campaigns.
+        out: folder of the campaigns; ``A_few`` and ``B_few`` are for a quick diagnosis.
         data: where all measured data lie.
 
     Returns:
@@ -62,6 +63,8 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
         columns |= deviation_columns(nominal, measured, turn=True)
         columns |= _covariates(table)
         folders[series] = write_campaign(out / series, robot, columns, SIGMA)
+        few = {name: column[::EVERY] for name, column in columns.items()}
+        write_campaign(out / f"{series}_few", robot, few, SIGMA)
     return folders
 
 
@@ -123,6 +126,7 @@ def _covariates(table: dict[str, NDArray]) -> dict[str, NDArray]:
     """Time, temperature, and for each joint the direction of its last motion."""
     warm = table["measurement_temperature"]
     columns = {"cov.temperature": warm - np.median(warm)}
+    columns["cov.gravity.z"] = np.full(len(warm), -9.81)  # it stands upright
     if np.isfinite(table["time"]).all():
         columns["cov.time"] = table["time"]
     else:
