@@ -67,8 +67,9 @@ def main(draws=400):
                 )
                 times.append(timed(asked, paths[workers], solve, tasks))
             seconds, ratio = times[-1], times[-2] / times[-1]
-            print(f"{workers} process(es)  {seconds:6.1f} s  {asked.size / seconds:6.0f} "
-                  f"points/s, {ratio:.2f} times the row above; {tasks[0]}")  # fmt: skip
+            rate = f"{asked.size / seconds:6.0f} points/s"
+            print(f"{workers} process(es)  {seconds:6.1f} s  {rate}, {ratio:.2f} times "
+                  f"the row above; {tasks[0]}")  # fmt: skip
         same = len({path.read_bytes() for path in paths}) == 1
     print("the three files are", "the same, byte by byte" if same else "DIFFERENT")
     return same
