@@ -53,7 +53,8 @@ HEAVY = (*OWNERS, "pyvista", "matplotlib")
 INDEPENDENT = (
     "multibody.py", "open_robot.py", "motion.py", "contact.py", "beams.py",
     "exudyn_parts.py", "exudyn_model.py", "exudyn_solids.py", "exudyn_solver.py",
-    "exudyn_reading.py",
+    "exudyn_reading.py", "generator_effects.py", "generator_outside.py",
+    "generator_machine.py", "generator_rest.py",
 )  # fmt: skip
 
 
