@@ -24,6 +24,8 @@ from assembly.conic import SolverFailed
 from assembly.links import link_compliance
 from assembly.posture import Posture, place_robot
 from assembly.robot import BeamLink, MeshLink, Robot
+from assembly.zone import zone_margin
+from validation.bushes import bush_margin
 from validation.multibody import without_clearance
 from validation.round_bars import bar_compliance, bar_stiffness, with_bars
 from validation.validity import (
@@ -168,6 +170,20 @@ def discs(name: str) -> Iterable[dict]:
             yield row((name, "discs", case, size), erred, bush_cost, load)
 
 
+def print_margins(name: str) -> None:
+    """By how much two bushes raise the zone's margin: least, median, largest factor."""
+    for compliant in ("rigid", "free"):
+        factors = []
+        for at in postures(name, play=True):
+            disc = zone_margin(at, compliant).margin
+            bushes = bush_margin(at, compliant).margin
+            if disc and bushes:
+                factors.append(bushes / disc)
+        if factors:
+            found = np.percentile(factors, [0, 50, 100])
+            print(name, f"margin, compliant {compliant}: bushes / disc", found.round(3))
+
+
 def forks() -> Iterable[dict]:
     """(b) for links as they could be built: tubes with forks and bearing bores."""
     mesh = MeshLink(FORKS, *BORES, 60e9, 0.3)
@@ -241,6 +257,7 @@ def main() -> None:
             print(f"\n{name}: {found[0]['assumption']}\n")
             print_table(found)
             rows += found
+        print_margins(name)
     print("\nreal shape\n")
     found = list(forks())
     print_table(found)

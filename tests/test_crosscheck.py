@@ -141,9 +141,9 @@ def test_weight_is_the_same_on_both_sides(links):
 
 
 def test_two_scales_at_full_errors_are_made_enough(irsbot2):
-    """At this pose the two alone say slope 2.2: smaller ones are added, and it holds.
+    """Limits are not known to a thousandth: smaller scales are added, and all holds.
 
-    A half per cent in the links' stiffness is found on the same two.
+    Of 30 draws on two scales alone, slopes were 1.92 to 2.21.
     """
     at = place_robot(
         drawn(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}

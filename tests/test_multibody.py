@@ -12,6 +12,7 @@ from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
+from validation.exudyn_parts import OutOfTime
 from validation.motion import exponential, inverse, logarithm, placement
 from validation.multibody import (
     SimulationFailed,
@@ -460,21 +461,46 @@ def test_the_closing_figure_marks_the_open_closures(rng):
     assert lengths[0] > lengths[1] > 1e6 * lengths[2]
 
 
+def resident():
+    """[MiB] memory of this process."""
+    status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    (line,) = (line for line in status if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024
+
+
 @pytest.mark.slow
 def test_five_hundred_models_leave_nothing_behind(rng):
     """Resident memory after the first fifty, in MiB; a leaked model is half of one."""
-
-    def resident():
-        status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-        (line,) = (line for line in status if line.startswith("VmRSS"))
-        return int(line.split()[1]) / 1024
-
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
         simulate_assembly(posture)
     before = resident()
     for _ in range(500):
         simulate_assembly(posture)
+    assert resident() - before < 10
+
+
+@pytest.mark.slow
+def test_models_with_contacts_and_models_that_fail_leave_nothing_behind():
+    """Functions that Exudyn calls hold their model; those of a hundred are let go.
+
+    Every other one runs out of time; a leaked model is half a MiB.
+    """
+    play = Clearance(axial=3e-5, radial=1e-5)
+    frames = list(coaxial([0, 0, 0, 1e-5, 0, 1e-4]).robot.frames)
+    frames[0] = replace(frames[0], clearance=play)
+    frames.insert(1, Frame("a_tip", "a"))
+    posture = home_posture(Robot("coaxial", "a_tip", tuple(frames), (("a_tip", "b"),)))
+
+    def batch(count):
+        for _ in range(count):
+            simulate_assembly(posture, clearances=True)
+            with pytest.raises(OutOfTime):
+                simulate_assembly(posture, clearances=True, time_limit=0.0)
+
+    batch(10)
+    before = resident()
+    batch(50)
     assert resident() - before < 10
 
 
