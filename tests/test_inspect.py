@@ -201,6 +201,16 @@ def test_an_encoder_offset_at_the_base_turns_the_measuring_frame(tmp_path, rng):
     assert 0 < unknown.left[i] < 0.9 < known.left[i]
 
 
+def test_a_device_that_cannot_be_located_is_said(tmp_path):
+    """One angle in two rows: inspected all the same."""
+    rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
+    folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
+                            toml={"registration": '"unknown"'})  # fmt: skip
+    first = inspect_campaign(read_campaign(folder)).remarks[0]
+    assert (first.about, first.weight) == ("registration", "lost")
+    assert "The registration cannot be found." in first.text
+
+
 def test_a_signature_is_the_derivative_by_hand(tmp_path, rng):
     """The second encoder 1e-5 rad off: the tool turns about the elbow by so much."""
     campaign = elastic_campaign(tmp_path, rng)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
 from assembly.effects.registration import BASE
+from stiffness.reading import BadInput
 from validation.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.registration import register
@@ -27,11 +28,13 @@ class DesignSignatures:
             same in all joints (in each it takes another branch with the load).
         nuisance: (N, p) what an unknown registration does.
         untestable: why an effect has no columns, by effect.
+        unregistered: why an unknown registration cannot be found; empty if it can.
     """
 
     columns: dict[str, NDArray]
     nuisance: NDArray
     untestable: dict[str, str]
+    unregistered: str
 
 
 def design_signatures(
@@ -40,7 +43,7 @@ def design_signatures(
     """Signatures of all effects of the library on a campaign.
 
     An unknown registration is fitted first, so that signatures are read in the axes of
-    the measuring device.
+    the measuring device; where it cannot be found they are read in the base's.
 
     Args:
         campaign: of N measured cells.
@@ -49,9 +52,12 @@ def design_signatures(
     Returns:
         The signatures.
     """
-    here = conditions_of(campaign)
+    here, unregistered = conditions_of(campaign), ""
     if campaign.registration == "unknown":
-        here = register(campaign, here)
+        try:
+            here = register(campaign, here)
+        except BadInput as error:
+            unregistered = str(error)
     tangents = Tangents(campaign, here)
     shown = _one_each(hypotheses(here, loaded_components(campaign)))
     columns, untestable = {}, {}
@@ -80,7 +86,7 @@ def design_signatures(
         base = [k for k, n in enumerate(names) if n in BASE]
         nuisance = columns["registration"][:, base]
         columns["registration"] = np.delete(columns["registration"], base, axis=1)
-    return DesignSignatures(columns, nuisance, untestable)
+    return DesignSignatures(columns, nuisance, untestable, unregistered)
 
 
 def changes_between_repeats(

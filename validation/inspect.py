@@ -17,7 +17,7 @@ from validation.design_signatures import (
     design_signatures,
 )
 from validation.measuring_order import Revisits, revisits
-from validation.remark import Remark
+from validation.remark import LOST, Remark
 from validation.repeats import RepeatNoise, repeat_noise
 from validation.separability import Separability, compare_signatures
 
@@ -109,6 +109,10 @@ def inspect_campaign(
     noise = repeat_noise(campaign, changes_between_repeats(campaign, signatures))
     repeats = revisits(campaign, campaign.repeat)
     visits = revisits(campaign, campaign.configuration)
+    remarks = remarks_on(campaign, repeats, visits, noise)
+    if signatures.unregistered:
+        text = f"The registration cannot be found. {signatures.unregistered}"
+        remarks.insert(0, Remark("registration", LOST, text))
     return Inspection(
         campaign=campaign,
         repeats=repeats,
@@ -116,7 +120,7 @@ def inspect_campaign(
         noise=noise,
         signatures=signatures,
         separability=compare_signatures(signatures.columns, signatures.nuisance),
-        remarks=tuple(remarks_on(campaign, repeats, visits, noise)),
+        remarks=tuple(remarks),
     )
 
 
