@@ -12,7 +12,7 @@ import typer
 
 from assembly.posture import parse_assignments
 from stiffness.reading import BadInput, nearest
-from stiffness.screws import WRENCH
+from stiffness.screws import SCREW, WRENCH
 from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
@@ -73,26 +73,59 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
-    """Gravity (3,) [m/s^2] from ``--gravity``; None if not given.
+    """Gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
+    return parse_vector(texts, "--gravity")
+
+
+def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
+    """Three numbers given by component; None if not given.
 
     Args:
         texts: such as ``["z=-9.81"]``.
+        option: whose they are, for messages.
 
     Returns:
-        Three numbers in base axes.
+        The numbers along x, y and z.
 
     Raises:
         BadInput: a name other than x, y, z, or not a number.
     """
     if not texts:
         return None
-    given = parse_assignments(texts, "--gravity")
+    given = parse_assignments(texts, option)
     for name in given:
-        if name not in "xyz":
-            raise BadInput(
-                f'--gravity: unknown component "{name[:60]}"; valid: x, y, z'
-            )
+        if name not in {"x", "y", "z"}:
+            raise BadInput(f'{option}: unknown component "{name[:60]}"; valid: x, y, z')
     return [given.get(name, 0.0) for name in "xyz"]
+
+
+def parse_direction(texts: list[str] | None) -> list[float] | None:
+    """Direction of a platform screw from ``--direction``, as a unit vector.
+
+    Args:
+        texts: such as ``["tx=1,tz=-1"]``.
+
+    Returns:
+        Six numbers ``[rx ry rz tx ty tz]``; None if not given.
+
+    Raises:
+        BadInput: an unknown component, all zero, or rotation mixed with translation.
+    """
+    if not texts:
+        return None
+    names = [name.lower() for name in SCREW]
+    given = parse_assignments(texts, "--direction")
+    for name in given:
+        if name not in names:
+            hint = nearest(name, names)
+            raise BadInput(f'--direction: unknown component "{name[:60]}"{hint}')
+    length = sum(value**2 for value in given.values()) ** 0.5
+    if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
+        raise BadInput(
+            "--direction: expected components of a translation or of a rotation, not "
+            "all zero, not of both"
+        )
+    return [given.get(name, 0.0) / length for name in names]
 
 
 def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
@@ -206,12 +239,15 @@ def exact(
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
+    gravity: GravityOption = None,
     json: JsonOption = None,
 ) -> None:
     """Close the robot with finite motions: closures hold exactly."""
     from assembly.results import exact_of, exact_text
 
-    results = exact_of(posture_of(robot, pose, joint), parse_load(load))
+    results = exact_of(
+        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity)
+    )
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -236,6 +272,14 @@ def error(
     tolerance_translation: Annotated[
         float, typer.Option(help="[m] upper minus lower bound.")
     ] = 1e-6,
+    point: Annotated[
+        list[str] | None,
+        typer.Option(help="Of the platform, in its axes [m], such as x=0.1,z=-0.05."),
+    ] = None,
+    direction: Annotated[
+        list[str] | None,
+        typer.Option(help="Also the largest error along it, such as tx=1,tz=-1."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the platform's largest pose error, problem (27)."""
@@ -256,8 +300,10 @@ def error(
             option = "--" + key.replace("_", "-")
             raise BadInput(f"{option}: found {value}, expected a finite number > 0")
     results = pose_error_of(
-        posture_of(robot, pose, joint), reading or READINGS, **options
-    )
+        posture_of(robot, pose, joint), reading or READINGS,
+        point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
+        direction=parse_direction(direction), **options,
+    )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
@@ -380,11 +426,18 @@ def plot(
         list[str] | None,
         typer.Option(help="Where to stand on other axes, such as draw=3."),
     ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(help="histogram | tornado | allocation; else what the file is."),
+    ] = None,
 ) -> None:
-    """Draw a saved sweep: six maps over two axes, or lines along one."""
+    """Draw a saved file: maps or lines of a sweep, histograms, tornado, tolerances."""
     from assembly.dataset import open_dataset
     from assembly.maps import figure_of
+    from assembly.statistics_plot import KINDS, figure_of_draws
 
+    if kind is not None and kind not in KINDS:
+        raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
     check_writable(output)
     places = {}
     for text in at or ():
@@ -392,7 +445,12 @@ def plot(
         if not equals:
             raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
         places[name] = value
-    save_figure(figure_of(open_dataset(file), places), output)
+    data = open_dataset(file)
+    try:
+        drawn = figure_of_draws(data, kind)
+    except ValueError as error:
+        raise BadInput(f"{file}: {error}") from None
+    save_figure(drawn or figure_of(data, places), output)
 
 
 def save_figure(figure: Any, path: Path) -> None:

@@ -107,12 +107,15 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale == 0.0:
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    low = 0.0 if positive else float(x.min()) - 4 * scale
-    counts, edges = np.histogram(x, _BINS, (low, float(x.max()) + 4 * scale))
+    # a long tail must not widen the bins: the density is not highest so far out
+    ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
+    low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
+    high = min(float(x.max()) + 4 * scale, float(ends[1]))
+    counts, edges = np.histogram(x, _BINS, (low, high))
     step = edges[1] - edges[0]
     width = 0.9 * scale * len(x) ** -0.2 / step
     rng = np.random.default_rng(seed)
-    tables = rng.multinomial(len(x), counts / counts.sum(), _RESAMPLES)
+    tables = rng.multinomial(int(counts.sum()), counts / counts.sum(), _RESAMPLES)
     modes = [_mode(table, width, positive) for table in (counts, *tables)]
     at = edges[0] + (np.array(modes) + 0.5) * step
     lower, upper = np.quantile(at[1:], [(1 - level) / 2, (1 + level) / 2])
@@ -219,3 +222,37 @@ def _described(values: NDArray, level: float) -> dict[str, Any]:
         "quantiles": {str(q): quantile(values, q, level) for q in QUANTILES},
         "most_probable": often,
     }
+
+
+def summary_text(summary: Mapping[str, Any]) -> str:
+    """What :func:`summarise` says, for people."""
+
+    def share(found: Mapping[str, float]) -> str:
+        low, high = found["lower"], found["upper"]
+        return f"{found['probability']:.5g} ({low:.5g} to {high:.5g})"
+
+    lines = [
+        f"{summary['draws']} draws; in brackets {summary['confidence']:.0%} intervals"
+    ]
+    words = {
+        "forced": "goes together, by force if need be",
+        "rigid": "goes together by play alone, compliant joints rigid",
+        "rigid_compliant_free": "goes together by play alone, compliant joints free",
+    }
+    for key, found in summary["assembles"].items():
+        lines.append(f"{words[key]}: {share(found)}")
+    for key, found in summary["exceeds"].items():
+        lines.append(f"{key} above {found['limit']:g}: {share(found)}")
+    if "within_limits" in summary:
+        lines.append(f"yield, all limits met: {share(summary['within_limits'])}")
+    for key, found in summary["quantities"].items():
+        if not found:
+            continue
+        often, half = found["most_probable"], found["quantiles"]["0.5"]
+        high = found["quantiles"]["0.95"]
+        lines.append(
+            f"{key}: most probable {often['value']:.4g}, median {half['value']:.4g} "
+            f"({half['lower']:.4g} to {half['upper']:.4g}), 95 % below "
+            f"{high['value']:.4g} ({high['lower']:.4g} to {high['upper']:.4g})"
+        )
+    return "\n".join(lines)

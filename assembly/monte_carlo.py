@@ -5,7 +5,7 @@ draw depends on its own number and the seed alone.  With a file, finished blocks
 journal beside it from the first on: a run that was killed goes on where it stopped.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cached_property
@@ -106,6 +106,21 @@ class Experiment:
         shapes |= dict.fromkeys(self.zones, ())
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
         return np.dtype([*fields, ("status", "u1")])
+
+    def check_limits(self, limits: Iterable[str]) -> None:
+        """Refuse limits on what is not computed here.
+
+        Raises:
+            BadInput: margins were left out, or no link's stress is known.
+        """
+        for name in limits:
+            if name.startswith("margin") and not self.margins:
+                raise BadInput(f"limit {name}: the margins were left out")
+            if name == "stress" and not self.links:
+                raise BadInput(
+                    f"limit stress: no link of {self.posture.robot.name} has a shape "
+                    "from which its stress follows"
+                )
 
     def solve(self, first: int, count: int) -> NDArray:
         """Rows of the draws ``first`` .. ``first + count - 1``."""
@@ -273,6 +288,11 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     return xarray.Dataset(variables, labels, provenance(experiment) | said)
 
 
+def limit_names() -> tuple[str, ...]:
+    """Quantities that may be limited."""
+    return tuple(k for k in UNITS if k not in {"platform_screw", "duality_gap"})
+
+
 def parse_limit(text: str) -> tuple[str, float]:
     """Quantity and limit from text such as ``"energy=5"``.
 
@@ -287,7 +307,7 @@ def parse_limit(text: str) -> tuple[str, float]:
         BadInput: not of that form.
     """
     name, _, number = (piece.strip() for piece in text.partition("="))
-    valid = [key for key in UNITS if key not in {"platform_screw", "duality_gap"}]
+    valid = limit_names()
     if name not in valid:
         raise BadInput(f'--limit: unknown quantity "{name[:60]}"{nearest(name, valid)}')
     try:

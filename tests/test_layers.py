@@ -42,7 +42,7 @@ OWNERS = {
         "assembly/dataset.py",
         "assembly/monte_carlo.py",
         "assembly/importance.py",
-        "assembly/allocation.py",
+        "assembly/tolerances.py",
         "stiffness/library.py",
     ),
     "h5netcdf": ("assembly/dataset.py",),
