@@ -7,11 +7,13 @@ tasks to others.  How blocks are spread changes no number: each process computes
 thread, and points do not depend on their neighbours.
 """
 
+import logging
 import pickle
 import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from functools import lru_cache
 from importlib.metadata import version
@@ -54,6 +56,8 @@ def cluster_solver(
     def solve(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
         from distributed import Client, LocalCluster
 
+        # what matters of it is said by the sweep, in one message
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
                 yield from _spread(client, sweep, iter(blocks), report)
@@ -128,6 +132,11 @@ def _spread(
                 raise BadInput(
                     "sweep: some points killed every worker they were given to, as "
                     "when memory runs out; the journal keeps all others"
+                ) from None
+            except CancelledError:
+                raise BadInput(
+                    "sweep: the connection to the scheduler was lost; finished points "
+                    "are in the journal, the same command goes on"
                 ) from None
             future.release()
             times.append(seconds)

@@ -127,7 +127,27 @@ def _solve_variant(
     errors = None
     if question.sources is not None:
         errors = _errors(question, points.draws[at - first])
-    _solve_reached(question, robot, perfect, some, errors, found, at)
+    _solve_or_split(question, robot, perfect, some, errors, found, at)
+
+
+def _solve_or_split(
+    question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
+    errors: NDArray | None, found: Found, rows: NDArray,
+) -> None:  # fmt: skip
+    """Points whose posture exists; where one breaks the others', one at a time."""
+    try:
+        _solve_reached(question, robot, perfect, postures, errors, found, rows)
+    except (np.linalg.LinAlgError, SolverFailed) as error:
+        if len(rows) == 1:
+            row = int(rows[0])
+            _fail(found, range(row, row + 1), "solver failed", str(error))
+            return
+        for i in range(len(rows)):
+            one = slice(i, i + 1)
+            own = None if errors is None else errors[one]
+            _solve_or_split(
+                question, robot, perfect, postures[one], own, found, rows[one]
+            )
 
 
 def _fail(found: Found, rows: range, status: str, reason: str) -> None:
@@ -154,7 +174,7 @@ def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, found: Found, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Points whose posture exists; one that fails stops nothing."""
+    """Points whose posture exists; most of what fails is a status already."""
     T = np.array([posture.transforms for posture in postures])
     off = np.array([posture.mismatch for posture in postures])
     out = found.records

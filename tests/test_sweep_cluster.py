@@ -129,6 +129,26 @@ def test_a_worker_killed_halfway_loses_nothing(cluster, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_scheduler_that_dies_is_one_message_and_the_sweep_goes_on(cluster, tmp_path):
+    sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
+    kept = []
+
+    def kill(done, _):
+        kept.append(done)
+        if done > 100:
+            cluster.processes[0].kill()
+
+    with pytest.raises(BadInput, match="connection to the scheduler was lost"):
+        run_sweep(
+            sweep, tmp_path / "map.nc", kill, cluster_solver(scheduler=cluster.address)
+        )
+    resumed = []
+    run_sweep(sweep, tmp_path / "map.nc", lambda done, _: resumed.append(done))
+    assert resumed[0] == kept[-1]
+    assert resumed[-1] == sweep.size
+
+
+@pytest.mark.slow
 def test_workers_on_this_machine_give_the_same_bytes(tmp_path):
     command = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar",
                "--grid", "tx=-0.04:0.04:0.004,ty=0.10:0.15:0.01"]  # fmt: skip

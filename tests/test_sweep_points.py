@@ -160,6 +160,30 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     assert summary_of(data)["status"] == {"invalid robot": 2, "ok": 2}
 
 
+def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
+    """The third of five postures raises in the middle of its block."""
+    from assembly import points
+
+    solve, axes = points.minimise_energies, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
+    expected = sweep_poses(robot, axes)
+    bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
+
+    def breaks(robot, T, errors, off):
+        at = T[:, robot.index(robot.platform), :3, 3]
+        if np.any(np.linalg.norm(at - bad, axis=1) < 1e-6):
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return solve(robot, T, errors, off)
+
+    monkeypatch.setattr(points, "minimise_energies", breaks)
+    data = sweep_poses(robot, axes).squeeze()
+    assert data.status.values.tolist() == ["ok", "ok", "solver failed", "ok", "ok"]
+    assert data.reason.values[2] == "SVD did not converge"
+    others = [0, 1, 3, 4]
+    found = data.energy.values[others]
+    assert np.array_equal(found, expected.energy.values.ravel()[others])
+    assert np.isnan(data.energy.values[2])
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
