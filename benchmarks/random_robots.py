@@ -24,7 +24,7 @@ from validation.generator_springs import rest_on_springs
 from validation.motion import turn_of
 from validation.multibody import SimulationFailed, without_clearance
 
-KINDS = ("arm", "arm", "arm", "3rrr", "five_bar", "hexapod", "delta")
+KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
 _MOST = 1.5e-3  # [rad, m] anywhere within reach
 _ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] by declared errors, by the largest load
 

@@ -85,7 +85,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
         [m.coordinates.get(f.name, 0.0) for f in m.robot.frames] for m in machines
     ])
     parts = _taken_apart(machines, q)
-    newton, unit = _newton(parts)
+    newton, unit = _newton(parts, q)
     size = 6 * len(parts.pairs)
     wrenches = np.zeros((len(q), len(parts.pairs), 6))
     screws = np.zeros((2, *q.shape, 6))
@@ -207,14 +207,24 @@ def _axes(parts: _Parts, T: NDArray) -> NDArray:
     return np.stack(columns, axis=1) if columns else np.zeros((len(T), 0, 6))
 
 
-def _newton(parts: _Parts) -> tuple[NDArray, float]:
+def _newton(parts: _Parts, q: NDArray) -> tuple[NDArray, float]:
     """Inverses of the matrix of the head, and the compliance that scales wrenches."""
-    machines, passive = len(parts.nominal), len(parts.passive)
+    # rows of one configuration and the same springs have the same matrix
+    told_apart = np.hstack([
+        q,
+        parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
+    ])
+    first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)[
+        1:
+    ]
+    nominal, C = parts.nominal[first], parts.compliances.sum(axis=0)[first]
+    machines, passive = len(first), len(parts.passive)
     size = 6 * len(parts.pairs)
-    maps, s = _maps(parts.nominal), parts.signs
-    met = maps @ parts.compliances.sum(axis=0) @ np.swapaxes(maps, -1, -2)
-    S = np.einsum("an,bn,knij->kaibj", s, s, met).reshape(machines, size, size)
-    axes = _axes(parts, parts.nominal)
+    maps, s = _maps(nominal), parts.signs
+    met = maps @ C @ np.swapaxes(maps, -1, -2)
+    S = np.einsum("an,bn,knij->kaibj", s, s, met, optimize=True)
+    S = S.reshape(machines, size, size)
+    axes = _axes(parts, nominal)
     # a closure's wrench passes a joint if the joint is on one of its chains only
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
@@ -224,7 +234,7 @@ def _newton(parts: _Parts) -> tuple[NDArray, float]:
     M[:, :size, :size] = -S / unit
     M[:, :size, size:] = -A
     M[:, size:, :size] = np.swapaxes(A, 1, 2)
-    return -np.linalg.pinv(M, rcond=_RANK), unit
+    return -np.linalg.pinv(M, rcond=_RANK)[same.ravel()], unit
 
 
 def _carried(
