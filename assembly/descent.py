@@ -2,7 +2,7 @@ r"""One step towards the exact equilibrium: expand, solve, draw back, accept or 
 
 Near a placement x the closures are linearised and the Lagrangian
 
-    L = |y|^2 / 2 - w . x_p(x) - lambda . r(x)
+    L = |y|^2 / 2 - W(x) - lambda . r(x)
 
 is expanded to second order, with its true Hessian: the closures' curvature times the
 wrenches they carry outweighs soft springs, which is where Gauss-Newton stalls.  Springs
@@ -33,6 +33,14 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh, svd
 
 from assembly.conic import SolverFailed, cone_sizes, into_cones
+from assembly.dead_load import (
+    DeadLoads,
+    curvature_of,
+    largest_wrench,
+    size_of_pull,
+    slopes_of,
+    work_of,
+)
 from assembly.finite import Placement
 from assembly.rims import PlayProblem, across_rims, move_play, rim_forces
 
@@ -65,7 +73,7 @@ class Expansion:
 
     Attributes:
         here: the placement.
-        load: (6,) [N m, N] on the platform.
+        loads: on the robot.
         gradient: (N,) [J] of energy minus work.
         hessian: (N, N) [J] of the Lagrangian.
         multipliers: (6 K,) of the closures.
@@ -78,7 +86,7 @@ class Expansion:
     """
 
     here: Placement
-    load: NDArray
+    loads: DeadLoads
     gradient: NDArray
     hessian: NDArray
     multipliers: NDArray
@@ -123,12 +131,12 @@ class Step:
     damping: float
 
 
-def expand(here: Placement, load: NDArray, rigid: NDArray) -> Expansion:
+def expand(here: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     """Closures to first and the Lagrangian to second order.
 
     Args:
         here: a placement.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        loads: on the robot.
         rigid: (6 K,) guess of the multipliers of closures that only clearances reach;
             the others are those that balance springs and free motions best.
 
@@ -138,7 +146,7 @@ def expand(here: Placement, load: NDArray, rigid: NDArray) -> Expansion:
     model, A = here.model, here.rows
     loose = np.ones(len(here.x), dtype=bool)
     loose[model.bounded] = False
-    gradient = -here.platform_rows.T @ load
+    gradient = -slopes_of(here, loads)
     gradient[model.springs] += here.x[model.springs]
     unit = model.units[loose]
     U, S, Vt = svd(A[:, loose] * unit, full_matrices=True)
@@ -147,10 +155,10 @@ def expand(here: Placement, load: NDArray, rigid: NDArray) -> Expansion:
     inverse = still[:, :rank] @ grip.T
     multipliers = inverse.T @ gradient[loose] + rest @ (rest.T @ rigid)
     rows, left = _independent(rest.T @ A[:, ~loose])
-    hessian = -here.curvature(multipliers, load)
+    hessian = -curvature_of(here, multipliers, loads)
     hessian[model.springs, model.springs] += np.eye(model.springs.stop)
     return Expansion(
-        here, load, gradient, hessian, multipliers, loose, inverse,
+        here, loads, gradient, hessian, multipliers, loose, inverse,
         _basis(loose, inverse @ A[:, ~loose], still[:, rank:]),
         rows, rows @ here.x[~loose] - left.T @ (rest.T @ here.residual), rest @ left,
     )  # fmt: skip
@@ -179,11 +187,15 @@ def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
     return U[:, :rank].T @ rows, U[:, :rank]
 
 
-def potential(place: Placement, load: NDArray) -> float:
-    """[J] elastic energy minus the load's work."""
+def energy_of(place: Placement) -> float:
+    """[J] elastic energy."""
     y = place.x[place.model.springs]
-    work = float(load @ place.platform_screw) if load.any() else 0.0
-    return float(y @ y) / 2 - work
+    return float(y @ y) / 2
+
+
+def potential(place: Placement, loads: DeadLoads) -> float:
+    """[J] elastic energy minus the loads' work."""
+    return energy_of(place) - work_of(place, loads)
 
 
 def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Step:
@@ -204,16 +216,16 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     start = local.here
     left_open = penalty * float(np.linalg.norm(start.residual))
     least = float(np.abs(local.multipliers).max(initial=local.small_wrench))
-    least = max(least, float(np.abs(local.load / start.model.scale).max()))
-    before = potential(start, local.load) + left_open
-    noise = 1e-13 * (abs(before) + abs(potential(start, np.zeros(6))))
+    least = max(least, largest_wrench(start, local.loads))
+    before = potential(start, local.loads) + left_open
+    noise = 1e-13 * (abs(before) + abs(energy_of(start)))
     noise += 1e-14 * penalty
     for attempt in range(_ATTEMPTS):
         # refused, Newton's step is followed by the conic one before either is damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton)
         if step is not None and step.length <= LONGEST:
-            after = potential(step.there, local.load)
+            after = potential(step.there, local.loads)
             after += penalty * float(np.linalg.norm(step.there.residual))
             expected = step.gain + left_open
             if before - after >= 1e-4 * expected - noise:
@@ -300,7 +312,7 @@ def imbalance(local: Expansion) -> float:
     here, A, model = local.here, local.here.rows, local.here.model
     left = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
-    pull = np.abs(here.platform_rows).T @ np.abs(local.load)
+    pull = size_of_pull(here, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + pull
     # within a cone nothing pulls; at its rim the pull is straight outward
     u, group = here.x[model.bounded], model.joints.group

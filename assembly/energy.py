@@ -171,6 +171,18 @@ class Assembly:
         errors = float(body @ self.posture.robot.errors.ravel())
         return -errors - float(springs @ springs) / 2 - play - slip
 
+    def has_loads(
+        self,
+        load: ArrayLike | None = None,
+        bodies: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+    ) -> bool:
+        """Whether these, as of :func:`solve_assembly`, are its loads."""
+        other = _all_forces(self.posture, load, bodies, gravity)
+        return np.array_equal(other.body, self.forces.body) and np.array_equal(
+            other.joint, self.forces.joint
+        )
+
     def closure_residual(self) -> float:
         """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
         left = self.linearisation.rows @ self.screws.ravel()
@@ -220,11 +232,7 @@ def solve_assembly(
     """
     lin = linearise(posture)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    carried = None
-    if gravity is not None:
-        own, carried = weights(posture, gravity)
-        bodies = own if bodies is None else own + np.asarray(bodies)
-    forces = forces_on(posture, wrench, bodies, carried)
+    forces = _all_forces(posture, wrench, bodies, gravity)
     robot = posture.robot
     try:
         answer = solve_with(lin, virtual_joints(robot), wrench, forces)
@@ -237,6 +245,20 @@ def solve_assembly(
     # the bound of a passive joint's own motion was left out, but it matters
     joints = virtual_joints(robot, bounded_motion=True)
     return solve_with(lin, joints, wrench, forces)
+
+
+def _all_forces(
+    posture: Posture,
+    load: ArrayLike | None,
+    bodies: ArrayLike | None,
+    gravity: ArrayLike | None,
+) -> Forces:
+    """Forces of everything that :func:`solve_assembly` takes."""
+    carried = None
+    if gravity is not None:
+        own, carried = weights(posture, gravity)
+        bodies = own if bodies is None else own + np.asarray(bodies)
+    return forces_on(posture, load, bodies, carried)
 
 
 def solve_with(

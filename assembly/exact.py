@@ -4,7 +4,7 @@ Springs, clearance cones and geometric errors are those of the linear virtual-jo
 model (:mod:`assembly.energy`); only the closures differ: motions follow one another as
 in :mod:`assembly.finite`.  Minimised is the springs' energy minus the work of a load,
 
-    minimise  |y|^2 / 2 - w . x_p(y, u, q)
+    minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
 
 by the steps of :mod:`assembly.descent`, from the linear answer.
@@ -15,6 +15,7 @@ symbol  code                  shape     meaning
 x_p     ``platform_screw``    (6,)      rotation vector of R R_nominal^T and shift of
                                         the platform's origin, base axes
 w       ``load``              (6,)      force: dead; moment: what has the work m . theta
+W       ``loads``             J         work of weights and of loads on bodies
 r       ``closure_residual``  (6 K,)    logarithms of what closures leave open
 ======  ====================  ========  ==============================================
 
@@ -31,12 +32,19 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.clearance import clearance_bounds, clearance_excess, has_bounded_motion
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.conic import into_cones
+from assembly.dead_load import (
+    DeadLoads,
+    dead_loads,
+    work_of,
+    wrenches_on_frames,
+)
 from assembly.descent import (
     CLOSED,
     LONGEST,
     Expansion,
     NotConverged,
     advance,
+    energy_of,
     expand,
     imbalance,
     least_curvature,
@@ -99,7 +107,12 @@ class ExactAssembly:
     @property
     def load(self) -> NDArray:
         """(6,) [N m, N] on the platform at its origin, base axes."""
-        return self.expansion.load
+        return self.loads.load
+
+    @property
+    def loads(self) -> DeadLoads:
+        """All that acts on the robot."""
+        return self.expansion.loads
 
     @property
     def multipliers(self) -> NDArray:
@@ -119,12 +132,12 @@ class ExactAssembly:
     @property
     def energy(self) -> float:
         """[J] elastic energy stored."""
-        return potential(self.placement, np.zeros(6))
+        return energy_of(self.placement)
 
     @property
     def potential(self) -> float:
-        """[J] energy minus the work of the load."""
-        return self.energy - float(self.load @ self.platform_screw)
+        """[J] energy minus the work of the loads."""
+        return potential(self.placement, self.loads)
 
     @property
     def platform_screw(self) -> NDArray:
@@ -162,18 +175,30 @@ class ExactAssembly:
         """
         return self.multipliers.reshape(-1, 6) * self.placement.model.scale
 
-    @cached_property
+    @property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on the inner through each frame.
+        """(n, 6) [N m, N] what the outer part exerts on the inner through each body.
 
         At the frame where it is, after its small motions, in its axes there.
         """
+        return self._through[0]
+
+    @property
+    def joint_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] the same through each joint.
+
+        They differ from :attr:`wrenches` by loads on the body, its weight for one.
+        """
+        return self._through[1]
+
+    @cached_property
+    def _through(self) -> NDArray:
+        """(2, n, 6) [N m, N] through bodies and joints."""
         robot, T = self.posture.robot, self.transforms
-        through = closure_signs(robot).T @ self.closure_wrenches
-        loaded = robot.on_path[robot.index(robot.platform)]
-        through = through + loaded[:, None] * self.placement.load_wrench(self.load)
+        closing = closure_signs(robot).T @ self.closure_wrenches
+        held = wrenches_on_frames(self.placement, self.loads)
         readings = screw_map(T[:, :3, 3] - self.posture.platform[:3, 3], T[:, :3, :3])
-        return np.einsum("nji,nj->ni", readings, through)
+        return np.einsum("nji,knj->kni", readings, closing + np.stack(held))
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
@@ -195,7 +220,11 @@ class ExactAssembly:
 
 
 def solve_exact(
-    posture: Posture, load: ArrayLike | None = None, start: Assembly | None = None
+    posture: Posture,
+    load: ArrayLike | None = None,
+    start: Assembly | None = None,
+    bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear answer.
 
@@ -204,52 +233,56 @@ def solve_exact(
             springs are the robot's.
         load: (6,) [N m, N] on the platform at its origin, base axes.  The force is
             dead; the moment's work is its product with the rotation vector.
-        start: the linear answer for this posture and load, if it is there already.
+        start: the linear answer for this posture and these loads, if it is there.
+        bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
+            frame's origin, base axes; moments are couples of dead forces.
+        gravity: (3,) [m/s^2] base axes; see :mod:`assembly.dead_load` for links.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
 
     Raises:
         CannotAssemble: the linear model has no answer to start from.
-        FreeMotion: the load drives a motion that nothing resists.
+        FreeMotion: a load drives a motion that nothing resists.
         NotConverged: no equilibrium was found; a :class:`SolverFailed`.
-        ValueError: ``start`` belongs to another posture or load.
+        ValueError: ``start`` belongs to another posture or other loads.
     """
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    linear = solve_assembly(posture, wrench) if start is None else start
-    if linear.posture is not posture or not np.array_equal(linear.load, wrench):
+    loads = dead_loads(posture, load, bodies, gravity)
+    if start is None:
+        start = solve_assembly(posture, loads.load, bodies, gravity)
+    elif start.posture is not posture or not start.has_loads(load, bodies, gravity):
         raise ValueError(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"
         )
-    answer = _search(linear.joints, linear, wrench)
+    answer = _search(start.joints, start, loads)
     if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
         # the bound of a passive joint's own motion was left out, but it matters
         joints = virtual_joints(posture.robot, bounded_motion=True)
-        answer = _search(joints, linear, wrench)
+        answer = _search(joints, start, loads)
     return answer
 
 
-def _search(joints: VirtualJoints, linear: Assembly, load: NDArray) -> ExactAssembly:
+def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactAssembly:
     """Step after step from the linear answer."""
     model = FiniteRobot(linear.posture, joints)
     here = model.place(_begin(model, linear))
     rigid = np.zeros(len(here.residual))
     penalty, damping, near = 0.0, 0.0, False
     for count in range(1, _STEPS + 1):
-        local = expand(here, load, rigid)
+        local = expand(here, loads, rigid)
         penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
         step = advance(local, penalty, damping, near)
         here, rigid, damping = step.there, step.rigid, step.damping
-        scale = max(_energy_scale(here, linear, load), local.small_energy)
+        scale = max(_energy_scale(here, linear, loads), local.small_energy)
         near = step.decrement <= _NEAR * scale
         still = damping == 0.0 and step.length <= _STILL
         still = still or abs(step.decrement) <= _DECREMENT * scale
         if still and here.largest_gap <= CLOSED + linear.posture.mismatch:
-            last = expand(here, load, rigid)
+            last = expand(here, loads, rigid)
             if imbalance(last) <= _STATIONARY:
                 return ExactAssembly(linear, last, imbalance(last), count)
-    left = imbalance(expand(here, load, rigid))
+    left = imbalance(expand(here, loads, rigid))
     raise NotConverged(
         whose(here),
         f"after {_STEPS} steps closures are open by {here.largest_gap:.2g} and forces "
@@ -268,8 +301,8 @@ def _begin(model: FiniteRobot, linear: Assembly) -> NDArray:
     return x
 
 
-def _energy_scale(here: Placement, linear: Assembly, load: NDArray) -> float:
+def _energy_scale(here: Placement, linear: Assembly, loads: DeadLoads) -> float:
     """[J] size of the energies at play."""
-    energy = potential(here, np.zeros(6))
-    work = abs(potential(here, load) - energy)
-    return max(energy, work, 1e-3 * linear.energy_without_play)
+    return max(
+        energy_of(here), abs(work_of(here, loads)), 1e-3 * linear.energy_without_play
+    )

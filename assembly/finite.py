@@ -45,6 +45,7 @@ from assembly.motion import (
 )
 from assembly.nominal import size_of
 from assembly.posture import Posture
+from assembly.robot import Robot
 from stiffness.screws import (
     rotation_matrix,
     rotation_vector,
@@ -185,6 +186,12 @@ class FiniteRobot:
         return np.sign(along[:, None, :] - along[:, :, None])
 
     @cached_property
+    def comes_before(self) -> NDArray:
+        """(N, N) 1 where the second unknown moves by the first's, 1/2 in one motion."""
+        above = self.posture.robot.on_path[self.frame][:, self.frame].T
+        return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
+
+    @cached_property
     def bodies(self) -> NDArray:
         """(n, 4, 4) bodies with their geometric errors, seen from after the parent."""
         robot = self.posture.robot
@@ -245,10 +252,10 @@ class Placement:
         """(5, n, 4, 4) before each of a frame's motions, and after all small ones."""
         robot = self.model.posture.robot
         link, play, spring = exponential(self.screws)
-        local = [self.model.bodies, link, play, spring, self._along_own(self.own)]
+        local = [self.model.bodies, link, play, spring, along_own(robot, self.own)]
         for k in range(1, 5):
             local[k] = local[k - 1] @ local[k]
-        step = local[4] @ self._along_own(self.model.posture.coordinates)
+        step = local[4] @ along_own(robot, self.model.posture.coordinates)
         after = np.empty_like(step)
         before = np.empty_like(step)
         for i, parent in enumerate(robot.parents):
@@ -256,12 +263,16 @@ class Placement:
             after[i] = before[i] @ step[i]
         return np.stack([before @ T for T in local])
 
-    def _along_own(self, coordinates: NDArray) -> NDArray:
-        """(n, 4, 4) motions about or along each joint's z."""
-        screws = np.zeros((len(coordinates), 6))
-        axes = [frame.own_axis for frame in self.model.posture.robot.frames]
-        screws[np.arange(len(axes)), axes] = coordinates
-        return exponential(screws)
+    @property
+    def bodies(self) -> NDArray:
+        """(n, 4, 4) ends of the bodies, before their joint's play and springs."""
+        return self._poses[1]
+
+    @cached_property
+    def carried(self) -> NDArray:
+        """(n, 4, 4) what the joints carry: frames after their joint's coordinate."""
+        posture = self.model.posture
+        return self.transforms @ along_own(posture.robot, posture.coordinates)
 
     @property
     def transforms(self) -> NDArray:
@@ -376,10 +387,18 @@ class Placement:
             here = self.load_wrench(load)
             through = through + m.on_platform[:, None] * here
             H += self._load_curvature(load)
-        return H + self._within(through)
+        return H + self.bent(through)
 
-    def _within(self, through: NDArray) -> NDArray:
-        """Part of the curvature that comes from each exponential by itself."""
+    def bent(self, through: NDArray) -> NDArray:
+        """Part of the curvature that comes from each exponential by itself.
+
+        Args:
+            through: (N, 6) wrench on what each unknown moves, at the platform's nominal
+                origin, base axes.
+
+        Returns:
+            (N, N) symmetric.
+        """
         m = self.model
         local = np.einsum("nji,nj->ni", self._readings, through)
         wrenches = np.zeros((4, len(self.own), 6))
@@ -408,3 +427,16 @@ class Placement:
         outer = np.outer(load[:3], turn)
         round_ = (outer + outer.T) / 2 - (load[:3] @ turn) * np.eye(3)
         return H + (pull + pull.T) / 2 + W[:3].T @ round_ @ W[:3] / 6
+
+
+def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
+    """(n, 4, 4) motions about or along each joint's z by (n,) coordinates."""
+    screws = np.zeros((len(coordinates), 6))
+    axes = [frame.own_axis for frame in robot.frames]
+    screws[np.arange(len(axes)), axes] = coordinates
+    return exponential(screws)
+
+
+def carried_nominally(posture: Posture) -> NDArray:
+    """(n, 4, 4) what the joints carry where nothing is wrong."""
+    return posture.transforms @ along_own(posture.robot, posture.coordinates)

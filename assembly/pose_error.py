@@ -123,9 +123,11 @@ class Reach:
         from assembly.support import Body
 
         starts = np.searchsorted(self.group, np.arange(self.group.max(initial=-1) + 2))
-        arrays = (self.centre, self.map, self.rows, self.start)
-        own = (np.require(a, requirements=["C", "W"]) for a in arrays)
-        return Body(*own, starts)
+        centre, X, H, start = (
+            np.require(a, requirements=["C", "W"])
+            for a in (self.centre, self.map, self.rows, self.start)
+        )
+        return Body(centre, X, H, start, starts)
 
     def _feasible(self, v: NDArray) -> NDArray:
         """A nearby v that satisfies rows and cones to rounding."""

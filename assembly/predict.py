@@ -131,9 +131,7 @@ def _solve(
     """The linear or the exact answer."""
     if not exact:
         return solve_assembly(posture, load, gravity=gravity)
-    if gravity is not None:
-        raise SolverFailed("exact equilibrium", "weight, which it does not know")
-    return solve_exact(posture, load)
+    return solve_exact(posture, load, gravity=gravity)
 
 
 def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> Posture:

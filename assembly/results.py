@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
-from assembly.load import forces_on
 from assembly.mobility import mobility
-from assembly.pose_error import bound_pose_error
+from assembly.pose_error import bound_pose_error, reachable_screws
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
 from assembly.zone import zone_margin
@@ -69,13 +68,14 @@ def solution_of(
     empty = {"energy": None, "platform_screw": None, "frames": None, "closures": None}
     try:
         results["zone"] = zone_of(posture)
-        return results | _answer(solve_assembly(posture, load, gravity=gravity))
+        answer = solve_assembly(posture, load, gravity=gravity)
+        return results | _answer(answer, gravity)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = _STATUS[_kind(error)]
         return results | empty | {"status": status, "reason": str(error)}
 
 
-def _answer(answer: Assembly) -> dict[str, Any]:
+def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
     """The part that only a solved assembly has."""
     certificate = {
         "closure_residual": answer.closure_residual(),
@@ -88,22 +88,20 @@ def _answer(answer: Assembly) -> dict[str, Any]:
         **_screws_and_wrenches(answer),
         "certificate": certificate,
         "ranks": answer.ranks,
-        "linearisation_error": _linearisation_error(answer),
+        "linearisation_error": _linearisation_error(answer, gravity),
     }
 
 
 def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
     """Energy, pose error, and what happens at every frame and closure."""
     robot = answer.posture.robot
-    # a body's own weight is what the two may differ by; the exact model has none
-    through = answer.joint_wrenches if isinstance(answer, Assembly) else answer.wrenches
     frames = {
         f.name: {
             "clearance": answer.clearance_screws[i],
             "link": answer.link_screws[i],
             "joint": answer.joint_screws[i],
             "wrench": answer.wrenches[i],
-            "joint_wrench": through[i],
+            "joint_wrench": answer.joint_wrenches[i],
         }
         for i, f in enumerate(robot.frames)
     }
@@ -120,24 +118,26 @@ def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
     }
 
 
-def _linearisation_error(answer: Assembly) -> dict[str, Any]:
+def _linearisation_error(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
     """What the linear closures cost here: linear minus exact, or why it is unknown."""
-    platform_only = forces_on(answer.posture, answer.load)
-    if not np.array_equal(platform_only.joint, answer.forces.joint):
-        return {"status": "not known with weights and loads on bodies"}
     try:
-        exact = solve_exact(answer.posture, answer.load, answer)
+        exact = solve_exact(answer.posture, answer.load, answer, gravity=gravity)
     except SolverFailed as error:
         return {"status": str(error)}
     return {"status": "ok", **vars(exact.linearisation_error)}
 
 
-def exact_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, Any]:
+def exact_of(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> dict[str, Any]:
     """Everything ``assembly exact`` reports, as plain values.
 
     Args:
         posture: where the robot stands.
         load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
 
     Returns:
         The keys of ``assembly solve`` for finite motions; ``status`` as there.
@@ -146,7 +146,7 @@ def exact_of(posture: Posture, load: ArrayLike | None = None) -> dict[str, Any]:
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
     }  # fmt: skip
     try:
-        answer = solve_exact(posture, load)
+        answer = solve_exact(posture, load, gravity=gravity)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
     certificate = {
@@ -215,13 +215,19 @@ def _linearisation_text(found: dict[str, Any]) -> str:
 
 
 def pose_error_of(
-    posture: Posture, readings: Sequence[str], **options: Any
+    posture: Posture,
+    readings: Sequence[str],
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    direction: ArrayLike | None = None,
+    **options: Any,
 ) -> dict[str, Any]:
     """Everything ``assembly error`` reports, as plain values.
 
     Args:
         posture: where the robot stands.
         readings: of problem (27).
+        point: (3,) [m] whose translation is asked for, platform axes.
+        direction: (6,) along which the largest error is asked for too.
         options: of :func:`assembly.pose_error.bound_pose_error`.
 
     Returns:
@@ -232,10 +238,19 @@ def pose_error_of(
         "status": "ok",
         "pose": posture.pose(),
         "error": None,
+        "point": np.asarray(point, dtype=float),
     }
+    offset = posture.platform[:3, :3] @ results["point"]
     try:
         answer = solve_assembly(posture)
-        found = [bound_pose_error(answer, name, **options) for name in readings]
+        found = [
+            bound_pose_error(answer, name, offset=offset, **options)
+            for name in readings
+        ]
+        along = {
+            name: _support(answer, name, offset, direction, **options)
+            for name in readings if direction is not None
+        }  # fmt: skip
     except (CannotAssemble, SolverFailed) as error:
         return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
     table = {
@@ -244,12 +259,28 @@ def pose_error_of(
             "translation": _bracket(one.translation_error, one.translation_screw),
             "cuts": one.cuts,
         }
+        | ({"along": along[one.reading]} if along else {})
         for one in found
     }
+    if direction is not None:
+        results["direction"] = np.asarray(direction, dtype=float)
     certificate = {"relative_gap": answer.relative_gap()}
     return results | {
         "energy": answer.energy, "error": table, "certificate": certificate
     }  # fmt: skip
+
+
+def _support(
+    answer: Assembly, reading: str, offset: NDArray, direction: ArrayLike,
+    energy_budget: float = 0.05, **_: float,
+) -> dict[str, Any]:  # fmt: skip
+    """Largest error along a direction: certified, attained, and the screw there."""
+    reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
+    if reach.unbounded:
+        return _bracket((np.inf, np.inf), reach.centre)
+    found = reach.support(direction)
+    attained = float(np.asarray(direction) @ found.screw)
+    return _bracket((attained, found.height), found.screw)
 
 
 def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
@@ -269,6 +300,10 @@ def pose_error_text(results: dict[str, Any]) -> str:
             f"{1e3 * rotation['upper']:.6g} mrad, translation "
             f"{1e3 * translation['lower']:.6g} to {1e3 * translation['upper']:.6g} mm"
         )
+        if "along" in found:
+            low, high = found["along"]["lower"], found["along"]["upper"]
+            unit = "mm" if np.any(results["direction"][3:]) else "mrad"
+            lines.append(f"        along it {1e3 * low:.6g} to {1e3 * high:.6g} {unit}")
     return "\n".join(lines)
 
 
