@@ -1,0 +1,309 @@
+"""Prints how fast problem (27) is solved, beside global solvers, on one core.
+
+Run ``python benchmarks/pose_error_speed.py``; some minutes, nearly all of them SCIP's.
+The robot and the grid are those of ``benchmarks/assembly_speed.py``.  Printed, for the
+rotation and the translation each,
+
+- clearances only (no errors), reading ``frozen``;
+- the first draw's errors, reading ``free``, at the points inside the assembly zone,
+  where play is left, and at all points, most of which have little;
+
+milliseconds of processor time a point to bounds 1e-6 rad or 1e-6 m apart by SCIP, by
+Gurobi, by a plain branch and bound written here (secants above the squares, Clarabel at
+every node), by ``bound_pose_error`` and by ``bound_pose_errors``; and the ratios to the
+last.  Then the whole study: four quantities, both readings, 1113 points, in seconds.
+
+The other solvers are given the problem as our reduction leaves it, unit cones and poses
+in mrad or mm, so their times hold no modelling but their own objects.  Ours hold all
+that follows the placing of the frames: (22), what it loads, the reduction, the search.
+A solver that is not installed, or whose licence does not allow the size, says so in its
+line; ``pip install forcefit[benchmarks]`` brings both.
+"""
+
+# ruff: noqa: E402  one thread must be asked for before numpy is imported
+import os
+
+for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
+    os.environ[f"{name}_NUM_THREADS"] = "1"
+
+import heapq
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, vstack
+
+from assembly import conic
+from assembly.batch import minimise_energies, zone_margins
+from assembly.batch_error import bound_pose_errors
+from assembly.energy import solve_assembly
+from assembly.pose_error import Reach, bound_pose_error, reachable_screws
+from assembly.posture import Posture, place_many
+from assembly.robot import Robot
+from benchmarks.assembly_speed import paper_robot, workspace
+
+SAMPLE = 6  # points of the other solvers
+UNIT = 1e-3  # poses are in mrad and mm for them
+TOLERANCE = 1e-6  # [rad or m]
+LIMIT = 30.0  # [s] a point
+PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Bounds [rad or m] and the processor time they took [s]."""
+
+    lower: float
+    upper: float
+    taken: float
+
+
+def scaled(reach: Reach, part: slice) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """As x = c + X v with H v = k, poses in units of 1e-3: (c, X, H, k)."""
+    X = reach.map[part] / UNIT
+    c = reach.centre[part] / UNIT - X @ reach.start
+    return c, X, reach.rows, reach.rows @ reach.start
+
+
+def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
+    """Bounds of x if no closure held."""
+    reach = np.array([conic.cone_sizes(row, group).sum() for row in X])
+    return c - reach, c + reach
+
+
+def by_scip(reach: Reach, part: slice, near: float) -> Answer:
+    """Maximise t <= x.x with SCIP, to the gap of t that is 1e-6 of x."""
+    import pyscipopt
+
+    c, X, H, k = scaled(reach, part)
+    low, high = box(c, X, reach.group)
+    begin = time.process_time()
+    model = pyscipopt.Model()
+    model.hideOutput()
+    model.setParam("limits/time", LIMIT)
+    v = [model.addVar(lb=-1, ub=1) for _ in range(X.shape[1])]
+    x = [model.addVar(lb=a, ub=b) for a, b in zip(low, high, strict=True)]
+    t = model.addVar(lb=0, ub=float((np.maximum(-low, high) ** 2).sum()))
+    for row, right in zip(H, k, strict=True):
+        terms = (w * u for w, u in zip(row.tolist(), v, strict=True))
+        model.addCons(pyscipopt.quicksum(terms) == right)
+    for a in range(3):
+        terms = (w * u for w, u in zip(X[a].tolist(), v, strict=True))
+        model.addCons(x[a] == c[a] + pyscipopt.quicksum(terms))
+    for cone in np.unique(reach.group):
+        own = np.flatnonzero(reach.group == cone)
+        model.addCons(pyscipopt.quicksum(v[j] * v[j] for j in own) <= 1)
+    model.addCons(t <= pyscipopt.quicksum(one * one for one in x))
+    model.setObjective(t, "maximize")
+    model.setParam("limits/absgap", 2 * near * TOLERANCE / UNIT**2)
+    model.setParam("limits/gap", 0.0)
+    model.setParam("numerics/feastol", 1e-9)
+    model.optimize()
+    lower, upper = model.getPrimalbound(), model.getDualbound()
+    return Answer(
+        np.sqrt(max(lower, 0.0)) * UNIT, np.sqrt(max(upper, 0.0)) * UNIT,
+        time.process_time() - begin,
+    )  # fmt: skip
+
+
+def by_gurobi(reach: Reach, part: slice, near: float) -> Answer:
+    """Maximise t <= x.x with Gurobi, to the gap of t that is 1e-6 of x."""
+    import gurobipy
+
+    c, X, H, k = scaled(reach, part)
+    low, high = box(c, X, reach.group)
+    begin = time.process_time()
+    with (
+        gurobipy.Env(params={"OutputFlag": 0}) as env,
+        gurobipy.Model(env=env) as model,
+    ):
+        for key, value in {
+            "Threads": 1, "NonConvex": 2, "TimeLimit": LIMIT, "MIPGap": 0.0,
+            "MIPGapAbs": 2 * near * TOLERANCE / UNIT**2, "FeasibilityTol": 1e-9,
+        }.items():  # fmt: skip
+            model.setParam(key, value)
+        v = model.addMVar(X.shape[1], lb=-1.0, ub=1.0)
+        x = model.addMVar(3, lb=low, ub=high)
+        t = model.addMVar(1, lb=0.0)
+        if len(k):
+            model.addConstr(H @ v == k)
+        model.addConstr(x == c + X @ v)
+        for cone in np.unique(reach.group):
+            own = v[np.flatnonzero(reach.group == cone)]
+            model.addConstr(own @ own <= 1.0)
+        model.addConstr(t <= x @ x)
+        model.setObjective(t.sum(), gurobipy.GRB.MAXIMIZE)
+        model.optimize()
+        lower, upper = model.ObjVal, model.ObjBound
+    return Answer(
+        np.sqrt(lower) * UNIT, np.sqrt(upper) * UNIT, time.process_time() - begin
+    )
+
+
+def by_branching(reach: Reach, part: slice, near: float) -> Answer:
+    """Branch and bound on x: above each square its secant, Clarabel at every node."""
+    c, X, H, k = scaled(reach, part)
+    begin = time.process_time()
+    low, high = box(c, X, reach.group)
+    lower, count = 0.0, 0
+    size = float(np.linalg.norm(np.maximum(-low, high)))
+    nodes = [(-size * size, count, low, high, (low + high) / 2)]
+    while nodes and time.process_time() - begin < LIMIT:
+        upper = np.sqrt(-nodes[0][0])
+        if upper - lower <= TOLERANCE / UNIT:
+            break
+        _, _, low, high, x = heapq.heappop(nodes)
+        axis = int(np.argmax((high - x) * (x - low)))
+        for side in (0, 1):
+            below, above = low.copy(), high.copy()
+            (above if side == 0 else below)[axis] = x[axis]
+            found = _secant_node(c, X, H, k, reach.group, below, above)
+            if found is None:
+                continue
+            value, where = found
+            lower = max(lower, float(np.linalg.norm(where)))
+            count += 1
+            if value > lower**2:
+                heapq.heappush(nodes, (-value, count, below, above, where))
+    upper = np.sqrt(-nodes[0][0]) if nodes else lower
+    return Answer(lower * UNIT, max(lower, upper) * UNIT, time.process_time() - begin)
+
+
+def _secant_node(
+    c: NDArray, X: NDArray, H: NDArray, k: NDArray, group: NDArray, low: NDArray,
+    high: NDArray,
+) -> tuple[float, NDArray] | None:  # fmt: skip
+    """Most of the secants above x.x within a box, and where; None if it is empty."""
+    nu = len(group)
+    slope = low + high
+    limits, radii = conic._unit_cones(group, np.ones(nu))
+    sides = csc_matrix(np.vstack([X, -X]))
+    A = vstack([csc_matrix(H), sides, limits], format="csc")
+    b = np.concatenate([k, high - c, c - low, radii])
+    v, z, status = conic._clarabel(
+        csc_matrix((nu, nu)), -X.T @ slope, A, b, len(k), group, 1e-8, positive=6
+    )
+    if v is None or z is None:
+        return None
+    x = c + X @ v
+    # the dual value, whatever the solver's status: an upper bound
+    pull = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
+    value = b[: len(k) + 6] @ z[: len(k) + 6] + conic.cone_sizes(pull, group).sum()
+    return float(value + slope @ c - low @ high), x
+
+
+def sampled(
+    solve: Callable[[Reach, slice, float], Answer], reaches: list[Reach], part: slice,
+    near: NDArray,
+) -> tuple[float, list[Answer], str]:  # fmt: skip
+    """Mean time [ms], the answers, and what there is to say."""
+    try:
+        answers = [
+            solve(reach, part, size)
+            for reach, size in zip(reaches, near.tolist(), strict=True)
+        ]
+    except ImportError as error:
+        return np.nan, [], f"not installed ({error.name})"
+    except Exception as error:
+        if type(error).__module__.partition(".")[0] not in {"gurobipy", "pyscipopt"}:
+            raise
+        return np.nan, [], f"refused: {error}"
+    late = sum(a.upper - a.lower > 1.01 * TOLERANCE for a in answers)
+    note = f"{late} of {len(answers)} wider than asked" if late else ""
+    return float(np.mean([a.taken for a in answers])) * 1e3, answers, note
+
+
+def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) -> None:
+    """The table of one case."""
+    own = [replace(p, robot=robot) for p in postures]
+    T = np.array([p.transforms for p in own])
+    off = np.array([p.mismatch for p in own])
+    few = np.arange(0, len(own), len(own) // SAMPLE)[:SAMPLE]
+    reaches = [reachable_screws(solve_assembly(own[i]), reading) for i in few]
+    for half, (name, part) in enumerate(PARTS.items()):
+        tolerance = dict(zip(
+            ("tolerance_rotation", "tolerance_translation"),
+            np.where(np.arange(2) == half, TOLERANCE, np.inf), strict=True,
+        ))  # fmt: skip
+        bound_pose_errors(robot, T[:2], reading, mismatch=off[:2], **tolerance)
+        begin = time.process_time()
+        batch = bound_pose_errors(robot, T, reading, mismatch=off, **tolerance)
+        batched = (time.process_time() - begin) / len(T) * 1e3
+        bound_pose_error(solve_assembly(own[few[0]]), reading, **tolerance)
+        begin = time.process_time()
+        for i in few:
+            bound_pose_error(solve_assembly(own[i]), reading, **tolerance)
+        single = (time.process_time() - begin) / len(few) * 1e3
+        print(f"\n{title}, {name}\n{'':28}{'ms/point':>10}{'over ours':>11}")
+        ours = getattr(batch, f"{name}_error")[few]
+        for solver, solve in (
+            ("SCIP, scaled", by_scip), ("Gurobi, scaled", by_gurobi),
+            ("plain branch and bound", by_branching),
+        ):  # fmt: skip
+            taken, answers, note = sampled(solve, reaches, part, ours[:, 0])
+            apart = [
+                max(a.lower - high, low - a.upper)
+                for a, (low, high) in zip(answers, ours, strict=False)
+            ]
+            if answers and max(apart) > 1e-7:
+                note += f"; brackets up to {max(apart):.1e} apart"
+            print(f"{solver:28}{taken:10.1f}{taken / batched:11.0f}  {note}")
+        print(f"{'ours, one at a time':28}{single:10.2f}{single / batched:11.1f}")
+        print(
+            f"{'ours, batched':28}{batched:10.3f}{1:11d}  {batch.supports.mean():.1f} "
+            f"supports a point, {batch.slower.sum()} by the slower road"
+        )
+
+
+def print_study(robot: Robot, poses: NDArray) -> None:
+    """The whole study: margin, energy, two pose errors; compliant rigid and free."""
+    begin = time.process_time()
+    postures = [p for p in place_many(robot, poses)[0] if p is not None]
+    T = np.array([p.transforms for p in postures])
+    off = np.array([p.mismatch for p in postures])
+    placed = time.process_time()
+    energies = minimise_energies(robot, T, mismatch=off)
+    zones = [zone_margins(robot, T, name, off) for name in ("rigid", "free")]
+    solved = time.process_time()
+    errors = [
+        bound_pose_errors(robot, T, name, mismatch=off, energies=energies)
+        for name in ("frozen", "free")
+    ]
+    done = time.process_time()
+    widest = max(
+        float(np.diff(getattr(one, f"{part}_error")).max())
+        for one in errors for part in PARTS
+    )  # fmt: skip
+    slow = sum(int(one.slower.sum()) for one in errors)
+    slow += sum(int(one.slower.sum()) for one in zones)
+    print(
+        f"\nthe study, {len(T)} points: {done - begin:.2f} s (placing "
+        f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "
+        f"{done - solved:.2f}); widest bracket {widest:.1e}, "
+        f"{energies.certified.mean():.0%} of energies certified, {slow} by slower roads"
+    )
+
+
+def main() -> None:
+    """Print everything."""
+    robot = paper_robot()
+    postures = workspace(robot)
+    perfect = robot.with_errors(0 * robot.errors)
+    print(f"{robot.name}, {len(postures)} points, one core")
+    print_case("clearances only", perfect, postures, "frozen")
+    T = np.array([p.transforms for p in postures])
+    inside = zone_margins(robot, T, "free").margin <= 1.0
+    zone = [p for p, here in zip(postures, inside, strict=True) if here]
+    print_case(f"first draw, free, {len(zone)} points of the zone", robot, zone, "free")
+    print_case("first draw, free, all points", robot, postures, "free")
+    x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
+    poses = np.full((x.size, 6), np.nan)
+    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
+    place_many(robot, poses[:1])
+    print_study(robot, poses)
+
+
+if __name__ == "__main__":
+    main()
