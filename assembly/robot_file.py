@@ -301,10 +301,17 @@ def _toml(value: Any) -> str:
     if isinstance(value, str):
         return f'"{"".join(map(_escaped, value))}"'
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
+        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
+        return "{ " + inner + " }"
     if isinstance(value, Iterable):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return repr(value) if isinstance(value, int) else repr(float(value))
+
+
+def _key(name: str) -> str:
+    """A key, between quotes where a dot or more would be read as something else."""
+    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
+    return name if bare else _toml(name)
 
 
 def _escaped(c: str) -> str:

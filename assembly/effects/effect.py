@@ -19,7 +19,7 @@ class Unknown:
         scale: plausible size, in the unit of the parameter or of the part.
         lower: bound below which it makes no sense.
         upper: bound above which it makes no sense.
-        start: where a fit begins and its first derivative is taken.
+        start: where the effect is none, and its first derivative is taken.
         scan: values at which a search looks first, where the model is far from linear.
         scan_by: a covariate whose range multiplies ``scan``, if any.
     """

@@ -25,12 +25,11 @@ def _apply(here: Conditions, values: Values) -> Conditions:
 def _public(robot: Robot, values: Values) -> dict[str, float]:
     """Amplitude and phase from the parts in sin and cos of the command."""
     found: dict[str, float] = {}
-    for key, sine in values.items():
-        name, _, kind = key.rpartition(".")
-        if kind == "sine":
-            cosine = values.get(f"{name}.cosine", 0.0)
-            found[f"{name}.amplitude"] = math.hypot(sine, cosine)
-            found[f"{name}.phase"] = math.atan2(cosine, sine)
+    for name in {key.rpartition(".")[0]: None for key in values}:
+        sine = values.get(f"{name}.sine", 0.0)
+        cosine = values.get(f"{name}.cosine", 0.0)
+        found[f"{name}.amplitude"] = math.hypot(sine, cosine)
+        found[f"{name}.phase"] = math.atan2(cosine, sine)
     return found
 
 

@@ -48,9 +48,9 @@ JOINT_CLEARANCE = Effect(
     frames=moving_joints,
     components=_KINDS,
     unknowns=lambda robot: (
-        Unknown("radial", 2e-5, 0.0, 1e-2, 2e-5),
-        Unknown("axial", 2e-5, 0.0, 1e-2, 2e-5),
-        Unknown("tilt", 2e-4, 0.0, 0.2, 2e-4),
+        Unknown("radial", 2e-5, 0.0, 1e-2),
+        Unknown("axial", 2e-5, 0.0, 1e-2),
+        Unknown("tilt", 2e-4, 0.0, 0.2),
     ),
     linear=False,
 )  # fmt: skip

@@ -38,6 +38,10 @@ def diagnose(
     write_json(results.table(found), json)
     if json != "-":
         print(results.text(found))
+    if report is not None:
+        from validation.diagnosis.report import write_report
+
+        write_report(found, report)
     if save is not None:
         if found.verdict != "explained":
             raise BadInput(

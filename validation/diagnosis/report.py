@@ -1,0 +1,139 @@
+"""A diagnosis as one self-contained page."""
+
+import html
+from pathlib import Path
+
+from stiffness.reading import BadInput
+from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.figures import (
+    confounding_figure,
+    covariate_figure,
+    error_figure,
+    probability_figure,
+    vector_figure,
+)
+from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.results import effects, sentence
+from validation.html import html_figure, html_page, html_table
+
+
+def write_report(found: Diagnosis, path: Path) -> None:
+    """Write the page, whole or not at all.
+
+    Args:
+        found: the diagnosis.
+        path: of the page.
+
+    Raises:
+        BadInput: it cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(report_page(found), encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def report_page(found: Diagnosis) -> str:
+    """The page as HTML with its pictures inside.
+
+    Args:
+        found: the diagnosis.
+
+    Returns:
+        The whole page.
+    """
+    campaign = found.campaign
+    settled = found.verdict in {"explained", "none_needed"}
+    parts = [
+        f"<h1>Diagnosis of {html.escape(campaign.name)}</h1>",
+        f"<p class='verdict {'good' if settled else 'bad'}'>"
+        f"{html.escape(sentence(found))}</p>",
+        f"<p>{len(campaign)} rows, robot {html.escape(campaign.robot.name)}; "
+        f"{html.escape(found.split.how)}.</p>",
+        "<h2>Before and after</h2>",
+        html_figure(error_figure(found), "Rows that chose and fitted nothing."),
+        *_parameters(found),
+        "<h2>Where the residual is</h2>",
+        html_figure(vector_figure(found), "All rows but outliers."),
+        "<h2>What it varies with</h2>",
+        html_figure(covariate_figure(found), "Line at 1: noise as stated."),
+        *_structure(found),
+        "<h2>Which effect</h2>",
+        html_figure(probability_figure(found), "Posterior weight of all sets with it."),
+        html_table(
+            ["set of effects", "probability"],
+            [[" + ".join(n) or "none", f"{p:.3f}"] for n, p in found.alternatives],
+        ),
+        "<h2>What this design can tell apart</h2>",
+        html_figure(
+            confounding_figure(found),
+            "1: whatever the row's effect does, the column's can do as well.",
+        ),
+        *_next(found),
+        *_noise(found),
+    ]
+    return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
+
+
+def _parameters(found: Diagnosis) -> list[str]:
+    """Table of the best set's numbers."""
+    if found.verdict not in {"explained", "ambiguous"}:
+        return []
+    rows = []
+    for effect in effects(found):
+        for p in effect["parameters"]:
+            low, high = p["interval_90"]
+            rows.append([
+                f"{effect['name']}: {p['name']}", f"{p['value']:.6g}", f"{p['std']:.2g}",
+                f"{low:.6g} .. {high:.6g}", p["unit"],
+            ])  # fmt: skip
+    title = "Parameters" if found.verdict == "explained" else "Parameters, if so"
+    head = ["parameter", "value", "std", "90 % interval", "unit"]
+    return [f"<h2>{title}</h2>", html_table(head, rows)]
+
+
+def _structure(found: Diagnosis) -> list[str]:
+    """Table of what is left varies with."""
+    if not found.trends:
+        return []
+    rows = [
+        [t.against, f"{100 * t.share:.0f} %", f"{t.probability:.1g}"]
+        for t in found.trends
+    ]
+    return [
+        "<p>What is left after the best set of effects varies with:</p>",
+        html_table(["against", "share of its square", "by chance"], rows),
+    ]
+
+
+def _next(found: Diagnosis) -> list[str]:
+    """What to measure next."""
+    if found.next is None:
+        return []
+    rows = [[k, f"{v:.6g}"] for k, v in found.next.configuration.items()]
+    rows.append(["load [N m, N]", load_text(found.next.load)])
+    rows += [[k, f"{v:g}"] for k, v in found.next.covariates.items()]
+    return [
+        "<h2>Measure next</h2>",
+        f"<p>{html.escape(found.next.why)}.</p>",
+        html_table(["command", "value"], rows),
+    ]
+
+
+def _noise(found: Diagnosis) -> list[str]:
+    """How the noise was judged, and which rows were left out."""
+    far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
+    lack = found.lack
+    repeats = (
+        f"{lack.repeats:.2f} between repeats"
+        if lack.repeats_freedom
+        else "no repeats to judge it by"
+    )
+    return [
+        "<h2>Noise and outliers</h2>",
+        f"<p>What is left is {lack.rms:.2f} of the stated sigma (probability "
+        f"{lack.probability:.2g} by chance); {repeats}.</p>",
+        f"<p>Left out as outliers: {html.escape(', '.join(far)) or 'none'}.</p>",
+    ]
