@@ -162,7 +162,7 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
     if "tolerance" not in data:
         raise ValueError("bars of tolerances need a data set of tolerances")
     figure = Figure(
-        figsize=(11, 1.5 + 0.35 * data.sizes["class"]), layout="constrained"
+        figsize=(11, 2.2 + 0.35 * data.sizes["class"]), layout="constrained"
     )
     panels = figure.subplots(1, 2)
     units = data["unit"].values.astype(str)
@@ -176,9 +176,12 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
         panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
         panel.set_yticks(np.arange(len(rows)), data["class"].values[rows], fontsize=8)
         panel.set(xlabel=f"tolerance, plus or minus [{shown}]", xscale="log")
+        if len(rows):
+            panel.set_xlim(value.min() / 3, 2 * most.max())
+            panel.legend(fontsize=8)
         for i, one in enumerate(value):
             panel.annotate(f" {one:.3g}", (one, i), va="center", fontsize=8)
         if not len(rows):
             panel.set_axis_off()
-    figure.suptitle(str(data.attrs.get("said", "")), fontsize=9)
+    figure.suptitle(str(data.attrs.get("said", "")).replace("; ", "\n"), fontsize=9)
     return figure
