@@ -92,7 +92,7 @@ def ccx(name, accuracy):
         tip = np.unique(mesh.faces[mesh.patch == 1])
         base = np.unique(mesh.faces[mesh.patch == 0])
         lines = ["*NODE, NSET=ALL"]
-        lines += [f"{k}, " + ", ".join(f"{v:.15g}" for v in p)
+        lines += [f"{k}, " + ", ".join(f"{v:.11e}" for v in p)
                   for k, p in enumerate(mesh.nodes, 1)]  # fmt: skip
         lines.append("*ELEMENT, TYPE=C3D10, ELSET=SOLID")
         lines += [f"{k}, " + ", ".join(str(n + 1) for n in cell)

@@ -173,20 +173,19 @@ def _tetrahedralize(
 def _run_mesher(given: Path, made: Path) -> None:
     """The child's work: pytetwild on a stored surface."""
     import pytetwild
-    import pyvista
 
     with np.load(given) as stored:
         points, triangles = stored["points"], stored["triangles"]
         edge, envelope = stored["settings"]
-    mesh = pytetwild.tetrahedralize_pv(
-        pyvista.PolyData.from_regular_faces(points, triangles),
+    points, cells = pytetwild.tetrahedralize(
+        np.ascontiguousarray(points, dtype=float),
+        np.ascontiguousarray(triangles, dtype=np.int32),
         edge_length_abs=float(edge),
         epsilon=float(envelope),
         stop_energy=8.0,
         quiet=True,
     )
-    cells = mesh.cells_dict.get(np.uint8(10), np.empty((0, 4), dtype=np.int64))
-    np.savez(made, points=np.array(mesh.points, dtype=float), cells=cells)
+    np.savez(made, points=np.asarray(points, dtype=float), cells=np.asarray(cells))
 
 
 def fit_to_patches(

@@ -1,7 +1,7 @@
-"""NAFEMS's standard tests LE1 and LE10, with our elements and a structured mesh.
+"""NAFEMS's standard tests LE1, LE10 and LE11: our elements on structured meshes.
 
-The Standard NAFEMS Benchmarks (1990).  Both are quarters of an elliptic ring: inner
-(x / 2)^2 + y^2 = 1, outer (x / 3.25)^2 + (y / 2.75)^2 = 1; E = 210 GPa, nu = 0.3.
+The Standard NAFEMS Benchmarks (1990).  LE1 and LE10 are quarters of an elliptic ring:
+inner (x / 2)^2 + y^2 = 1, outer (x / 3.25)^2 + (y / 2.75)^2 = 1; E = 210 GPa, nu = 0.3.
 """
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 from stiffness.elements import (
     Quadratic,
     assemble,
+    integration,
     lame,
     node_gradients,
     quadratic,
@@ -39,6 +40,50 @@ def ring(counts, thickness):
     return flat.nodes, Quadratic(places, cells, flat.faces, flat.patch, curved)
 
 
+def sphere_cone_cylinder(counts):
+    """Quadratic tetrahedra of a quarter of LE11's body, as :func:`ring`.
+
+    Inside a sphere of radius 1 m up to 45 degrees, then a cylinder; outside a sphere of
+    1.4 m up to z = 0.7, a cone to r = 1 at z = 1.39, a cylinder to the top, 1.79.
+    """
+    flat = quadratic(box_solid(counts, (1.0, 1.0, 1.0)))
+    s, t, turn = flat.nodes.T
+    # finer toward A, at s = t = 0
+    s, low = (np.expm1(2 * v) / np.expm1(2) for v in (s, np.minimum(4 * t, 1.0)))
+    t = np.where(t < 0.25, low / 4, t)
+    corner, top = np.sqrt(0.5), 1.79
+    # four bands, cut where the outline has corners
+    inner_angle = np.interp(t, [0, 0.5], [0, np.pi / 4])
+    height = np.interp(t, [0.5, 1.0], [corner, top])
+    inner = np.where(
+        t <= 0.5,
+        [np.cos(inner_angle), np.sin(inner_angle)],
+        [np.full(len(t), corner), height],
+    )
+    angle = np.interp(t, [0, 0.25], [0, np.arcsin(0.5)])
+    line = [0.25, 0.5, 0.75, 1.0]
+    edge_r = 1.4 * np.sqrt(0.75)
+    outer = np.where(
+        t <= 0.25,
+        [1.4 * np.cos(angle), 1.4 * np.sin(angle)],
+        [
+            np.interp(t, line, [edge_r, (edge_r + 1) / 2, 1.0, 1.0]),
+            np.interp(t, line, [0.7, 1.045, 1.39, top]),
+        ],
+    )
+    r, z = inner + s * (outer - inner)
+    places = np.column_stack([
+        r * np.cos(np.pi / 2 * turn),
+        r * np.sin(np.pi / 2 * turn),
+        z,
+    ])
+    size = np.linalg.det(places[flat.cells[:, 1:4]] - places[flat.cells[:, :1]])
+    swapped = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
+    cells = flat.cells if size.min() > 0 else flat.cells[:, swapped]
+    curved = np.ones(len(cells), dtype=bool)
+    return flat.nodes, Quadratic(places, cells, flat.faces, flat.patch, curved)
+
+
 def pressed(mesh, faces, pressure):
     """(n, 3) nodal forces of a pressure [Pa] against faces."""
     N, dN, weights = triangle_rule()
@@ -52,8 +97,8 @@ def pressed(mesh, faces, pressure):
     return loads
 
 
-def stress_at(mesh, held, loads, node):
-    """sigma_yy [Pa] at a node, averaged over its elements."""
+def stress_at(mesh, held, loads, node, direction=1):
+    """sigma_yy [Pa], or another, at a node, averaged over its elements."""
     ones = np.ones(len(mesh.cells))
     upper = assemble(mesh, LAM * ones, MU * ones)
     free = ~held.ravel()
@@ -64,7 +109,8 @@ def stress_at(mesh, held, loads, node):
     for part, G in node_gradients(mesh):
         nodes = mesh.cells[part]
         slope = np.einsum("cqax,cai->cqix", G, u[nodes])
-        stress = LAM * np.trace(slope, axis1=2, axis2=3) + 2 * MU * slope[:, :, 1, 1]
+        along = slope[:, :, direction, direction]
+        stress = LAM * np.trace(slope, axis1=2, axis2=3) + 2 * MU * along
         found.append(stress[nodes == node])
     return float(np.concatenate(found).mean())
 
@@ -107,3 +153,61 @@ def test_le10_thick_plate():
         -1e6 * np.pi / 4 * (3.25 * 2.75 - 2), rel=1e-3
     )
     assert stress_at(mesh, held, loads, node) == pytest.approx(-5.38e6, rel=6e-3)
+
+
+def heated(mesh, temperature, coefficient):
+    """(n, 3) nodal forces that stand for a temperature [K]."""
+    loads = np.zeros_like(mesh.nodes)
+    modulus = (3 * LAM + 2 * MU) * coefficient
+    for part, N, G, w in integration(mesh):
+        T = temperature(np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]]))
+        force = np.einsum("tq,tqax->tax", w * modulus * T, G)
+        np.add.at(loads, mesh.cells[part], force)
+    return loads
+
+
+def warmth(x):
+    """LE11's temperature, r + z."""
+    return np.hypot(x[..., 0], x[..., 1]) + x[..., 2]
+
+
+def test_free_expansion_is_stressless():
+    """A body held nowhere but against rigid motion grows by coefficient x T."""
+    mesh = quadratic(box_solid((2, 2, 2), (0.3, 0.2, 0.1)))
+    loads = heated(mesh, lambda x: np.full(x.shape[:-1], 50.0), 2.3e-4)
+    held = mesh.nodes == 0  # the three planes through the origin
+    ones = np.ones(len(mesh.cells))
+    upper = assemble(mesh, LAM * ones, MU * ones)
+    free = ~held.ravel()
+    u = np.zeros(free.size)
+    u[free] = solve(upper[free][:, free], loads.ravel()[free][:, None])[:, 0]
+    expected = 50 * 2.3e-4 * mesh.nodes
+    np.testing.assert_allclose(u.reshape(-1, 3), expected, atol=1e-13)
+
+
+def le11_stress(counts):
+    """sigma_zz [Pa] on the circle through A, (1, 0, 0), by a mesh of so many boxes."""
+    unit, mesh = sphere_cone_cylinder(counts)
+    held = np.zeros(mesh.nodes.shape, dtype=bool)
+    held[unit[:, 2] == 0, 1] = True
+    held[unit[:, 2] == 1, 0] = True
+    held[(unit[:, 1] == 0) | (unit[:, 1] == 1), 2] = True
+    loads = heated(mesh, warmth, 2.3e-4)
+    circle = np.flatnonzero((unit[:, 0] == 0) & (unit[:, 1] == 0))
+    assert np.hypot(*mesh.nodes[circle, :2].T) == pytest.approx(1)
+    middle = circle[np.argmin(np.abs(unit[circle, 2] - 0.5))]
+    thermal = (3 * LAM + 2 * MU) * 2.3e-4 * warmth(mesh.nodes[middle])
+    return stress_at(mesh, held, loads, middle, direction=2) - thermal
+
+
+@pytest.mark.slow
+def test_le11_solid_cylinder_taper_sphere():
+    """T = r + z, 2.3e-4 / K, ends held along z; sigma_zz at A is -105 MPa, 0.6 %.
+
+    A is a corner with a steep gradient: one mesh leaves 3.5, 1.6, 1.0 % with 6, 9, 12
+    elements across, which is the square of the element; two meshes take that out.
+    """
+    coarse, fine = le11_stress((6, 16, 6)), le11_stress((9, 24, 6))
+    extrapolated = fine + (fine - coarse) / (1.5**2 - 1)
+    assert extrapolated == pytest.approx(-105e6, rel=6e-3)
+    assert abs(fine + 105e6) < 0.6 * abs(coarse + 105e6)
