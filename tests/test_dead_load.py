@@ -10,12 +10,14 @@ from assembly.dead_load import curvature_of, dead_loads, slopes_of, work_of
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
 from assembly.finite import LINK
+from assembly.links import link_compliance
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 from tests.test_exact import moved_unknowns, only
+from validation.multibody import simulate_assembly, without_clearance
 
 G = 9.81
 
@@ -211,3 +213,36 @@ def test_a_start_under_other_loads_is_refused():
     assert solve_exact(posture, start=start, gravity=[0, -G, 0]).energy > 0
     with pytest.raises(ValueError, match="another posture or load"):
         solve_exact(posture, start=start)
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
+def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
+    """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
+    too.  Poses agree as without weight, see ``test_exact``.  The energy alone is not
+    least under a load: it differs by the weight's work on what the poses differ.
+    """
+    robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
+    rng = np.random.default_rng(4)
+    robot = replace(robot, frames=tuple(
+        replace(f, mass=rng.uniform(1, 2), centre_of_mass=rng.normal(size=3) * 0.05)
+        for f in robot.frames
+    ))  # fmt: skip
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    answer = solve_exact(posture, gravity=gravity)
+    other = simulate_assembly(
+        posture, links="spring", stiffness=stiffness, gravity=gravity
+    )
+    light = solve_exact(posture)
+    sag = np.abs(answer.platform_screw - light.platform_screw)[3:].max()
+    difference = np.abs(other.platform_screw - answer.platform_screw)
+    assert sag > 1e-6
+    assert difference[:3].max() < 2e-7
+    assert difference[3:].max() < 1e-8
+    weight = sum(f.mass for f in robot.frames) * np.linalg.norm(gravity)
+    assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)
