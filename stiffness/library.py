@@ -327,7 +327,8 @@ def look_up(
 
     Args:
         entries: a full grid.
-        wanted: a value of every parameter.
+        wanted: a value of every parameter; of one that has a single value in the grid
+            it may be left out.
 
     Returns:
         (6, 6) stiffness, and (6, 6) the sizes of its error: what one neighbour fewer
@@ -342,6 +343,8 @@ def look_up(
         if name not in names:
             raise BadInput(f'look-up: unknown parameter "{name}"{nearest(name, names)}')
     axes = [sorted({e.parameters[name] for e in entries}) for name in names]
+    single = {n: a[0] for n, a in zip(names, axes, strict=True) if len(a) == 1}
+    wanted = single | dict(wanted)
     for name, axis in zip(names, axes, strict=True):
         if name not in wanted:
             raise BadInput(f"look-up: {name}: missing; the grid has it")

@@ -78,16 +78,19 @@ def look_up_entry(
 @library.command()
 def export(
     folder: Folder,
-    to: Annotated[str, typer.Option(help="csv, exudyn, adams or mapdl.")] = "csv",
+    to: Annotated[str, typer.Option(help="csv, json, exudyn, adams or mapdl.")] = "csv",
     key: Annotated[str | None, typer.Option(help="One entry; all for csv.")] = None,
 ) -> None:
-    """Print a library as CSV, or one entry's K_E for another program."""
+    """Print a library as CSV or JSON, or one entry's K_E for another program."""
     from stiffness.export import library_csv, stiffness_for
     from stiffness.library import read_entry, read_library
 
-    if to == "csv":
+    if to in {"csv", "json"}:
         entries = read_library(folder) if key is None else [read_entry(folder, key)]
-        print(library_csv(entries), end="")
+        if to == "json":
+            write_json({"entries": [entry.about for entry in entries]}, "-")
+        else:
+            print(library_csv(entries), end="")
         return
     if key is None:
         raise BadInput("--key: missing; another program reads one entry at a time")
