@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from assembly.conic import SolverFailed
 from assembly.energy import Assembly
@@ -108,13 +108,23 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
     }
 
 
-def exact_answer(linear: Assembly) -> ExactAssembly | None:
-    """The answer with finite rotations near a linear one; None if none was found."""
+def exact_answer(
+    linear: Assembly, gravity: ArrayLike | None = None
+) -> ExactAssembly | None:
+    """The answer with finite rotations near a linear one; None if none was found.
+
+    Args:
+        linear: the answer to start from.
+        gravity: (3,) [m/s^2] base axes, the one of the linear answer.
+
+    Returns:
+        The exact answer or None.
+    """
     joints = linear.joints
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):
         return None  # nothing can move
     try:
-        return solve_exact(linear.posture, linear.load, linear)
+        return solve_exact(linear.posture, linear.load, linear, gravity=gravity)
     except (SolverFailed, FreeMotion):
         return None
 

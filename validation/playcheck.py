@@ -229,8 +229,7 @@ def playcheck(
             smaller ones are added where these leave a check undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"beam"``, ``"spring"`` or ``"fem"``, as for a cross-check.
-        gravity: (3,) [m/s^2] base axes; weight acts on both sides (the exact model has
-            none and is left out).
+        gravity: (3,) [m/s^2] base axes; weight acts in all three models.
         time_limit: [s] for each simulation.
 
     Returns:
@@ -254,7 +253,7 @@ def playcheck(
             posture, s, load=s * wrench, gravity=s * g, elements=ELEMENTS,
             clearances=True, time_limit=time_limit, **vars(models),
         )  # fmt: skip
-        exact = None if g.any() else exact_answer(linear)
+        exact = exact_answer(linear, s * g)
         return Pair(s, linear, simulated, exact, s**2 * between)
 
     def judge(pairs: tuple[Pair, ...], asked: int) -> PlayCheck:

@@ -68,12 +68,13 @@ def cost_between(
         missing: [J] energy that neither counts but the better one has.
 
     Returns:
-        The cost.  Energies within 1e-6 of what closing without play would take count
-        as that: inside an assembly zone both are zero but for rounding.
+        The cost.  Without loads, energies below 1e-6 of what closing without play
+        would take count as that: inside an assembly zone both are rounding.
     """
     screw = model.platform_screw - better.platform_screw
     energy = better.energy + missing
-    scale = max(energy, 1e-6 * model.energy_without_play, 1e-300)
+    least = 0.0 if model.forces else 1e-6 * model.energy_without_play
+    scale = max(energy, least, 1e-300)
     return Cost(
         float(np.linalg.norm(screw[:3])),
         float(np.linalg.norm(screw[3:])),
