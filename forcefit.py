@@ -63,6 +63,11 @@ def main() -> None:
         sys.exit(_complain(str(error), 2))
     except (KeyboardInterrupt, typer.Abort):
         sys.exit(_complain("interrupted", 130))
+    except SystemError as error:
+        # Ctrl-C while compiled code ran
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        sys.exit(_complain("interrupted", 130))
     except typer.Exit as error:
         sys.exit(error.exit_code)
     except BrokenPipeError:

@@ -76,6 +76,8 @@ def write_sweep(
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else error
         raise BadInput(f"{path}: cannot be written: {reason}") from None
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def _write(

@@ -7,7 +7,10 @@ anyone: no number depends on who solved it or what was solved before.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -154,9 +157,31 @@ def _sources_hash(question: Question) -> str:
 def solve_here(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
     """Solve blocks one after the other, on one thread."""
     # small matrices: more threads take longer, and sum in another order
-    with threadpool_limits(1):
+    with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
+            if noted:
+                raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts_noted() -> Generator[list[int], None, None]:
+    """Ctrl-C is noted, so that a block is finished; a second one stops at once."""
+    noted: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield noted
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(number: int, _: object) -> None:
+        noted.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def run_sweep(
