@@ -135,8 +135,14 @@ class _Postures:
     @cached_property
     def experiments(self) -> list[Experiment]:
         """Everything but the margins, at each posture."""
-        sources = self.plan.sources
-        return [Experiment(p, sources, margins=False) for p in self.postures]
+        sources, stress = self.plan.sources, "stress" in self.plan.limits
+        found = [
+            Experiment(p, sources, margins=False, stress=stress) for p in self.postures
+        ]
+        for key in self.plan.limits:
+            if not key.startswith("margin"):
+                found[0].check_limits([key])
+        return found
 
     @cached_property
     def convex(self) -> dict[str, list]:

@@ -66,6 +66,7 @@ class Experiment:
         seed: of all draws.
         play: ``"least"``, ``"uniform"`` or ``"contact"``, see :mod:`assembly.play`.
         margins: whether the zone margins are asked for.
+        stress: whether the links' stress is.
     """
 
     posture: Posture
@@ -73,6 +74,7 @@ class Experiment:
     seed: int = 1
     play: str = "least"
     margins: bool = True
+    stress: bool = True
 
     def __post_init__(self) -> None:
         if self.play not in PLAY:
@@ -93,7 +95,9 @@ class Experiment:
 
     @cached_property
     def links(self) -> tuple[str, ...]:
-        """Frames of the links whose stress is known."""
+        """Frames of the links whose stress is known and asked for."""
+        if not self.stress:
+            return ()
         return tuple(link.frame for link in stressed_links(self.posture.robot))
 
     @cached_property
@@ -253,6 +257,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "seed": experiment.seed,
         "play": experiment.play,
         "margins": int(experiment.margins),
+        "stress": int(experiment.stress),
         "program": f"forcefit {version('forcefit')}",
     }
 

@@ -1,0 +1,96 @@
+"""Certified energy problems a second at one posture, by the size of the errors.
+
+The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
+up to a share of the paper's.  Printed for each share: how many of the draws cost
+nothing, how many were certified and how many went the slower road; draws per second of
+processor time and what 1e7 would take on two cores at that rate, which other work on
+the machine does not blur; draws per second of the clock on two threads; and the batched
+road of :mod:`assembly.batch`, which reduces each draw anew, per second of processor.
+``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+"""
+
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from assembly.batch import minimise_energies
+from assembly.distributions import ErrorSources
+from assembly.draw import frames_named
+from assembly.one_posture import OnePosture, prepare_energies
+from assembly.posture import place_robot
+from assembly.robots import load_robot
+
+FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
+PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
+SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
+BLOCK, TARGET, GOAL = 4096, 1e7, 600.0  # draws, draws, s
+
+
+def paper_sources(share: float) -> ErrorSources:
+    """The paper's errors, scaled, with random signs."""
+    robot = load_robot("irsbot2")
+    rows = [robot.index(name) for name in frames_named(robot, FRAMES)]
+    count = 6 * len(rows)
+    zero = np.zeros(count)
+    return ErrorSources(
+        robot, np.repeat(rows, 6), np.tile(np.arange(6), len(rows)),
+        np.zeros(count, dtype=int), zero, share * np.tile(PAPER, len(rows)), zero, zero,
+        np.ones(count, dtype=bool),
+    )  # fmt: skip
+
+
+def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
+    """Draws without energy, certified, and slower, of one block; drawing included."""
+    errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
+    found = one.solve(errors)
+    h = errors.reshape(BLOCK, -1) @ one.misfit.T
+    allowed = 1e-8 * found.energy + 1e-12 * (h**2).sum(axis=1) / 2
+    fine = found.energy - found.bound <= allowed
+    return np.array([np.sum(found.energy <= 1e-20), fine.sum(), found.slower.sum()])
+
+
+def run(one: OnePosture, sources: ErrorSources, blocks: int, threads: int) -> tuple:
+    """Draws per second of processor and of the clock, and shares of the draws."""
+    clock, processor = time.perf_counter(), time.process_time()
+    with threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
+        counts = list(pool.map(lambda b: solve_block(one, sources, b), range(blocks)))
+    draws = blocks * BLOCK
+    used = time.process_time() - processor, time.perf_counter() - clock
+    return draws / used[0], draws / used[1], np.sum(counts, axis=0) / draws
+
+
+def main() -> None:
+    """Print the table."""
+    draws = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
+    blocks = -(-draws // BLOCK)
+    posture = place_robot(load_robot("irsbot2"), pose={"tx": 0.1, "tz": -0.5})
+    one = prepare_energies(posture)
+    print(f"{blocks * BLOCK} draws a line; goal {TARGET:.0e} in {GOAL:.0f} s")
+    print(
+        "errors  no energy  certified  slower  per core s  1e7, 2 cores [s]  "
+        "2 threads, per s  batch, per core s"
+    )
+    for share in SHARES:
+        sources = paper_sources(share)
+        solve_block(one, sources, 0)  # compiled before the clock starts
+        single, _, (without, certified, slower) = run(one, sources, blocks, 1)
+        _, double, _ = run(one, sources, blocks, 2)
+        few = sources.errors(sources.draw(0, 1000, seed=1))
+        T = np.repeat(posture.transforms[None], len(few), axis=0)
+        minimise_energies(posture.robot, T[:1], few[:1])
+        start = time.process_time()
+        minimise_energies(posture.robot, T, few)
+        batch = len(few) / (time.process_time() - start)
+        print(
+            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {slower:6.4f}  "
+            f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}  "
+            f"{batch:18.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
