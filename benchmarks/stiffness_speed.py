@@ -59,14 +59,15 @@ def true_error(name, K):
 
 def solved(name, accuracy, folder):
     """Our link and its finest mesh."""
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import Budget, Material, solve_link
     from stiffness.interface import parse_interface
     from stiffness.surface import read_surface
 
     surface = read_surface(HERE.parent / "meshes" / f"{name}.stl")
     faces = [parse_interface(text) for text in INTERFACES[name]]
     material = [Material(60e9, 0.3)]
-    return solve_link(surface, *faces, material, accuracy=accuracy, cache=Path(folder))
+    return solve_link(surface, *faces, material, accuracy=accuracy, cache=Path(folder),
+        budget=Budget(seconds=7200))  # fmt: skip
 
 
 def ours(name, accuracy):

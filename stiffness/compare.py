@@ -50,10 +50,16 @@ class Comparison:
         c = self.end_effect
         noise = self.fea.relative_error_estimate * self.slenderness
         turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
+        chord = float(np.linalg.norm(self.fea.tip - self.fea.base))
+        bent = (
+            "  A solid's corner is stiffer than two beams that meet in a point: part "
+            "of c is no end effect."
+        )
         return (
             f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
             f"K / K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
             f"(translations); the mesh's error is worth {noise:.2f}."
+            f"{bent if self.length > 1.001 * chord else ''}"
         )
 
 

@@ -95,7 +95,7 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
         (k,) indices of triangles.
 
     Raises:
-        BadInput: there are none.
+        BadInput: there are none, or a disc's outline runs through triangles.
     """
     near = 1e-5 * surface.diagonal
     if interface.kind == "bore":
@@ -107,8 +107,14 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     along = np.abs(normals @ interface.direction)
     on &= along < 0.5 if interface.kind == "bore" else along > 0.9
     if interface.kind == "disc":
-        offset = corners - interface.point
-        on &= (np.linalg.norm(offset, axis=2) < interface.radius * 1.002).all(axis=1)
+        out = np.linalg.norm(corners - interface.point, axis=2) / interface.radius
+        cut = on & (out < 0.99).any(axis=1) & (out > 1.01).any(axis=1)
+        if cut.any():
+            raise BadInput(
+                f"{surface.name}: the {name} interface {interface} [m] cuts "
+                f"{cut.sum()} triangles; a disc must be an outline of the surface's own triangles"
+            )
+        on &= (out < 1.002).all(axis=1)
     if not on.any():
         low, high = surface.points.min(axis=0), surface.points.max(axis=0)
         box = ", ".join(

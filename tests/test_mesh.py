@@ -16,7 +16,7 @@ from stiffness.mesh import (
     cache_folder,
     mesh_solid,
 )
-from stiffness.patches import find_patches
+from stiffness.patches import find_patches, triangles_on
 from stiffness.quality import element_quality
 from stiffness.reading import BadInput
 from stiffness.refine import refine
@@ -371,6 +371,16 @@ def test_a_barrels_mesh_has_its_volume_not_its_facets(tmp_path):
     volume = sum(w.sum() for *_, w in integration(quadratic(solid)))
     assert surface.volume / exact - 1 < -0.006
     assert abs(volume / exact - 1) < 0.001
+
+
+def test_a_disc_is_an_outline_of_triangles_or_refused():
+    """An end of radius 0.02 as a fan from its middle: the whole end is a disc; a
+    smaller one would cut every triangle of the fan."""
+    surface = bar()
+    whole = triangles_on(surface, parse_interface("disc=0,0,0/0,0,1/0.02"), "base")
+    assert len(whole) == 32
+    with pytest.raises(BadInput, match=r"cuts 32 triangles; a disc must be an outline"):
+        triangles_on(surface, parse_interface("disc=0,0,0/0,0,1/0.01"), "base")
 
 
 def test_an_interface_off_the_part_is_refused_with_the_parts_box():

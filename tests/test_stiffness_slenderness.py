@@ -223,3 +223,12 @@ def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
             [*command, "--curve", str(path), "--radius", "0.1"],
             catch_exceptions=False,
         )
+
+
+def test_a_bent_beams_corner_is_named():
+    """Straight: no word of corners; an L: its corner is no end effect."""
+    one = made_up(20, 0.2, 0.0)
+    assert "corner" not in one.explanation
+    bent = compare_link(one.beam, one.fea, 0.02, length=1.5 * one.length)
+    assert "corner is stiffer" in bent.explanation
+    assert bent.slenderness == pytest.approx(30)
