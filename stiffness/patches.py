@@ -112,7 +112,8 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
         if cut.any():
             raise BadInput(
                 f"{surface.name}: the {name} interface {interface} [m] cuts "
-                f"{cut.sum()} triangles; a disc must be an outline of the surface's own triangles"
+                f"{cut.sum()} triangles; a disc must be an outline of the surface's "
+                "own triangles"
             )
         on &= (out < 1.002).all(axis=1)
     if not on.any():
