@@ -263,8 +263,8 @@ def main() -> None:
     print_table(found)
     rows += found
     maps = {name: over_poses(name) for name in POSES}
-    validity_figure(rows).savefig(folder / "validity.png", dpi=110)
-    pose_figure(maps).savefig(folder / "validity_poses.png", dpi=110)
+    validity_figure(rows).savefig(folder / "validity.png", dpi=80)
+    pose_figure(maps).savefig(folder / "validity_poses.png", dpi=80)
     (folder / "validity.json").write_text(json.dumps(rows, indent=0) + "\n")
 
 

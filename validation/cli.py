@@ -90,7 +90,7 @@ def crosscheck(
     ] = None,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="[s] for each simulation.")
-    ] = 300.0,
+    ] = 600.0,
 ) -> None:
     """Compare with a multibody simulation at several scales of the imperfections.
 
