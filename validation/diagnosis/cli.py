@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from assembly.cli import JsonOption
+from assembly.cli import JsonOption, progress_bars
 from assembly.robot_file import write_robot
 from stiffness.reading import BadInput
 from stiffness.writing import check_writable, write_json
@@ -18,6 +18,9 @@ def diagnose(
     report: Annotated[
         Path | None, typer.Option(help="Also write a report, one HTML file.")
     ] = None,
+    calibrate: Annotated[
+        int, typer.Option(help="Simulate this many campaigns on the same design.")
+    ] = 0,
     save: Annotated[
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
@@ -35,13 +38,22 @@ def diagnose(
         if path is not None:
             check_writable(path)
     found = trace(read_campaign(campaign))
-    write_json(results.table(found), json)
+    tally = None
+    if calibrate:
+        from validation.diagnosis.verdict import calibrate as simulate
+
+        with progress_bars() as update:
+            tally = simulate(
+                found.screen, found.best, calibrate,
+                lambda done, n: update("simulated campaigns", done, n),
+            )  # fmt: skip
+    write_json(results.table(found, tally), json)
     if json != "-":
-        print(results.text(found))
+        print(results.text(found, tally))
     if report is not None:
         from validation.diagnosis.report import write_report
 
-        write_report(found, report)
+        write_report(found, report, tally)
     if save is not None:
         if found.verdict != "explained":
             raise BadInput(

@@ -28,7 +28,7 @@ from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import device_frame, register
-from validation.diagnosis.scoring import Scored, Screen, inclusion, posterior
+from validation.diagnosis.scoring import Scored, Screen, inclusion
 from validation.diagnosis.signatures import (
     Signature,
     Tangents,
@@ -37,11 +37,9 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.structure import Trend, trends
+from validation.diagnosis.verdict import by_names, verdict
 
-CLAIM = 0.9  # probability from which an effect is claimed
-RIVAL = 0.5  # probability from which another one stands against it
 _ROUNDS = 4  # of refitting and scoring again
-_LISTED = 0.02  # probability from which an alternative is listed
 _VISIBLE = 4.0  # squared whitened change of the readings
 _KINDS = 4  # sets of different effects that are refitted
 _NEAR = 6.0  # in score: sets this near the best are refitted too
@@ -86,6 +84,7 @@ class Diagnosis:
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
         residual_after: (R, 6) [rad, m] reading minus the best set's model.
         screen: the scored hypotheses of the last round.
+        best: the best set there.
         trends: what the residual left varies with, if more than noise is left.
         next: the measurement that would decide, if the verdict is ambiguous.
     """
@@ -108,6 +107,7 @@ class Diagnosis:
     residual_before: NDArray
     residual_after: NDArray
     screen: Screen
+    best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
 
@@ -326,63 +326,36 @@ def _judge(
     fitting = campaign.take(used)
     lack = lack_of_fit(fitting, found.fit.residual, found.unknowns)
     declared = lack_of_fit(fitting, found.tangents.residual, 0)
-    by_names = _by_names(found)
+    sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
     best = tuple(sorted(found.screen.effects[i] for i in found.sets[0].members))
-    verdict, claimed = _verdict(by_names, probability, lack)
+    said, claimed = verdict(sets, probability, lack.significant)
     after = apply_effects(here, found.fit.effects)
     measured = campaign.measured
     residual_before = measured - predict(here).deviation
     residual_after = measured - predict(after).deviation
     left: tuple[Trend, ...] = ()
-    if verdict == "outside_library":
+    if said == "outside_library":
         left = tuple(trends(fitting, here.take(used), residual_after[used]))
     further = None
-    if verdict == "ambiguous" and found.rival is not None:
+    if said == "ambiguous" and found.rival is not None:
         further = next_measurement(fitting, here.take(used), [found.fit, found.rival])
     held = ~parts.fitted & ~outliers
     if not held.any():
         held = used
     far = np.zeros_like(held)
-    shown = residual_after if verdict in {"explained", "ambiguous"} else residual_before
+    shown = residual_after if said in {"explained", "ambiguous"} else residual_before
     judged = campaign.take(held)
     far[held] = outlying(judged, whiten(judged, residual_after[held]))
     outliers = outliers | far
     held &= ~far
     return Diagnosis(
-        campaign, verdict, found.fit, claimed, probability, by_names, best, lack,
+        campaign, said, found.fit, claimed, probability, sets, best, lack,
         declared, _errors(campaign, residual_before, held),
         _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
         parts, outliers, here, residual_before, residual_after, found.screen,
-        left, further,
+        found.sets[0], left, further,
     )  # fmt: skip
-
-
-def _by_names(found: _Selection) -> tuple[tuple[tuple[str, ...], float], ...]:
-    """Probabilities of sets of effects, whatever their way to act."""
-    weights: dict[tuple[str, ...], float] = {}
-    for one, weight in zip(found.sets, posterior(found.sets), strict=True):
-        names = tuple(sorted(found.screen.effects[i] for i in one.members))
-        weights[names] = weights.get(names, 0.0) + float(weight)
-    listed = sorted(weights.items(), key=lambda item: -item[1])
-    return tuple((names, p) for names, p in listed if p >= _LISTED)
-
-
-def _verdict(
-    sets: Sequence[tuple[tuple[str, ...], float]], probability: dict[str, float],
-    lack: LackOfFit,
-) -> tuple[str, tuple[str, ...]]:  # fmt: skip
-    """The verdict, and which effects it claims."""
-    if lack.significant:
-        return "outside_library", ()
-    names, weight = sets[0]
-    if not names and weight >= RIVAL:
-        return "none_needed", ()
-    sure = tuple(sorted(name for name, p in probability.items() if p >= CLAIM))
-    rivals = [name for name, p in probability.items() if RIVAL <= p < CLAIM]
-    if sure and not rivals and dict(sets).get(sure, 0.0) >= RIVAL:
-        return "explained", sure
-    return "ambiguous", ()
 
 
 def _errors(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:

@@ -13,33 +13,38 @@ from validation.diagnosis.figures import (
     vector_figure,
 )
 from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.results import effects, sentence
+from validation.diagnosis.results import calibration_text, effects, sentence
+from validation.diagnosis.verdict import Calibration
 from validation.html import html_figure, html_page, html_table
 
 
-def write_report(found: Diagnosis, path: Path) -> None:
+def write_report(
+    found: Diagnosis, path: Path, tally: Calibration | None = None
+) -> None:
     """Write the page, whole or not at all.
 
     Args:
         found: the diagnosis.
         path: of the page.
+        tally: how often it is right on this design, if that was simulated.
 
     Raises:
         BadInput: it cannot be written.
     """
     part = path.with_name(path.name + ".part")
     try:
-        part.write_text(report_page(found), encoding="utf-8")
+        part.write_text(report_page(found, tally), encoding="utf-8")
         part.replace(path)
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def report_page(found: Diagnosis) -> str:
+def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
     """The page as HTML with its pictures inside.
 
     Args:
         found: the diagnosis.
+        tally: how often it is right on this design, if that was simulated.
 
     Returns:
         The whole page.
@@ -74,6 +79,11 @@ def report_page(found: Diagnosis) -> str:
         *_next(found),
         *_noise(found),
     ]
+    if tally is not None:
+        parts += [
+            "<h2>How often this is right</h2>",
+            f"<p>{calibration_text(tally)}</p>",
+        ]
     return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
 
 

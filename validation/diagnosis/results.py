@@ -1,20 +1,22 @@
 """A diagnosis for machines, and the honest sentence for people."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from assembly.effects import LIBRARY
 from assembly.robot import Robot
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.verdict import Calibration
 
 
-def table(found: Diagnosis) -> dict[str, Any]:
+def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
     """The diagnosis in the public format.
 
     Args:
         found: a diagnosis.
+        tally: how often it is right on this design, if that was simulated.
 
     Returns:
         Plain values.
@@ -55,6 +57,7 @@ def table(found: Diagnosis) -> dict[str, Any]:
             for t in found.trends
         ],
         "next_measurement": _next(found),
+        "calibration": None if tally is None else asdict(tally),
     }
 
 
@@ -142,7 +145,21 @@ def sentence(found: Diagnosis) -> str:
     )
 
 
-def text(found: Diagnosis) -> str:
+def calibration_text(tally: Calibration) -> str:
+    """How often the method is right on this design, in words."""
+
+    def counts(said: dict[str, int]) -> str:
+        return ", ".join(f"{name} {n}" for name, n in sorted(said.items()))
+
+    named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
+    return (
+        f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
+        f"{counts(tally.without)}; with what was found {counts(tally.with_found)}"
+        f"{named}; false claims {100 * tally.false_claims:.1f} %"
+    )
+
+
+def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     """The diagnosis for a terminal."""
     lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
     for effect in effects(found) if found.verdict in {"explained", "ambiguous"} else []:
@@ -176,6 +193,8 @@ def text(found: Diagnosis) -> str:
             f"measure next: {where}; load {load_text(found.next.load)}{covariates}",
             f"  {found.next.why}",
         ]
+    if tally is not None:
+        lines += ["", calibration_text(tally)]
     return "\n".join(lines)
 
 

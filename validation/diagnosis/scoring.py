@@ -16,6 +16,7 @@ Sources:
 import math
 from collections import Counter
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -69,13 +70,48 @@ class Screen:
             k = s.columns.shape[1]
             self._slices.append((at, at + k))
             at += k + 1
-        full = np.column_stack([*blocks, residual])
-        self._gram = full.T @ full
+        self._columns = np.column_stack([*blocks, np.zeros(self.count)])
+        self._columns[:, -1] = residual
+        self._gram = self._columns.T @ self._columns
         self._bounds = [s.hypothesis.bounds for s in signatures]
         self.effects = [s.hypothesis.effect for s in signatures]
         ways = Counter(self.effects)
         self._ways = [math.log(ways[e]) for e in self.effects]
         self._m = len(ways)
+
+    def with_residual(self, residual: NDArray) -> "Screen":
+        """The same signatures for another residual.
+
+        Args:
+            residual: (N,) whitened; nuisances are taken out of it as out of the first.
+
+        Returns:
+            A screen that shares what does not change.
+        """
+        other = copy(self)
+        other._columns = self._columns.copy()
+        other._columns[:, -1] = residual
+        other._gram = self._gram.copy()
+        other._gram[-1] = other._gram[:, -1] = other._columns.T @ residual
+        return other
+
+    def shown(self, one: Scored) -> NDArray:
+        """What a fitted set adds to the readings.
+
+        Args:
+            one: fitted by this screen.
+
+        Returns:
+            (N,) whitened.
+        """
+        signal = np.zeros(self.count)
+        at = 0
+        for i in one.members:
+            s = self.signatures[i]
+            k = s.columns.shape[1]
+            signal += s.offset + s.columns @ one.values[at : at + k]
+            at += k
+        return signal
 
     def fit(self, members: Sequence[int]) -> Scored:
         """Fit a set of hypotheses, unknowns within their bounds.
