@@ -32,7 +32,6 @@ _TASK = 0.5  # [s] that a task should take; Dask asks for 0.1 at least
 _IN_FLIGHT = 3  # tasks for each thread of the cluster
 _LARGEST = 256  # blocks in a task
 _PATIENCE = 60.0  # [s] to wait for a first worker
-_DEATHS = 20  # workers that a task may lose before it is given up
 
 Task = tuple[int, Points]
 
@@ -60,7 +59,7 @@ def cluster_solver(
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
-                yield from _spread(client, sweep, iter(blocks), report)
+                yield from _connected_spread(client, sweep, iter(blocks), report)
             return
         with _without_interrupts():
             here = LocalCluster(
@@ -68,7 +67,7 @@ def cluster_solver(
                 dashboard_address=None, silence_logs=50,
             )  # fmt: skip
         with here as cluster, Client(cluster) as client:
-            yield from _spread(client, sweep, iter(blocks), report)
+            yield from _connected_spread(client, sweep, iter(blocks), report)
 
     return solve
 
@@ -99,6 +98,24 @@ def _connected(address: str) -> "distributed.Client":
         ) from None
 
 
+def _connected_spread(
+    client: "distributed.Client",
+    sweep: Sweep,
+    blocks: Iterator[int],
+    report: Callable[[str], None],
+) -> Iterator[tuple[int, Found]]:
+    """Hand out blocks; a scheduler that goes away is one message."""
+    from distributed.comm import CommClosedError
+
+    try:
+        yield from _spread(client, sweep, blocks, report)
+    except (CommClosedError, CancelledError):
+        raise BadInput(
+            "sweep: the connection to the scheduler was lost; finished points are in "
+            "the journal, the same command goes on"
+        ) from None
+
+
 def _spread(
     client: "distributed.Client",
     sweep: Sweep,
@@ -106,52 +123,41 @@ def _spread(
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, Found]]:
     """Hand out blocks as workers become free; what is found comes in any order."""
-    import dask
     from distributed import KilledWorker, as_completed
 
-    with dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS}):
-        _check_workers(client)
-        question = pickle.dumps(sweep.question)
-        size, times = 1, []
-        waiting: Any = as_completed()
+    _check_workers(client)
+    question = pickle.dumps(sweep.question)
+    size, flying, times = 1, 0, []
+    waiting: Any = as_completed()
 
-        def hand_out() -> bool:
-            some = list(islice(blocks, size))
-            if some:
-                tasks = [(block, sweep.points(block)) for block in some]
-                waiting.add(client.submit(solve_task, question, tasks, pure=False))
-            return bool(some)
+    def hand_out() -> None:
+        nonlocal flying
+        # asked each time: clusters grow and shrink
+        threads = max(1, sum(client.nthreads().values()))
+        while flying < _IN_FLIGHT * threads and (some := list(islice(blocks, size))):
+            tasks = [(block, sweep.points(block)) for block in some]
+            waiting.add(client.submit(solve_task, question, tasks, pure=False))
+            flying += 1
 
-        for _ in range(_IN_FLIGHT * max(1, _threads(client))):
-            if not hand_out():
-                break
-        for future in waiting:
-            try:
-                seconds, found = future.result()
-            except KilledWorker:
-                raise BadInput(
-                    "sweep: some points killed every worker they were given to, as "
-                    "when memory runs out; the journal keeps all others"
-                ) from None
-            except CancelledError:
-                raise BadInput(
-                    "sweep: the connection to the scheduler was lost; finished points "
-                    "are in the journal, the same command goes on"
-                ) from None
-            future.release()
-            times.append(seconds)
-            per_block = seconds / len(found)
-            size = int(min(_LARGEST, max(1.0, _TASK / max(per_block, 1e-6))))
-            yield from found
-            hand_out()
-        if times:
-            median = sorted(times)[len(times) // 2]
-            report(f"{len(times)} tasks, {median:.2g} s each")
-
-
-def _threads(client: "distributed.Client") -> int:
-    """Threads of all workers."""
-    return sum(client.nthreads().values())
+    hand_out()
+    for future in waiting:
+        try:
+            seconds, found = future.result()
+        except KilledWorker:
+            raise BadInput(
+                "sweep: some points killed every worker they were given to, as "
+                "when memory runs out; the journal keeps all others"
+            ) from None
+        future.release()
+        flying -= 1
+        times.append(seconds)
+        per_block = seconds / len(found)
+        size = int(min(_LARGEST, max(1.0, _TASK / max(per_block, 1e-6))))
+        yield from found
+        hand_out()
+    if times:
+        median = sorted(times)[len(times) // 2]
+        report(f"{len(times)} tasks, {median:.2g} s each")
 
 
 def _check_workers(client: "distributed.Client") -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.dataset import slabs
 from assembly.journal import open_journal
 from assembly.quantities import Question, record_type
 from assembly.robots import load_robot
@@ -134,6 +135,18 @@ def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert str(error.value).startswith(f"{path}: journal of another sweep: found ")
     assert message in str(error.value)
     assert path.read_bytes() == kept[8]
+
+
+@pytest.mark.parametrize("shape", [(7,), (3, 4), (2, 3, 4), (2, 1, 5, 3), (4, 1, 1)])
+def test_slabs_hold_consecutive_points_in_their_order(shape):
+    """All stretches of all lengths: the boxes, read one after the other, are them."""
+    numbers = np.arange(int(np.prod(shape))).reshape(shape)
+    for first in range(numbers.size):
+        for last in range(first + 1, numbers.size + 1):
+            boxes = list(slabs(shape, first, last))
+            found = np.concatenate([numbers[box].ravel() for box in boxes])
+            assert found.tolist() == list(range(first, last))
+            assert len(boxes) <= 2 * len(shape) - 1
 
 
 def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
