@@ -356,6 +356,9 @@ def sweep(
     near: Annotated[
         float, typer.Option(help="Distance below which a singularity is named.")
     ] = 0.02,
+    yield_strength: Annotated[
+        float | None, typer.Option(help="[Pa] of the links: their stress and safety.")
+    ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes on this machine.", min=1)
     ] = None,
@@ -380,7 +383,7 @@ def sweep(
     asked = ask_sweep(
         robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
         seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
-        linearisation=linearisation, near=near,
+        linearisation=linearisation, near=near, yield_strength=yield_strength,
     )  # fmt: skip
     if workers is not None and scheduler is not None:
         raise BadInput("sweep: found --workers and --scheduler, expected one of them")

@@ -54,13 +54,21 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
     Raises:
         BadInput: a surface is not usable.
     """
-    found = []
-    for row, frame in enumerate(robot.frames):
-        if isinstance(frame.link, BeamLink) and "area" not in frame.link.section:
-            found.append(LinkStress(frame.name, row, "beam", _of_beam(frame)))
-        elif isinstance(frame.link, MeshLink):
-            found.append(_of_mesh(frame, row))
-    return tuple(found)
+    return tuple(
+        _of_mesh(robot.frame(name), robot.index(name))
+        if isinstance(robot.frame(name).link, MeshLink)
+        else LinkStress(name, robot.index(name), "beam", _of_beam(robot.frame(name)))
+        for name in stressed_names(robot)
+    )
+
+
+def stressed_names(robot: Robot) -> tuple[str, ...]:
+    """Frames of :func:`stressed_links`, without solving any."""
+    return tuple(
+        frame.name for frame in robot.frames
+        if isinstance(frame.link, MeshLink)
+        or (isinstance(frame.link, BeamLink) and "area" not in frame.link.section)
+    )  # fmt: skip
 
 
 def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:

@@ -27,6 +27,7 @@ _PAPER = (
     ("translation_error_play", 1e3, "position error by play alone [mm]", "viridis"),
 )
 _RIGID = ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
+_SAFETY = ("safety", 1.0, "yield strength over peak stress [-]", "viridis")
 
 Panel = tuple[str, float, str, str]
 
@@ -207,7 +208,7 @@ def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     """The panels that a data set has the numbers for."""
     if "rotation_error_play" in data:
         return _PAPER
-    return (*_PAPER[:4], _RIGID)
+    return (*_PAPER[:4], _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:

@@ -17,6 +17,7 @@ from assembly.closure import closure_signs
 from assembly.conic import SolverFailed
 from assembly.energy import CannotAssemble
 from assembly.exact import solve_exact
+from assembly.link_stress import peak_stresses
 from assembly.nominal import size_of
 from assembly.posture import Posture, place_many, place_many_joints
 from assembly.quantities import STATUSES, TEXTS, Question, record_type
@@ -203,7 +204,14 @@ def _solve_reached(
     ):  # fmt: skip
         out[key][at] = values[good]
     if question.wrenches:
-        out["wrench"][at] = _wrenches(question, robot, T, energies)[good]
+        chosen = [robot.index(name) for name in question.wrenches]
+        out["wrench"][at] = _wrenches(robot, T, energies, chosen)[good]
+    if question.strength is not None:
+        every = list(range(len(robot.frames)))
+        stress = peak_stresses(robot, _wrenches(robot, T, energies, every)[good])
+        out["stress"][at] = stress
+        with np.errstate(divide="ignore"):
+            out["safety"][at] = question.strength / stress.max(axis=1)
     if question.play_alone:
         _bound_play(perfect, T, off, found, rows)
     if question.reading is not None and good:
@@ -235,12 +243,11 @@ def _note_singularities(
 
 
 def _wrenches(
-    question: Question, robot: Robot, T: NDArray, energies: Energies
+    robot: Robot, T: NDArray, energies: Energies, chosen: list[int]
 ) -> NDArray:
-    """(k, frames, 6) [N m, N] wrench through the frames asked for, in their axes."""
+    """(k, frames, 6) [N m, N] wrench through the frames chosen, in their axes."""
     size = size_of(robot)
     closures = energies.multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
-    chosen = [robot.index(name) for name in question.wrenches]
     at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot)[:, chosen], closures)
     origin = T[:, None, robot.index(robot.platform), :3, 3]
     frames = T[:, chosen]

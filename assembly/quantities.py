@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly.link_stress import stressed_names
 from assembly.parameters import Design
 from assembly.robot import Robot
 from assembly.singularity import KINDS
@@ -36,6 +37,7 @@ class Question:
         wrenches: frames whose wrench is kept.
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
+        strength: [Pa] yield strength of the links; stress and safety are then found.
     """
 
     robot: Robot
@@ -49,6 +51,7 @@ class Question:
     wrenches: tuple[str, ...] = ()
     linearisation: bool = False
     near: float = 0.02
+    strength: float | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,10 @@ def variables(question: Question) -> dict[str, Variable]:
             {"frame": question.wrenches, "wrench_component": WRENCH}, "N m, N",
             "what the outer part exerts on the inner, at the frame in its axes",
         )  # fmt: skip
+    if question.strength is not None:
+        links = {"link": stressed_names(question.robot)}
+        table["stress"] = Variable(links, "Pa", "largest von Mises stress in the link")
+        table["safety"] = Variable({}, "1", "yield strength over the largest stress")
     if question.linearisation:
         for part, unit in (("rotation", "rad"), ("translation", "m")):
             table[f"linearisation_{part}"] = Variable(

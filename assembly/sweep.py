@@ -142,6 +142,7 @@ class Sweep:
             ).hexdigest(),
             "asked": " ".join(map(str, record_type(asked).names or ())),
             "wrenches": " ".join(asked.wrenches),
+            "strength": str(asked.strength),
             "block": str(self.block_size),
         }
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.link_stress import stressed_names
 from assembly.parameters import Design, load_design
 from assembly.pose_error import READINGS
 from assembly.quantities import Question
@@ -41,6 +42,7 @@ def ask_sweep(
     wrench: Sequence[str] = (),
     linearisation: bool = False,
     near: float = 0.02,
+    yield_strength: float | None = None,
 ) -> Sweep:
     """The sweep that options of ``forcefit assembly sweep`` ask for.
 
@@ -57,6 +59,7 @@ def ask_sweep(
         wrench: frames whose wrench is kept.
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
+        yield_strength: [Pa] of the links, to find their stress and safety.
 
     Returns:
         The sweep, everything in it checked.
@@ -75,6 +78,14 @@ def ask_sweep(
         raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
     for name in wrench:
         machine.index(name)
+    if yield_strength is not None:
+        if not 0 < yield_strength < float("inf"):
+            raise BadInput(f"--yield-strength: found {yield_strength:g}, expected > 0")
+        if not stressed_names(machine):
+            raise BadInput(
+                f"--yield-strength: no link of {machine.name} has a shape from which "
+                "its stress follows"
+            )
     design = load_design(robot) if vary else None
     varied = _vary(design, vary) if design is not None else {}
     sources = None
@@ -91,7 +102,7 @@ def ask_sweep(
     question = Question(
         machine, design, tuple(varied), targets.names, sources, seed,
         None if reading == "none" else reading, play_alone, tuple(wrench),
-        linearisation, near,
+        linearisation, near, yield_strength,
     )  # fmt: skip
     return Sweep(
         question, targets, tuple(varied.values()), draws or 0, _command(robot, said)

@@ -9,8 +9,11 @@ import pytest
 from assembly.energy import solve_assembly
 from assembly.link_stress import peak_stresses, safety_factors, stressed_links
 from assembly.posture import place_robot
+from assembly.quantities import Question
 from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import load_robot
+from assembly.sweep import Sweep, sweep_in_memory
+from assembly.targets import grid_targets, parse_grid
 from stiffness.reading import BadInput
 
 PLAIN = Path(__file__).parents[1] / "meshes" / "distal_plain.stl"
@@ -89,3 +92,21 @@ def test_finite_elements_agree_with_the_beam_away_from_the_ends():
     beam = replace(frame, link=BeamLink({"radius": r}, 6e10, 0.3))
     whole = peak_stresses(Robot("one", "distal", (beam,)), w)[:, 0]
     assert whole[1] == pytest.approx(4000 * 0.452 / (np.pi * r**3), rel=1e-9)
+
+
+def test_a_sweep_finds_stress_and_safety_of_every_posture():
+    """The same stress as one solve at a time, away from zero energy."""
+    robot = load_robot("irsbot2")
+    errors = np.zeros_like(robot.errors)
+    errors[robot.index("leg1.link_a"), 3] = 1e-3
+    robot = robot.with_errors(errors)
+    targets = grid_targets(parse_grid("tx=0:0.1:0.1,tz=-0.5"))
+    question = Question(robot, components=targets.names, strength=2e8)
+    data = sweep_in_memory(Sweep(question, targets))
+    for x in (0.0, 0.1):
+        posture = place_robot(robot, pose={"tx": x, "tz": -0.5})
+        expected = peak_stresses(robot, solve_assembly(posture).wrenches)
+        here = data.sel(tx=x, method="nearest").squeeze()
+        np.testing.assert_allclose(here["stress"], expected, rtol=1e-4)
+        assert float(here["safety"]) == pytest.approx(2e8 / expected.max(), rel=1e-4)
+        assert expected.max() > 1e5
