@@ -105,8 +105,8 @@ class Allocation:
         plan: what was asked.
         tolerances: (G,) [rad or m].
         price: their cost.
-        price_bound: no tolerances that meet the convex limits cost less; for a yield
-            below 1 this holds for the stricter mean of the worst draws.
+        price_bound: no tolerances that always meet the convex limits cost less; NaN
+            for a yield below 1, or without convex limits.
         cuts: planes in the programme.
         worst: by limit in :data:`CONVEX` and for yield 1: the worst corner found and
             the proven upper bound, over all postures.
@@ -209,8 +209,11 @@ def allocate(
     _check_taken_up(driver)
     t, bound, cuts = _cutting_planes(driver, progress)
     t = np.clip(t * _scale(work, t), plan.least, plan.most)
-    answer = Allocation(plan, t, plan.price(t), bound if work.convex else np.nan, cuts)
-    if plan.asked_yield == 1.0:
+    always = plan.asked_yield == 1.0
+    if not (always and work.convex):
+        bound = np.nan
+    answer = Allocation(plan, t, plan.price(t), bound, cuts)
+    if always:
         answer = _prove(work, answer, progress)
     if fresh:
         answer = replace(answer, verification=_verify(work, t, fresh, progress))

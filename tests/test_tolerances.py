@@ -1,6 +1,7 @@
 """Worst cases and allocations against brute force and closed forms."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -180,6 +181,16 @@ def test_a_tolerance_file_is_read(write_file):
     assert plan.most.tolist() == [1e-3, 0.1]
     assert plan.limits == {"margin_free": 1.0, "energy": 2.0}
     assert (plan.asked_yield, plan.cost) == (0.95, "logarithm")
+
+
+@pytest.mark.parametrize("name", ["always", "mostly", "forced"])
+def test_the_plans_of_the_example_are_read(name):
+    folder = Path(__file__).parents[1] / "examples" / "tolerance_allocation"
+    plan = read_plan(folder / f"{name}.toml", load_robot("irsbot2"))
+    assert len(plan.names) == 7
+    # every error of the paper's section IV: 12 frames, 6 components
+    assert len(plan.sources) == 72
+    assert plan.asked_yield == (1.0 if name == "always" else 0.99)
 
 
 @pytest.mark.parametrize(
