@@ -1,12 +1,14 @@
 """What the studies of measured data share: options, tables, results."""
 
 import argparse
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.reading import BadInput
 from stiffness.writing import write_json
 
 
@@ -26,6 +28,21 @@ def arguments(doc: str | None, output: str) -> argparse.Namespace:
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     return options
+
+
+def run(study: Callable[[], None]) -> None:
+    """Run a study; without its data it says so and exits with 2.
+
+    Args:
+        study: to be run.
+    """
+    try:
+        study()
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 def rms_position(residuals: NDArray) -> float:

@@ -20,7 +20,7 @@ from examples.hangprinter.convert import (
     convert,
     read_samples,
 )
-from examples.study_output import arguments, print_table, write_results
+from examples.study_output import arguments, print_table, run, write_results
 
 POSITION = np.array([2.0e-3, 1.2e-3, 2.7e-3])  # [m] of the camera, from what is left
 LENGTH = 0.5e-3  # [m] of a line's length, likewise
@@ -212,4 +212,4 @@ def _parameters(model: Model, std: NDArray) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

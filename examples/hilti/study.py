@@ -26,6 +26,7 @@ from examples.study_output import (
     arguments,
     print_table,
     rms_position,
+    run,
     write_results,
 )
 from validation.campaign_file import read_campaign
@@ -267,4 +268,4 @@ def _save(out: Path, scores: dict, inside: dict, trials: dict, best: str) -> Non
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

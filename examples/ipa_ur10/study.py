@@ -28,6 +28,7 @@ from examples.study_output import (
     print_table,
     rms_position,
     rms_rotation,
+    run,
     write_results,
 )
 from validation.campaign_file import read_campaign
@@ -250,4 +251,4 @@ def _print(steps: list[dict]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

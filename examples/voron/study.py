@@ -15,7 +15,7 @@ from assembly.conditions import as_declared
 from assembly.effects import apply_effects
 from assembly.posture import Posture
 from assembly.predict import predict
-from examples.study_output import arguments, print_table, write_results
+from examples.study_output import arguments, print_table, run, write_results
 from examples.voron.convert import convert
 from validation.campaign import Campaign
 from validation.campaign_file import read_campaign
@@ -204,4 +204,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)
