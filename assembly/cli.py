@@ -129,7 +129,34 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
 
 
 def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
-    """The posture that ``--pose`` or ``--joint`` asks for; home if neither."""
+    """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
+
+    Args:
+        robot: name or file.
+        pose: of the platform.
+        joint: coordinates.
+
+    Returns:
+        The posture, of the robot as the effects of its file make it.
+
+    Raises:
+        BadInput: an effect loads the robot, which the command asking does not know.
+    """
+    from assembly.effects.acting import act
+
+    acting = act(declared_posture(robot, pose, joint))
+    if acting.gravity is not None or acting.load.any():
+        raise BadInput(
+            f"{robot}: its effects load it; expected assembly solve or exact, or "
+            "validation crosscheck, which know loads"
+        )
+    return acting.posture
+
+
+def declared_posture(
+    robot: str, pose: list[str] | None, joint: list[str] | None
+) -> Any:
+    """The posture asked for, of the robot without the effects of its file."""
     from assembly.posture import place_robot
     from assembly.robots import load_robot
 
@@ -204,7 +231,7 @@ def solve(
     from assembly.results import solution_of, solution_text
 
     acting = act(
-        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
     results = solution_of(acting.posture, acting.load, acting.gravity)
@@ -240,14 +267,18 @@ def exact(
     joint: JointOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
+    under: UnderOption = None,
     json: JsonOption = None,
 ) -> None:
     """Close the robot with finite motions: closures hold exactly."""
+    from assembly.effects.acting import act
     from assembly.results import exact_of, exact_text
 
-    results = exact_of(
-        posture_of(robot, pose, joint), parse_load(load), parse_gravity(gravity)
-    )
+    acting = act(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=True,
+    )  # fmt: skip
+    results = exact_of(acting.posture, acting.load, acting.gravity)
     write_json(results, json)
     if json != "-":
         print(exact_text(results))

@@ -58,6 +58,8 @@ class Conditions:
         approach: (R,) -1 or 1; NaN where not known.
         laws: contact springs in series with joints.
         exact: finite motions instead of the linear model.
+        rest: (R, n, 6) where play rests, in units of its bounds; None where the least
+            energy is to say.
         base: (6,) [rad, m] turn and shift of the measuring frame, acting on the left.
         tool: (3,) [m] from the reference point to the one really measured, platform
             axes.
@@ -77,6 +79,7 @@ class Conditions:
     approach: NDArray
     laws: tuple[ContactLaw, ...] = ()
     exact: bool = False
+    rest: NDArray | None = None
     base: NDArray = field(default_factory=lambda: np.zeros(6))
     tool: NDArray = field(default_factory=lambda: np.zeros(3))
     reading: NDArray | float = 0.0
@@ -122,6 +125,8 @@ class Conditions:
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
         if isinstance(self.reading, np.ndarray):
             kept["reading"] = self.reading[index]
+        if self.rest is not None:
+            kept["rest"] = self.rest[index]
         return replace(self, **kept)
 
 

@@ -24,7 +24,7 @@ from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
 from assembly.posture import Posture
 from assembly.reduction import FreeMotion
-from assembly.resting_play import taken_up
+from assembly.resting_play import at_rest, fractions, taken_up
 from stiffness.screws import rotation_matrix, rotation_vector
 
 _STEPS = 100
@@ -60,7 +60,9 @@ def predict(here: Conditions) -> Prediction:
     left = np.ones(len(here), dtype=bool)
     open_ = np.zeros(len(here), dtype=bool)
     play = bool(virtual_joints(here.robot).cones.shape[1])
-    if play and not here.robot.closures and not here.exact:
+    if play and not here.exact and here.rest is not None:
+        here, play = at_rest(here), False
+    elif play and not here.robot.closures and not here.exact:
         here, open_ = taken_up(here)
         play = False
     if not here.exact and not play:
@@ -72,6 +74,28 @@ def predict(here: Conditions) -> Prediction:
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
     return Prediction(read(here, screws), reason, open_)
+
+
+def settle(here: Conditions) -> Conditions:
+    """Conditions that say where play rests, found once by the least energy.
+
+    Effects may then be tried on them at the cost of a robot without play, true to first
+    order as long as joints keep touching where they touch.
+
+    Args:
+        here: R situations of a robot.
+
+    Returns:
+        The same, ``rest`` given; rows without an answer have it in the middle.
+    """
+    rest = np.zeros_like(here.errors)
+    for row in range(len(here)):
+        try:
+            answer = assemble_row(here, row)
+        except (CannotAssemble, FreeMotion, SolverFailed):
+            continue
+        rest[row] = fractions(here.robot, answer.clearance_screws)
+    return replace(here, rest=rest)
 
 
 def read(here: Conditions, screws: NDArray) -> NDArray:

@@ -49,6 +49,46 @@ def taken_up(here: Conditions) -> tuple[Conditions, NDArray]:
     return replace(tight, errors=here.errors + play), open_
 
 
+def at_rest(here: Conditions) -> Conditions:
+    """Conditions with play replaced by the screws at which it is said to rest.
+
+    Args:
+        here: R situations of a robot with play, ``rest`` given.
+
+    Returns:
+        The same situations of the robot without play, the play among its errors.
+
+    Raises:
+        ValueError: no ``rest`` is given.
+    """
+    if here.rest is None:
+        raise ValueError("at_rest: conditions do not say where play rests")
+    play = here.rest * _bounds_by_row(here.robot)
+    robot = without_play(here.robot)
+    return replace(here, robot=robot, errors=here.errors + play, rest=None)
+
+
+def _bounds_by_row(robot: Robot) -> NDArray:
+    """(n, 6) bound of every row of a clearance screw; 0 where it is no play."""
+    bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
+    return bounds[:, [0, 0, 1, 2, 2, 3]]
+
+
+def fractions(robot: Robot, play: NDArray) -> NDArray:
+    """Clearance screws in units of their bounds.
+
+    Args:
+        robot: of n frames.
+        play: (n, 6) [rad, m].
+
+    Returns:
+        (n, 6) [-], 0 where there is no play.
+    """
+    bounds = _bounds_by_row(robot)
+    finite = np.isfinite(bounds) & (bounds > 0)
+    return np.divide(play, bounds, out=np.zeros_like(play), where=finite)
+
+
 def without_play(robot: Robot) -> Robot:
     """The robot with tight joints; bounds of passive joints' own motion stay.
 

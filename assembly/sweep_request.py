@@ -69,6 +69,12 @@ def ask_sweep(
     """
     said = {k: v for k, v in locals().items() if k != "robot"}
     machine = load_robot(robot)
+    if machine.effects:
+        names = ", ".join(machine.effects)
+        raise BadInput(
+            f"{robot}: found effects ({names}), which sweeps do not know; expected a "
+            "robot without [[effect]], or assembly solve at single postures"
+        )
     if (grid is None) == (poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
     if reading not in (*READINGS, "none"):

@@ -13,6 +13,9 @@ from assembly.cli import (
     LoadOption,
     PoseOption,
     RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
     parse_gravity,
     parse_load,
     posture_of,
@@ -67,6 +70,7 @@ def crosscheck(
     joint: JointOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
+    under: UnderOption = None,
     scale: Annotated[
         str,
         typer.Option(
@@ -97,6 +101,7 @@ def crosscheck(
     Joint clearances are left out on both sides unless asked for; energies and springs
     are then compared instead of poses.  Exit status 1 when a check fails.
     """
+    from assembly.effects.acting import act
     from validation.crosscheck import Crosscheck, attempt
     from validation.crosscheck import crosscheck as compare_tight
     from validation.playcheck import PlayCheck, playcheck
@@ -116,7 +121,12 @@ def crosscheck(
     if grid is not None:
         _crosscheck_grid(robot, grid, compare, json)
         return
-    posture = posture_of(robot, pose, joint)
+    acting = act(
+        declared_posture(robot, pose, joint), wrench, g, parse_covariates(under)
+    )
+    posture = acting.posture
+    wrench = acting.load.tolist()
+    g = None if acting.gravity is None else acting.gravity.tolist()
     answer, failure = attempt(posture.robot.name, lambda: compare(posture))
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
@@ -141,6 +151,8 @@ def _crosscheck_grid(
     from validation.poses import check_poses, poses_table, poses_text
 
     machine, axes = load_robot(robot), parse_grid(grid)
+    if machine.effects:
+        raise BadInput(f"--grid: {robot} has effects, which act at one pose at a time")
     with progress_bars() as update:
         rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
     write_json(poses_table(rows), json)

@@ -42,6 +42,8 @@ def act(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     covariates: Mapping[str, float] | None = None,
+    *,
+    finite: bool = False,
 ) -> Acting:
     """Put the effects of a robot's file to work.
 
@@ -50,6 +52,7 @@ def act(
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
         covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
+        finite: whether what follows is the exact model.
 
     Returns:
         The situation; without effects, what was given.
@@ -64,6 +67,11 @@ def act(
             hint = nearest(name, COVARIATES)
             raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
     effects = posture.robot.effects
+    if "geometric_stiffening" in effects and not finite:
+        raise BadInput(
+            f'{posture.robot.name}: effect "geometric_stiffening" asks for finite '
+            "motions; expected the command forcefit assembly exact"
+        )
     for name in effects:
         for needed in LIBRARY[name].needs:
             if needed not in given:

@@ -17,8 +17,9 @@ def _apply(here: Conditions, values: Values) -> Conditions:
     robot = with_foundation(here.robot, values)
     still = np.broadcast_to(np.eye(4), (len(here), 1, 4, 4))
     zero = np.zeros((len(here), 1, 6))
+    rest = None if here.rest is None else np.concatenate([zero, here.rest], axis=1)
     return replace(
-        here, robot=robot,
+        here, robot=robot, rest=rest,
         coordinates=np.concatenate([zero[:, :, 0], here.coordinates], axis=1),
         transforms=np.concatenate([still, here.transforms], axis=1),
         errors=np.concatenate([zero, here.errors], axis=1),

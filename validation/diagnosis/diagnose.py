@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.closure import virtual_joints
 from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
-from assembly.predict import predict
+from assembly.predict import predict, settle
 from validation.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
@@ -131,7 +132,7 @@ def diagnose(campaign: Campaign) -> Diagnosis:
     outliers = np.zeros(len(campaign), dtype=bool)
     while True:
         used = parts.fitted & ~outliers
-        found = _select(campaign.take(used), here.take(used))
+        found = _select_with_play(campaign.take(used), here.take(used))
         far = np.zeros_like(outliers)
         far[used] = outlying(campaign.take(used), found.fit.residual)
         if not far.any():
@@ -156,6 +157,19 @@ class _Selection:
     tangents: Tangents
 
 
+def _select_with_play(campaign: Campaign, here: Conditions) -> _Selection:
+    """Select with declared play held where it rests, first as declared, then as found."""
+    # where play rests in closed chains is found row by row, too slowly for every trial
+    play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
+    if not play:
+        return _select(campaign, here)
+    found = _select(campaign, settle(here))
+    there = settle(apply_effects(here, found.fit.effects))
+    assert there.rest is not None
+    rest = there.rest[:, -len(here.robot.frames) :]
+    return _select(campaign, replace(here, rest=rest))
+
+
 def _select(campaign: Campaign, here: Conditions) -> _Selection:
     """Score all small sets; refit the best; score again about it until it stays."""
     tangents = Tangents(campaign, here)
@@ -178,9 +192,7 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
         for one in _worth_refitting(screen, sets):
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
-            fit = refit(campaign, here, [*nuisance, *members], start)
-            if fit is not None:
-                fits[one.members] = fit
+            fits[one.members] = refit(campaign, here, [*nuisance, *members], start)
         sets = _with_fits(screen, sets, fits)
         chosen = fits[sets[0].members]
         if turn and chosen.hypotheses == best:

@@ -28,6 +28,7 @@ from validation.diagnosis.refit import Fit
 _TRIED = 240  # situations looked at
 _FURTHER = 1.5  # of the range of loads and covariates used so far
 _STEP = 1e-3
+_AS_GOOD = 0.97
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,10 @@ def next_measurement(
     powers = np.minimum(
         _power(a - b, Jb, rivals[1].covariance), _power(b - a, Ja, rivals[0].covariance)
     )
-    best = int(np.argmax(powers))
+    # among situations as good as the best, the one that asks for the least load
+    good = powers >= _AS_GOOD * powers.max()
+    size = np.abs(there.load).sum(axis=1)
+    best = int(np.argmin(np.where(good, size, np.inf)))
     if powers[best] < 1.0:
         return None
     names = [" + ".join(sorted(fit.effects)) for fit in rivals[:2]]
@@ -99,7 +103,6 @@ def _situations(here: Conditions) -> Conditions:
     rows = rng.integers(0, len(here), _TRIED)
     there = here.take(rows)
     largest = np.abs(here.load).max(axis=0)
-    largest[3:] = np.where(largest[3:] > 0, largest[3:], largest[3:].max())
     corner = rng.choice([-1.0, 0.0, 1.0], (_TRIED, 6))
     temperature = there.temperature
     if np.isfinite(temperature).all():

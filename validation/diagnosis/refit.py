@@ -5,7 +5,7 @@ Sources:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from assembly.conditions import Conditions
 from assembly.effects import apply_effects
 from assembly.effects.effect import Values
-from assembly.predict import predict
+from assembly.predict import predict, settle
 from assembly.robot import Robot
 from validation.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
@@ -23,6 +23,8 @@ from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_SETTLINGS = 2  # of play in closed chains; a third changes nothing that shows
+_LOST = 1e3  # [sigma] a reading that the model has no answer for
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +110,11 @@ def _public(
 
 def refit(
     campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
-) -> Fit | None:
+) -> Fit:
     """Fit a set of hypotheses in the full model.
+
+    Play in closed chains is found row by row and is slow: it is settled by the least
+    energy, held while the unknowns are fitted, and settled again.
 
     Args:
         campaign: what was measured.
@@ -118,8 +123,36 @@ def refit(
         start: where to begin, one unknown after the other.
 
     Returns:
-        The fit, None if the model has no answer at the start.
+        The fit.
     """
+    adds_play = any(h.effect == "joint_clearance" for h in members)
+    if not (adds_play and here.robot.closures) or here.rest is not None:
+        return _fit(campaign, here, members, start)
+    fit = _fit(
+        campaign, replace(here, rest=_rest(here, members, start)), members, start
+    )
+    for _ in range(_SETTLINGS - 1):
+        rest = _rest(here, members, fit.values)
+        fit = _fit(campaign, replace(here, rest=rest), members, fit.values)
+    conditions = apply_effects(here, fit.effects)
+    model = whiten(campaign, predict(conditions).deviation)
+    left = whiten(campaign, campaign.measured) - model
+    return replace(
+        fit, conditions=conditions, residual=np.where(np.isfinite(left), left, _LOST)
+    )
+
+
+def _rest(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDArray:
+    """Where play rests with effects at some values; a foundation's frame left out."""
+    there = settle(apply_effects(here, dict(_public(members, x, here.robot))))
+    assert there.rest is not None
+    return there.rest[:, -len(here.robot.frames) :]
+
+
+def _fit(
+    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
+) -> Fit:
+    """Least squares with play, if any, as the conditions have it."""
     slots = [slot for h in members for slot in h.slots]
     lower = np.array([slot.unknown.lower for slot in slots])
     upper = np.array([slot.unknown.upper for slot in slots])
@@ -135,7 +168,7 @@ def refit(
 
     def left(scaled: NDArray) -> NDArray:
         model = whiten(campaign, predict(there(scaled * size)).deviation)
-        return np.where(np.isfinite(model), measured - model, 1e3)
+        return np.where(np.isfinite(model), measured - model, _LOST)
 
     def slopes(scaled: NDArray) -> NDArray:
         middle = left(scaled)

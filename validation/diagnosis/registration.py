@@ -57,8 +57,6 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
     here = apply_effects(here, {"registration": start})
     frame = device_frame(own)
     fine = refit(campaign, own, [frame], frame.start)
-    if fine is None:
-        return here
     return apply_effects(here, {"registration": fine.effects["registration"]})
 
 

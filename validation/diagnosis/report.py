@@ -96,9 +96,12 @@ def _parameters(found: Diagnosis) -> list[str]:
         for p in effect["parameters"]:
             low, high = p["interval_90"]
             rows.append([
-                f"{effect['name']}: {p['name']}", f"{p['value']:.6g}", f"{p['std']:.2g}",
-                f"{low:.6g} .. {high:.6g}", p["unit"],
-            ])  # fmt: skip
+                f"{effect['name']}: {p['name']}",
+                f"{p['value']:.6g}",
+                f"{p['std']:.2g}",
+                f"{low:.6g} .. {high:.6g}",
+                p["unit"],
+            ])
     title = "Parameters" if found.verdict == "explained" else "Parameters, if so"
     head = ["parameter", "value", "std", "90 % interval", "unit"]
     return [f"<h2>{title}</h2>", html_table(head, rows)]

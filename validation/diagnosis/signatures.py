@@ -115,7 +115,7 @@ class Tangents:
             (N,) whitened; NaN where the model has no answer.
         """
         there = apply_effects(self.here, effects)
-        if "joint_clearance" in effects and not there.exact:
+        if "joint_clearance" in effects and there.rest is None and not there.exact:
             there, _ = taken_up(there)
         return whiten(self.campaign, predict(there).deviation)
 
