@@ -1,5 +1,6 @@
 """Worst cases and allocations against brute force and closed forms."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from assembly.posture_margins import prepare_margins
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.tolerance_file import read_plan
+from assembly.tolerances import grid_postures, present_errors, present_text
 from assembly.worst_case import (
     bound_energy,
     bound_margin,
@@ -21,7 +23,9 @@ from assembly.worst_case import (
     respond,
     worst_corner,
 )
+from assembly.zone import zone_margin
 from stiffness.reading import BadInput
+from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 PLAY = 1e-4
 
@@ -215,3 +219,18 @@ def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
     with pytest.raises(BadInput) as error:
         read_plan(path, load_robot("irsbot2"))
     assert message in str(error.value)
+
+
+def test_present_errors_times_their_factor_just_fit():
+    """The margin is proportional: solved anew with the scaled errors it is 1."""
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
+    found = present_errors(postures)
+    assert found["postures"] == 3
+    scaled = robot.with_errors(found["factor_on_errors"] * robot.errors)
+    margins = [zone_margin(replace(p, robot=scaled), "free").margin for p in postures]
+    assert max(margins) == pytest.approx(1.0, rel=1e-7)
+    shares = [one["share_of_margin"] for one in found["slopes"]]
+    assert sum(shares) == pytest.approx(1.0, rel=1e-6)
+    assert shares == sorted(shares, reverse=True)
+    assert "everywhere with all errors times" in present_text(found)
