@@ -101,6 +101,8 @@ class Reach:
         Raises:
             SolverFailed: the cone solver gave up.
         """
+        from assembly.support import screw_at, within
+
         direction = np.asarray(direction, dtype=float)
         pull = self.map.T @ direction
         at_centre = float(direction @ self.centre)
@@ -112,8 +114,8 @@ class Reach:
             none, np.zeros(0), pull / size, self.rows, right, self.group
         )
         height = at_centre - least.bound * size - float(pull @ self.start)
-        v = self._feasible(least.clearances)
-        screw = self.centre + self.map @ (v - self.start)
+        body = self.body
+        screw = screw_at(body, within(body, least.clearances))
         pulls = pull + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, pulls)
 
@@ -128,16 +130,6 @@ class Reach:
             for a in (self.centre, self.map, self.rows, self.start)
         )
         return Body(centre, X, H, start, starts)
-
-    def _feasible(self, v: NDArray) -> NDArray:
-        """A nearby v that satisfies rows and cones to rounding."""
-        step = v - self.start
-        step = step - self.rows.T @ (self.rows @ step)
-        sizes = cone_sizes(self.start + step, self.group)
-        if sizes.max(initial=0.0) > 1.0:
-            # shrink towards the start, itself inside, by what the worst cone asks
-            step = step / sizes.max()
-        return self.start + step
 
 
 @dataclass(frozen=True, eq=False)

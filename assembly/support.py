@@ -112,7 +112,8 @@ def within(body: Body, v: NDArray) -> NDArray:
             ab += body.start[j] * step[j]
             bb += body.start[j] * body.start[j]
         if aa + 2.0 * ab + bb > 0.0:
-            share = min(share, -bb / (ab + np.sqrt(max(ab * ab - aa * bb, 0.0))))
+            root = np.sqrt(max(ab * ab - aa * bb, 0.0))
+            share = min(share, -bb / (ab + root) if ab > 0.0 else (root - ab) / aa)
     return body.start + max(share, 0.0) * step
 
 
