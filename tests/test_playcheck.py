@@ -219,7 +219,7 @@ def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
     monkeypatch.setattr(
         assembly.closure, "clearance_bounds", lambda *args: 1.2 * right(*args)
     )
-    monkeypatch.setattr(validation.playcheck, "exact_answer", lambda linear: None)
+    monkeypatch.setattr(validation.playcheck, "exact_answer", lambda *_: None)
     posture = place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
     assert not playcheck(posture, (0.5, 0.25)).passed
 
