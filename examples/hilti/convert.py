@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
-import yaml
+import yaml  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from assembly.nominal import Target, follow
@@ -20,6 +20,7 @@ from examples.campaign_folder import (
     deviation_columns,
     write_campaign,
 )
+from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NAME = "hilti_trailblazer"
@@ -43,39 +44,48 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
 
     Returns:
         The robot; every joint of the chain that moves is actuated.
+
+    Raises:
+        BadInput: a joint moves about or along another axis than its z.
     """
     root = ET.parse(path).getroot()
-    links = {link.get("name"): link for link in root.findall("link")}
-    above = {j.find("child").get("link"): j for j in root.findall("joint")}
+    links = {said(link, "name"): link for link in root.findall("link")}
+    above = {said(j, "link", "child"): j for j in root.findall("joint")}
     chain = []
     while tip in above:
         chain.append(above[tip])
-        tip = above[tip].find("parent").get("link")
+        tip = said(above[tip], "link", "parent")
     frames, parent = [], "base"
     for joint in reversed(chain):
-        place = _origin(joint)
-        inertial = links[joint.find("parent").get("link")].find("inertial")
+        name, kind, place = said(joint, "name"), said(joint, "type"), _origin(joint)
+        inertial = links[said(joint, "link", "parent")].find("inertial")
         mass, centre = 0.0, np.zeros(3)
         if inertial is not None:
-            mass = float(inertial.find("mass").get("value"))
+            mass = float(said(inertial, "value", "mass"))
             centre = np.linalg.solve(place, _origin(inertial))[:3, 3]
-        kind = joint.get("type")
+        if kind != "fixed" and said(joint, "xyz", "axis") != "0 0 1":
+            raise BadInput(f"{path}: joint {name}: expected its axis to be 0 0 1")
         frames.append(
             Frame(
-                joint.get("name"), parent, place[:3, 3],
-                rotation_vector(place[:3, :3]), joint=kind, actuated=kind != "fixed",
-                mass=mass, centre_of_mass=centre,
+                name, parent, place[:3, 3], rotation_vector(place[:3, :3]), joint=kind,
+                actuated=kind != "fixed", mass=mass, centre_of_mass=centre,
             )
         )  # fmt: skip
-        parent = joint.get("name")
-    return Robot(root.get("name"), parent, tuple(frames), (), "from a URDF")
+        parent = name
+    return Robot(said(root, "name"), parent, tuple(frames), (), "from a URDF")
+
+
+def said(element: ET.Element, key: str, inside: str = "", default: str = "") -> str:
+    """An attribute of an element, or of one inside it."""
+    found = element.find(inside) if inside else element
+    return default if found is None else found.get(key) or default
 
 
 def _origin(element: ET.Element) -> NDArray:
     """(4, 4) of an ``origin``; roll, pitch, yaw about fixed axes."""
-    origin = element.find("origin")
-    xyz = [float(x) for x in origin.get("xyz").split()]
-    r, p, y = (float(x) for x in (origin.get("rpy") or "0 0 0").split())
+    xyz = [float(x) for x in said(element, "xyz", "origin", "0 0 0").split()]
+    rpy = said(element, "rpy", "origin", "0 0 0").split()
+    r, p, y = (float(x) for x in rpy)
     turn = rotation_matrix([[0, 0, y], [0, p, 0], [r, 0, 0]])
     return transform(xyz, turn[0] @ turn[1] @ turn[2])
 

@@ -39,10 +39,10 @@ def draw(scores: dict, rows: dict, out: Path) -> Path:
             at = space == number
             spread = height[at] + np.linspace(-0.04, 0.04, at.sum())
             panel.plot(
-                spread, left[at, 1], ".", color=color, ms=4, label=f"arm {number}"
+                spread, left[at, 0], ".", color=color, ms=4, label=f"arm {number}"
             )
         panel.axhline(0, color="0.6", lw=0.8)
-        panel.set(title=name, xlabel="column height [m]", ylabel="pallet, error y [mm]")
+        panel.set(title=name, xlabel="column height [m]", ylabel="pallet, error x [mm]")
         panel.set_ylim(-6, 6)
     panels[0].legend()
     path = out / "residuals.png"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from examples.calibration import (
     Fit,
     Rows,
+    Signature,
     Term,
     calibrate,
     joint_springs,
@@ -47,11 +48,11 @@ def column_clearance() -> Term:
     return Term(("play.x", "play.y"), np.full(2, 1e-2), _column(1, play=True))
 
 
-def _column(power: int, play: bool):
+def _column(power: int, play: bool) -> Signature:
     """Signature of tilts about the two horizontal axes, in both overlaps."""
 
     def signature(rows: Rows) -> NDArray:
-        moments, total = rows.joint_wrenches(), 0.0
+        moments, total = rows.joint_wrenches(), np.zeros((len(rows), 6, 2))
         for name in SEGMENTS:
             centre, axes, overlap = _guide(rows, name)
             m = moments[:, rows.here.robot.index(name), :2]
