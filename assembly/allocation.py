@@ -20,81 +20,22 @@ Sources:
     Uryasev (2000), Optimization of conditional value-at-risk.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.distributions import ErrorSources
 from assembly.estimates import proportion
-from assembly.monte_carlo import Experiment
 from assembly.posture import Posture
-from assembly.posture_margins import prepare_margins
-from assembly.worst_case import (
-    bound_energy,
-    bound_margin,
-    random_corners,
-    respond,
-    worst_corner,
-)
+from assembly.requirement import TRAINING, Plan, Requirement
+from assembly.verification import prove_worst, verify_yield
+from assembly.worst_case import CORNERS, random_corners, respond, worst_corner
 from stiffness.reading import BadInput
 
-CONVEX = ("margin", "margin_free", "energy")
-COSTS = ("reciprocal", "logarithm")
-_TRAINING, _FRESH = 10, 11  # streams of random numbers
-_CORNERS = 24
 _TOLERANCE = 1e-3  # of a limit: by how much the programme may still violate it
 _MOST_CUTS = 200
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """What is asked of the tolerances.
-
-    Attributes:
-        sources: m errors within tolerances of 1 [rad or m].
-        group: (m,) class of each.
-        names: of the G classes.
-        costs: (G,) > 0.
-        least: (G,) [rad or m] no tolerance is tighter.
-        most: (G,) [rad or m] and none looser.
-        cost: ``"reciprocal"`` or ``"logarithm"``.
-        limits: by quantity: margin, margin_free, energy [J], force [N], moment [N m],
-            stress [Pa], rotation [rad], translation [m].
-        asked_yield: 1 means always; else the share of robots that must meet every
-            limit at every posture.
-        draws: training draws at every posture.
-        seed: of all draws.
-    """
-
-    sources: ErrorSources
-    group: NDArray
-    names: tuple[str, ...]
-    costs: NDArray
-    least: NDArray
-    most: NDArray
-    limits: Mapping[str, float]
-    cost: str = "reciprocal"
-    asked_yield: float = 1.0
-    draws: int = 1000
-    seed: int = 1
-
-    def spread(self, tolerances: NDArray) -> NDArray:
-        """(m,) the tolerance of every source."""
-        return tolerances[self.group]
-
-    def gather(self, slopes: NDArray) -> NDArray:
-        """(G,) sums over the sources of each class."""
-        return np.bincount(self.group, weights=slopes, minlength=len(self.names))
-
-    def price(self, tolerances: NDArray) -> float:
-        """What tolerances cost."""
-        if self.cost == "reciprocal":
-            return float((self.costs / tolerances).sum())
-        return float(-(self.costs * np.log(tolerances)).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,60 +66,6 @@ class Allocation:
     verification: dict[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class _Postures:
-    """All postures made ready for what is limited."""
-
-    postures: Sequence[Posture]
-    plan: Plan
-
-    @cached_property
-    def experiments(self) -> list[Experiment]:
-        """Everything but the margins, at each posture."""
-        sources, stress = self.plan.sources, "stress" in self.plan.limits
-        found = [
-            Experiment(p, sources, margins=False, stress=stress) for p in self.postures
-        ]
-        for key in self.plan.limits:
-            if not key.startswith("margin"):
-                found[0].check_limits([key])
-        return found
-
-    @cached_property
-    def convex(self) -> dict[str, list]:
-        """By convex limit, the postures prepared for it."""
-        readings = {"margin": "rigid", "margin_free": "free"}
-        return {
-            key: [prepare_margins(p, readings[key]) for p in self.postures]
-            if key in readings else [e.energies for e in self.experiments]
-            for key in CONVEX if key in self.plan.limits
-        }  # fmt: skip
-
-    def shares(self, values: NDArray) -> NDArray:
-        """(k,) largest quantity over its limit, of all limits and postures."""
-        worst = np.zeros(len(values))
-        others = [key for key in self.plan.limits if not key.startswith("margin")]
-        for key, ready in self.convex.items():
-            if key.startswith("margin"):
-                for one in ready:
-                    found = respond(one, self.plan.sources, values)[0]
-                    share = found / self.plan.limits[key]
-                    worst = np.maximum(worst, np.where(np.isnan(share), np.inf, share))
-        for one in self.experiments if others else ():
-            rows = one.answer(values, range(len(values)))
-            screws = rows["platform_screw"]
-            sizes = {
-                "rotation": np.linalg.norm(screws[:, :3], axis=1),
-                "translation": np.linalg.norm(screws[:, 3:], axis=1),
-                "stress": rows["stress"].max(axis=1, initial=0.0),
-            }
-            for key in others:
-                found = sizes[key] if key in sizes else rows[key]
-                share = found / self.plan.limits[key]
-                worst = np.maximum(worst, np.where(np.isnan(share), np.inf, share))
-        return worst
-
-
 def allocate(
     postures: Sequence[Posture],
     plan: Plan,
@@ -200,13 +87,13 @@ def allocate(
         BadInput: an error is taken up by nothing, or even the tightest tolerances
             violate a limit.
     """
-    work = _Postures(postures, plan)
+    work = Requirement(postures, plan)
     driver = work
     if not work.convex:
         # nothing convex is limited: the energy gives the shape, the scale does the rest
         typical = _typical_energy(work)
-        driver = _Postures(postures, replace(plan, limits={"energy": typical}))
-    _check_taken_up(driver)
+        driver = Requirement(postures, replace(plan, limits={"energy": typical}))
+    driver.check_taken_up()
     t, bound, cuts = _cutting_planes(driver, progress)
     t = np.clip(t * _scale(work, t), plan.least, plan.most)
     always = plan.asked_yield == 1.0
@@ -214,42 +101,23 @@ def allocate(
         bound = np.nan
     answer = Allocation(plan, t, plan.price(t), bound, cuts)
     if always:
-        answer = _prove(work, answer, progress)
+        worst, proven = prove_worst(work, t, progress)
+        answer = replace(answer, worst=worst, proven_scale=proven)
     if fresh:
-        answer = replace(answer, verification=_verify(work, t, fresh, progress))
+        answer = replace(answer, verification=verify_yield(work, t, fresh, progress))
     return answer
 
 
-def _typical_energy(work: _Postures) -> float:
+def _typical_energy(work: Requirement) -> float:
     """[J] of half the draws at the loosest tolerances, at the first posture."""
     plan = work.plan
-    values = _standard(plan, _TRAINING, 200) * plan.spread(plan.most)
+    values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
     rows = work.experiments[0].answer(values, range(len(values)))
     return max(float(np.median(rows["energy"])), 1e-12)
 
 
-def _standard(plan: Plan, stream: int, count: int) -> NDArray:
-    """(count, m) errors of unit tolerances."""
-    return plan.sources.draw(0, count, plan.seed, stream)
-
-
-def _check_taken_up(work: _Postures) -> None:
-    """Refuse errors that neither play nor springs take up anywhere."""
-    sources = work.plan.sources
-    columns = 6 * sources.frame + sources.component
-    for key, ready in work.convex.items():
-        for one in ready:
-            left = np.abs(one.unanswered[:, columns]).max(axis=0, initial=0.0)
-            if left.max(initial=0.0) > 1e-9:
-                name = sources.labels[int(left.argmax())]
-                raise BadInput(
-                    f"limit {key}: no play or spring takes up an error {name}; leave "
-                    "it out, or limit the energy of a robot that gives way there"
-                )
-
-
 def _cutting_planes(
-    work: _Postures, progress: Callable[[str, int, int], None]
+    work: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
     """Tolerances, the programme's cost and its planes."""
     plan = work.plan
@@ -268,21 +136,21 @@ def _cutting_planes(
     return t, bound, len(planes)
 
 
-def _violated(work: _Postures, t: NDArray) -> Any:
+def _violated(work: Requirement, t: NDArray) -> Any:
     """Planes ``a.t <= b`` that the tolerances violate."""
     plan = work.plan
     spread = plan.spread(t)
     for key, ready in work.convex.items():
         limit = plan.limits[key]
         if plan.asked_yield == 1.0:
-            corners = random_corners(_CORNERS, len(spread), plan.seed)
+            corners = random_corners(CORNERS, len(spread), plan.seed)
             for one in ready:
                 worst = worst_corner(one, plan.sources, spread, corners)
                 slopes = plan.gather(worst.slopes * worst.signs)
                 if worst.value > limit * (1 + _TOLERANCE):
                     yield _plane(slopes, worst.value, t, limit)
             continue
-        draws = _standard(plan, _TRAINING, plan.draws)
+        draws = plan.draws_of(TRAINING, plan.draws)
         values = np.full(len(draws), -np.inf)
         slopes = np.zeros_like(draws)
         for one in ready:
@@ -329,19 +197,19 @@ def _solve(plan: Plan, planes: list[tuple[NDArray, float]]) -> NDArray:
     return np.clip(x.value * scale, plan.least, plan.most)
 
 
-def _scale(work: _Postures, t: NDArray) -> float:
+def _scale(work: Requirement, t: NDArray) -> float:
     """Factor on all tolerances at which the draws, or the worst corner, just fit."""
     plan = work.plan
     if plan.asked_yield == 1.0:
         samples = random_corners(plan.draws, len(plan.sources), plan.seed)
         worst = [
-            worst_corner(one, plan.sources, plan.spread(t), samples[:_CORNERS]).signs
+            worst_corner(one, plan.sources, plan.spread(t), samples[:CORNERS]).signs
             for ready in work.convex.values() for one in ready
         ]  # fmt: skip
         samples = np.vstack([samples, *worst]) if worst else samples
         allowed = 0
     else:
-        samples = _standard(plan, _TRAINING, plan.draws)
+        samples = plan.draws_of(TRAINING, plan.draws)
         # so many may fail that the yield asked for is still held with 95 %
         allowed = _allowed_failures(plan.draws, plan.asked_yield)
 
@@ -377,61 +245,3 @@ def _allowed_failures(draws: int, asked: float) -> int:
             "fails; ask for more draws"
         )
     return allowed
-
-
-def _prove(
-    work: _Postures, answer: Allocation, progress: Callable[[str, int, int], None]
-) -> Allocation:
-    """The answer with proven bounds of the worst, over all postures."""
-    plan, t = work.plan, answer.tolerances
-    spread, worst, scale = plan.spread(t), {}, np.inf
-    corners = random_corners(_CORNERS, len(spread), plan.seed + 1)
-    total = sum(map(len, work.convex.values()))
-    done = 0
-    for key, ready in work.convex.items():
-        lower, upper = 0.0, 0.0
-        for one in ready:
-            found = worst_corner(one, plan.sources, spread, corners).value
-            bound = bound_energy if key == "energy" else bound_margin
-            lower = max(lower, found)
-            upper = max(upper, bound(one, plan.sources, spread))
-            done += 1
-            progress("proofs", done, total)
-        worst[key] = lower, upper
-        # tighter tolerances need that much less play, springs that much less again
-        power = 0.5 if key == "energy" else 1.0
-        scale = min(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
-    covered = set(plan.limits) <= set(worst)
-    proven = min(1.0, scale) if covered else float("nan")
-    return replace(answer, worst=worst, proven_scale=proven)
-
-
-def _verify(
-    work: _Postures, t: NDArray, fresh: int,
-    progress: Callable[[str, int, int], None],
-) -> dict[str, Any]:  # fmt: skip
-    """Yield of fresh draws: of each posture, and of all postures together."""
-    plan = work.plan
-    values = _standard(plan, _FRESH, fresh) * plan.spread(t)
-    worst, each = np.zeros(fresh), []
-    for i, posture in enumerate(work.postures):
-        shares = _Postures([posture], plan).shares(values)
-        worst = np.maximum(worst, shares)
-        each.append(int((shares <= 1.0 + 1e-9).sum()) / fresh)
-        progress("verification", i + 1, len(work.postures))
-    good = int((worst <= 1.0 + 1e-9).sum())
-    found = proportion(good, fresh)
-    return {
-        "draws": fresh, "yield": found, "worst_posture_yield": min(each),
-        "posture_yields": each, "verdict": _verdict(found, plan.asked_yield),
-        "largest_share_of_a_limit": float(worst.max()),
-    }  # fmt: skip
-
-
-def _verdict(found: Mapping[str, float], asked: float) -> str:
-    """What an interval says of the yield asked for."""
-    if asked == 1.0:
-        return "no draw failed" if found["probability"] == 1.0 else "contradicted"
-    if found["lower"] >= asked:
-        return "shown"
-    return "not contradicted" if found["upper"] >= asked else "contradicted"

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.allocation import COSTS, Plan
 from assembly.distributions import KINDS, ErrorSources
 from assembly.draw import frames_named
 from assembly.monte_carlo import UNITS, limit_names
+from assembly.requirement import COSTS, Plan
 from assembly.robot import Robot
 from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW

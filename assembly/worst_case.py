@@ -20,6 +20,7 @@ from assembly.distributions import ErrorSources
 from assembly.one_posture import OnePosture
 from assembly.posture_margins import PostureMargins
 
+CORNERS = 24  # to start from
 _STEPS = 12  # from corner to corner; most searches end after three
 
 

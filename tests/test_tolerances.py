@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.allocation import Plan, allocate
+from assembly.allocation import allocate
 from assembly.distributions import tolerance_sources
 from assembly.one_posture import prepare_energies
 from assembly.posture import place_robot
 from assembly.posture_margins import prepare_margins
+from assembly.requirement import Plan
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.tolerance_file import read_plan
