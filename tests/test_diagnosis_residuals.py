@@ -1,0 +1,172 @@
+"""What a diagnosis makes of residuals: rows kept aside, noise or not, what varies."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom, kstest
+
+from tests.campaigns_for_tests import campaign_of
+from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis.holdout import split
+from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit, outlying
+from validation.diagnosis.signatures import conditions_of, whiten
+from validation.diagnosis.structure import trends
+
+# rows kept aside
+
+
+def test_no_configuration_is_on_both_sides():
+    repeat = np.repeat(np.arange(10), 4)
+    campaign = campaign_of(
+        np.ones((40, 6)), repeat=np.random.default_rng(0).permutation(repeat)
+    )
+    parts = split(campaign)
+    kept = set(campaign.configuration[~parts.fitted])
+    assert len(kept) == 10 // 4
+    assert not kept & set(campaign.configuration[parts.fitted])
+    assert np.array_equal(split(campaign).fitted, parts.fitted)
+    assert "8 rows of 2 of 10 configurations" in parts.how
+
+
+def test_few_configurations_are_split_by_spans_of_time():
+    """Sixteen spans of three rows, a quarter kept, each whole; order of time counts."""
+    order = np.random.default_rng(0).permutation(48)
+    campaign = campaign_of(
+        np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order
+    )
+    parts = split(campaign)
+    assert "12 rows of 4 of 16 spans of time" in parts.how
+    held = np.sort(order[~parts.fitted])
+    assert np.array_equal(held.reshape(4, 3) % 3, np.tile([0, 1, 2], (4, 1)))
+
+
+def test_one_row_is_not_split():
+    parts = split(campaign_of(np.ones((1, 6))))
+    assert parts.fitted.all()
+    assert "too few" in parts.how
+
+
+# is what is left noise?
+
+
+def noisy(rng, rows=40, sets=10, size=1.0):
+    """Noise of ``size`` sigmas, each configuration measured rows / sets times."""
+    z = size * rng.normal(size=(rows, 6))
+    z[rng.random(z.shape) < 0.1] = np.nan
+    return campaign_of(z * SIGMA, SIGMA, np.arange(rows) % sets)
+
+
+def test_probabilities_of_noise_are_uniform(rng):
+    """So that the stated rate of false alarms is the true one."""
+    found = []
+    for _ in range(300):
+        campaign = noisy(rng)
+        found.append(lack_of_fit(campaign, whiten(campaign, campaign.measured), 0))
+    for kind in ("probability", "against_repeats"):
+        drawn = [getattr(one, kind) for one in found]
+        assert kstest(drawn, "uniform").pvalue > 1e-3
+        alarms = np.sum(np.array(drawn) < 0.05)
+        assert binom.cdf(alarms, 300, 0.05) < 1 - 1e-4
+    assert not any(one.significant for one in found)
+
+
+def test_scatter_between_repeats_by_hand():
+    """1 and 3: 2 about their mean, one degree of freedom; a third stands alone."""
+    seen = np.full((3, 6), np.nan)
+    seen[:, 4] = [1.0, 3.0, 50.0]
+    campaign = campaign_of(seen, repeat=[0, 0, 1])
+    found = lack_of_fit(campaign, whiten(campaign, seen), 1)
+    assert found.repeats == pytest.approx(np.sqrt(2))
+    assert found.repeats_freedom == 1
+    assert found.freedom == 2
+    assert found.rms == pytest.approx(np.sqrt(2510 / 2))
+
+
+def test_a_device_worse_than_stated_is_no_lack_of_fit(rng):
+    campaign = noisy(rng, 120, 20, size=2.0)
+    found = lack_of_fit(campaign, whiten(campaign, campaign.measured), 0)
+    assert found.probability < SIGNIFICANT
+    assert found.sigma_too_small
+    assert found.repeats == pytest.approx(2.0, rel=0.1)
+    assert not found.significant
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0])
+def test_what_repeats_share_is_a_lack_of_fit(size, rng):
+    """Whatever the device: 2 sigma common to all visits of a configuration."""
+    campaign = noisy(rng, 120, 20, size)
+    shared = 2 * size * rng.normal(size=(20, 6))[campaign.repeat] * SIGMA
+    z = whiten(campaign, campaign.measured + shared)
+    assert lack_of_fit(campaign, z, 0).significant
+
+
+def test_a_row_far_off_is_named_and_at_most_one_in_twenty(rng):
+    z = rng.normal(size=(40, 6))
+    z[7, 3] += 40
+    campaign = campaign_of(z)
+    assert np.flatnonzero(outlying(campaign, z[campaign.cells])).tolist() == [7]
+    z[[3, 20], 0] += 60
+    assert np.flatnonzero(outlying(campaign_of(z), z.ravel())).tolist() == [3, 20]
+
+
+def test_noise_has_no_outliers(rng):
+    for _ in range(50):
+        z = rng.normal(size=(100, 6))
+        z[rng.random(z.shape) < 0.7] = np.nan
+        z[:, 2] = rng.normal(size=100)
+        campaign = campaign_of(z)
+        assert not outlying(campaign, z[campaign.cells]).any()
+
+
+# what is left
+
+
+def varied(rng, rows=120):
+    """A post under loads in all directions, in wet and dry air; noise."""
+    loads = np.zeros((rows, 6))
+    loads[:, 3:] = 20 * rng.normal(size=(rows, 3))
+    return campaign_of(
+        rng.normal(size=(rows, 6)) * SIGMA, SIGMA, loads=loads,
+        humidity=rng.uniform(-1, 1, rows), time=60.0 * np.arange(rows),
+        temperature=rng.normal(size=rows),
+    )  # fmt: skip
+
+
+PLANTED = {
+    "square of the load's size": lambda c: (np.abs(c.loads) ** 2).sum(axis=1) / 400,
+    "load.fy": lambda c: c.loads[:, 4] / 20,
+    "cov.humidity": lambda c: c.covariates["humidity"] * 2,
+    "cov.temperature and its square": lambda c: c.covariates["temperature"] ** 2,
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_what_the_rest_varies_with_is_named_first(name, rng):
+    """A larger family that holds the planted one may take a little more."""
+    campaign = varied(rng)
+    shape = PLANTED[name](campaign)
+    rest = campaign.measured + np.outer(shape, [1, 0, -1, 1, 0.5, 0]) * SIGMA
+    found = trends(campaign, conditions_of(campaign), rest)
+    holders = {name, f"{name} and its square"}
+    if name == "load.fy":
+        holders.add("load, linearly")
+    assert found[0].against in holders
+    assert found[0].probability < 1e-6
+    assert name in [t.against for t in found]
+
+
+def test_the_share_taken_away_is_that_of_the_squares(rng):
+    """Nothing but the trend: all of it."""
+    campaign = varied(rng)
+    rest = np.outer(campaign.covariates["humidity"], np.ones(6)) * SIGMA
+    rest += 1e-6 * campaign.measured
+    found = {t.against: t for t in trends(campaign, conditions_of(campaign), rest)}
+    assert found["cov.humidity"].share == pytest.approx(1.0, abs=1e-9)
+
+
+def test_nothing_is_seen_in_noise(rng):
+    """Stated: once in a thousand campaigns; two of 50 would be a chance of 1e-3."""
+    alarms = 0
+    for _ in range(50):
+        campaign = varied(rng, 60)
+        alarms += bool(trends(campaign, conditions_of(campaign), campaign.measured))
+    assert alarms <= 1
