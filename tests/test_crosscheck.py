@@ -99,7 +99,7 @@ def test_a_difference_that_finite_rotations_leave_fails(posture, monkeypatch):
 
     right = validation.pair.solve_exact
 
-    def wrong(place, *_):
+    def wrong(place, *_, **__):
         robot = place.robot.with_errors(1.01 * place.robot.errors)
         return right(replace(place, robot=robot))
 
