@@ -18,7 +18,7 @@ q       ``free``       (6n, nq)    motions without bound, in units of their scre
 ======  =============  ==========  ================================================
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -56,7 +56,6 @@ class VirtualJoints:
     bounded_motion: bool
 
 
-@lru_cache(maxsize=16)
 def virtual_joints(
     robot: Robot, compliant: str = "elastic", bounded_motion: bool = False
 ) -> VirtualJoints:
@@ -74,6 +73,35 @@ def virtual_joints(
     Returns:
         The columns.
     """
+    return _virtual_joints(_Parts(_parts(robot), robot), compliant, bounded_motion)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Robots that differ in errors and masses alone have the same virtual joints."""
+
+    parts: tuple
+    robot: Robot = field(compare=False)
+
+
+def _parts(robot: Robot) -> tuple:
+    """All that virtual joints depend on; links by identity, the robot keeps them."""
+    return tuple(
+        (
+            f.parent, f.joint, f.actuated, f.clearance, id(f.link),
+            f.translation.tobytes(), f.rotation.tobytes(),
+            None if f.joint_stiffness is None else f.joint_stiffness.tobytes(),
+        )
+        for f in robot.frames
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _virtual_joints(
+    case: _Parts, compliant: str, bounded_motion: bool
+) -> VirtualJoints:
+    """The columns, once for all robots of the same parts."""
+    robot = case.robot
     turns = compliant in {"free", "hinged"}
     bounds = clearance_bounds(robot, "free" if turns else "elastic")
     play = scales_with_margin(robot)

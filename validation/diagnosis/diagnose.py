@@ -158,7 +158,7 @@ class _Selection:
 
 
 def _select_with_play(campaign: Campaign, here: Conditions) -> _Selection:
-    """Select with declared play held where it rests, first as declared, then as found."""
+    """Select, declared play held where it rests: as declared, then as found."""
     # where play rests in closed chains is found row by row, too slowly for every trial
     play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
     if not play:
