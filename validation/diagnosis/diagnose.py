@@ -27,7 +27,13 @@ from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
-from validation.diagnosis.refit import Fit, refit
+from validation.diagnosis.refit import (
+    Fit,
+    adds_play,
+    in_full,
+    refit,
+    resting,
+)
 from validation.diagnosis.registration import device_frame, register
 from validation.diagnosis.scoring import Scored, Screen, inclusion
 from validation.diagnosis.signatures import (
@@ -181,6 +187,7 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
     signatures = [s for s in signatures if _finite(s) and _shows(s)]
     project = _projector([tangents.at_start(h) for h in nuisance])
     best: tuple[Hypothesis, ...] = ()
+    rest: NDArray | None = None  # where play would rest in closed chains; slow to find
     for turn in range(_ROUNDS):
         screen = Screen(
             project(tangents.residual[:, None])[:, 0],
@@ -192,13 +199,22 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
         for one in _worth_refitting(screen, sets):
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
-            fits[one.members] = refit(campaign, here, [*nuisance, *members], start)
+            every = [*nuisance, *members]
+            there = here
+            if adds_play(here, every):
+                rest = resting(here, every, start) if rest is None else rest
+                there = replace(here, rest=rest)
+            fits[one.members] = refit(campaign, there, every, start)
         sets = _with_fits(screen, sets, fits)
         chosen = fits[sets[0].members]
         if turn and chosen.hypotheses == best:
             break
         best = chosen.hypotheses
+        if adds_play(here, best):
+            rest = resting(here, best, chosen.values)
         signatures = _about(tangents, signatures, chosen, len(nuisance))
+    if adds_play(here, chosen.hypotheses):
+        chosen = in_full(campaign, here, chosen)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rival = _rival(screen, sets, fits)
     return _Selection(screen, sets, chosen, rival, unknowns, tangents)

@@ -23,7 +23,6 @@ from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
-_SETTLINGS = 2  # of play in closed chains; a third changes nothing that shows
 _LOST = 1e3  # [sigma] a reading that the model has no answer for
 
 
@@ -108,51 +107,60 @@ def _public(
     return found
 
 
+def adds_play(here: Conditions, members: Sequence[Hypothesis]) -> bool:
+    """Whether a set puts play into closed chains, where it is found row by row."""
+    added = any(h.effect == "joint_clearance" for h in members)
+    return added and bool(here.robot.closures) and here.rest is None
+
+
+def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDArray:
+    """Where play rests by the least energy with hypotheses at some values.
+
+    Args:
+        here: conditions without the effects.
+        members: the hypotheses.
+        x: their unknowns, one after the other.
+
+    Returns:
+        (R, n, 6) in units of its bounds; a foundation's frame is left out.
+    """
+    there = settle(apply_effects(here, dict(_public(members, x, here.robot))))
+    assert there.rest is not None
+    return there.rest[:, -len(here.robot.frames) :]
+
+
+def in_full(campaign: Campaign, here: Conditions, fit: Fit) -> Fit:
+    """A fit whose residual has play where the least energy puts it now.
+
+    Args:
+        campaign: what was measured.
+        here: its conditions without the effects.
+        fit: made with play held.
+
+    Returns:
+        The same numbers with the full model's residual.
+    """
+    there = apply_effects(here, fit.effects)
+    model = whiten(campaign, predict(there).deviation)
+    left = whiten(campaign, campaign.measured) - model
+    left = np.where(np.isfinite(left), left, _LOST)
+    return replace(fit, conditions=there, residual=left)
+
+
 def refit(
     campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
 ) -> Fit:
     """Fit a set of hypotheses in the full model.
 
-    Play in closed chains is found row by row and is slow: it is settled by the least
-    energy, held while the unknowns are fitted, and settled again.
-
     Args:
         campaign: what was measured.
-        here: its conditions without the effects.
+        here: its conditions without the effects; with ``rest``, play is held there.
         members: hypotheses of different effects.
         start: where to begin, one unknown after the other.
 
     Returns:
         The fit.
     """
-    adds_play = any(h.effect == "joint_clearance" for h in members)
-    if not (adds_play and here.robot.closures) or here.rest is not None:
-        return _fit(campaign, here, members, start)
-    fit = _fit(
-        campaign, replace(here, rest=_rest(here, members, start)), members, start
-    )
-    for _ in range(_SETTLINGS - 1):
-        rest = _rest(here, members, fit.values)
-        fit = _fit(campaign, replace(here, rest=rest), members, fit.values)
-    conditions = apply_effects(here, fit.effects)
-    model = whiten(campaign, predict(conditions).deviation)
-    left = whiten(campaign, campaign.measured) - model
-    return replace(
-        fit, conditions=conditions, residual=np.where(np.isfinite(left), left, _LOST)
-    )
-
-
-def _rest(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDArray:
-    """Where play rests with effects at some values; a foundation's frame left out."""
-    there = settle(apply_effects(here, dict(_public(members, x, here.robot))))
-    assert there.rest is not None
-    return there.rest[:, -len(here.robot.frames) :]
-
-
-def _fit(
-    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
-) -> Fit:
-    """Least squares with play, if any, as the conditions have it."""
     slots = [slot for h in members for slot in h.slots]
     lower = np.array([slot.unknown.lower for slot in slots])
     upper = np.array([slot.unknown.upper for slot in slots])
