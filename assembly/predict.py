@@ -73,7 +73,11 @@ def predict(here: Conditions) -> Prediction:
             screws[row] = assemble_row(here, row).platform_screw
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
-    return Prediction(read(here, screws), reason, open_)
+    known = np.isfinite(screws).all(axis=1)
+    deviation = np.full_like(screws, np.nan)
+    if known.any():
+        deviation[known] = read(here.take(known), screws[known])
+    return Prediction(deviation, reason, open_)
 
 
 def settle(here: Conditions) -> Conditions:

@@ -7,7 +7,6 @@ import typer
 
 from assembly.cli import JsonOption, progress_bars
 from assembly.robot_file import write_robot
-from stiffness.reading import BadInput
 from stiffness.writing import check_writable, write_json
 from validation.inspect_cli import CampaignArgument
 
@@ -34,7 +33,7 @@ def diagnose(
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
 
-    for path in (report, save):
+    for path in (report, save, Path(json) if json not in {None, "-"} else None):
         if path is not None:
             check_writable(path)
     found = trace(read_campaign(campaign))
@@ -56,7 +55,6 @@ def diagnose(
         write_report(found, report, tally)
     if save is not None:
         if found.verdict != "explained":
-            raise BadInput(
-                f"--save {save}: not written, the verdict is {found.verdict}"
-            )
+            typer.echo(f"{save}: not written, the verdict is {found.verdict}", err=True)
+            raise typer.Exit(1)
         write_robot(results.corrected(found), save)

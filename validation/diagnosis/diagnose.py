@@ -48,6 +48,7 @@ from validation.diagnosis.verdict import by_names, verdict
 
 _ROUNDS = 4  # of refitting and scoring again
 _VISIBLE = 4.0  # squared whitened change of the readings
+_FEW = 3  # of the best sets are refitted
 _KINDS = 4  # sets of different effects that are refitted
 _NEAR = 6.0  # in score: sets this near the best are refitted too
 
@@ -188,6 +189,7 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
     project = _projector([tangents.at_start(h) for h in nuisance])
     best: tuple[Hypothesis, ...] = ()
     rest: NDArray | None = None  # where play would rest in closed chains; slow to find
+    known: dict[object, Fit] = {}
     for turn in range(_ROUNDS):
         screen = Screen(
             project(tangents.residual[:, None])[:, 0],
@@ -200,14 +202,17 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
             every = [*nuisance, *members]
-            there = here
             if adds_play(here, every):
                 rest = resting(here, every, start) if rest is None else rest
-                there = replace(here, rest=rest)
-            fits[one.members] = refit(campaign, there, every, start)
+                held = replace(here, rest=rest)
+                fits[one.members] = refit(campaign, held, every, start)
+                continue
+            if _names(every) not in known:
+                known[_names(every)] = refit(campaign, here, every, start)
+            fits[one.members] = known[_names(every)]
         sets = _with_fits(screen, sets, fits)
         chosen = fits[sets[0].members]
-        if turn and chosen.hypotheses == best:
+        if turn and _names(chosen.hypotheses) == _names(best):
             break
         best = chosen.hypotheses
         if adds_play(here, best):
@@ -234,18 +239,20 @@ def _rival(
 
 def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
     """The best sets, all their parts, and the best sets of other effects."""
-    near = [s for s in sets[:6] if s.score > sets[0].score - _NEAR]
-    parts = {
-        tuple(i for i in s.members if i != left)
-        for s in near
-        for left in (None, *s.members)
-    }
+    parts = {s.members for s in sets[:_FEW] if s.score > sets[0].score - _NEAR}
+    best = sets[0].members
+    parts |= {tuple(i for i in best if i != left) for left in best}
     kinds: dict[frozenset[str], Scored] = {}
     for s in sets:
         kinds.setdefault(frozenset(screen.effects[i] for i in s.members), s)
     others = list(kinds.values())[:_KINDS]
     parts |= {s.members for s in others if s.score > sets[0].score - _NEAR}
     return [s for s in sets if s.members in parts]
+
+
+def _names(members: Sequence[Hypothesis]) -> tuple[object, ...]:
+    """What a set fits, wherever it begins."""
+    return tuple((h.effect, tuple(slot.names for slot in h.slots)) for h in members)
 
 
 def _start(one: Scored, members: Sequence[Hypothesis]) -> NDArray:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from validation.campaign import Campaign
+from validation.campaign import Campaign, number_rows
 
 SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
+_LEVELS = 10  # of a covariate's range within which rows are alike
 _OUTLYING = 5.5  # rms of a row, in medians of all rows
 
 
@@ -83,12 +84,24 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
     """Squares between repeats of the same configuration and load, and their number."""
     rows, columns = np.nonzero(campaign.cells)
-    group = campaign.repeat[rows] * 6 + columns
+    group = _alike(campaign)[rows] * 6 + columns
     order = np.argsort(group, kind="stable")
     _, start, count = np.unique(group[order], return_index=True, return_counts=True)
     sums = np.add.reduceat(residual[order], start)
     squares = np.add.reduceat(residual[order] ** 2, start) - sums**2 / count
     return float(squares[count > 1].sum()), int((count[count > 1] - 1).sum())
+
+
+def _alike(campaign: Campaign) -> NDArray:
+    """(R,) number of the situation: command, load, every covariate but time."""
+    # alike: no covariate differs by more than a tenth of its range.  What nobody
+    # modelled must not pass for noise
+    parts = [campaign.repeat]
+    for name, values in campaign.covariates.items():
+        span = float(np.ptp(values))
+        if name != "time" and span > 0:
+            parts.append(np.floor(_LEVELS * (values - values.min()) / span))
+    return number_rows(*parts)
 
 
 def outlying(campaign: Campaign, residual: NDArray) -> NDArray:

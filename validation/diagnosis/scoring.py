@@ -190,7 +190,12 @@ class Screen:
             self._enlarge(
                 found, {(*s.members, j) for s in best[:_BEST] for j in chosen}
             )
-        return sorted(found.values(), key=lambda s: -s.score)
+        return sorted(found.values(), key=self._order)
+
+    def _order(self, one: Scored) -> tuple[float, int]:
+        """Best score first; of equal ones, the one that acts at fewer frames."""
+        where = sum(len(self.signatures[i].hypothesis.where) for i in one.members)
+        return -round(one.score, 6), where
 
     def _enlarge(
         self, found: dict[tuple[int, ...], Scored], sets: set[tuple[int, ...]]
