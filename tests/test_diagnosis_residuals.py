@@ -81,6 +81,18 @@ def test_scatter_between_repeats_by_hand():
     assert found.rms == pytest.approx(np.sqrt(2510 / 2))
 
 
+def test_the_same_command_on_a_warmer_day_is_no_repeat():
+    """Within a tenth of the range it is; time is no difference."""
+    seen = np.full((4, 6), np.nan)
+    seen[:, 4] = [1.0, 3.0, 50.0, 7.0]
+    temperature = np.array([0.0, 0.5, 9.0, 10.0])
+    campaign = campaign_of(
+        seen, repeat=[0, 0, 0, 1], temperature=temperature, time=900.0 * np.arange(4)
+    )
+    found = lack_of_fit(campaign, whiten(campaign, seen), 0)
+    assert (found.repeats_freedom, found.repeats) == (1, pytest.approx(np.sqrt(2)))
+
+
 def test_a_device_worse_than_stated_is_no_lack_of_fit(rng):
     campaign = noisy(rng, 120, 20, size=2.0)
     found = lack_of_fit(campaign, whiten(campaign, campaign.measured), 0)
