@@ -5,7 +5,8 @@ and, where the data are at hand, those of another program.
 """
 
 import json
-import runpy
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -316,13 +317,15 @@ def test_practice_campaigns_of_another_program(tmp_path):
     for name in truth:
         found = table(diagnose(read_campaign(practice / name)))
         (tmp_path / f"{name}.json").write_text(json.dumps(plain(found)))
-    score = runpy.run_path(str(practice / "score.py"))
     out = tmp_path / "score.out"
-    total = score["main"](str(path), str(tmp_path), str(out))
+    words = [practice / "score.py", path, tmp_path, "--json", out]
+    subprocess.run([sys.executable, *words], check=True)
+    scored = json.loads(out.read_text())
+    total = scored["total"]
     assert total["missing"] == total["verdict_wrong"] == total["false_claims"] == 0
     assert total["effects_wrong"] == 0
     assert total["par_ok"] == total["par_found"]
-    rows = {row["name"]: row for row in json.loads(out.read_text())["rows"]}
+    rows = {row["name"]: row for row in scored["rows"]}
     for name, row in rows.items():
         if truth[name]["verdict"] == "explained":
             assert row["after"] <= 1.15 * row["floor"]
