@@ -58,6 +58,8 @@ class Conditions:
         approach: (R,) -1 or 1; NaN where not known.
         laws: contact springs in series with joints.
         exact: finite motions instead of the linear model.
+        second_order: (R, 6) [rad, m] what finite motions add to the linear platform
+            screw without load; see :func:`assembly.predict.with_second_order`.
         rest: (R, n, 6) where play rests, in units of its bounds; None where the least
             energy is to say.
         base: (6,) [rad, m] turn and shift of the measuring frame, acting on the left.
@@ -79,6 +81,7 @@ class Conditions:
     approach: NDArray
     laws: tuple[ContactLaw, ...] = ()
     exact: bool = False
+    second_order: NDArray | float = 0.0
     rest: NDArray | None = None
     base: NDArray = field(default_factory=lambda: np.zeros(6))
     tool: NDArray = field(default_factory=lambda: np.zeros(3))
@@ -123,8 +126,10 @@ class Conditions:
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
-        if isinstance(self.reading, np.ndarray):
-            kept["reading"] = self.reading[index]
+        for name in ("reading", "second_order"):
+            values = getattr(self, name)
+            if isinstance(values, np.ndarray):
+                kept[name] = values[index]
         if self.rest is not None:
             kept["rest"] = self.rest[index]
         return replace(self, **kept)

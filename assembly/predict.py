@@ -28,6 +28,7 @@ from assembly.resting_play import at_rest, fractions, taken_up
 from stiffness.screws import rotation_matrix, rotation_vector
 
 _STEPS = 100
+_CORRECTED = 40  # configurations whose second order is found
 _SETTLED = 1e-11  # relative change of a contact's deflection
 
 
@@ -73,11 +74,48 @@ def predict(here: Conditions) -> Prediction:
             screws[row] = assemble_row(here, row).platform_screw
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
+    if not here.exact:
+        screws = screws + here.second_order
     known = np.isfinite(screws).all(axis=1)
     deviation = np.full_like(screws, np.nan)
     if known.any():
         deviation[known] = read(here.take(known), screws[known])
     return Prediction(deviation, reason, open_)
+
+
+def with_second_order(here: Conditions) -> Conditions:
+    """Conditions whose linear answers carry what the declared errors do beyond it.
+
+    Near a singularity a robot's own geometric errors move it so far that the linear
+    model is wrong by more than a device's noise, whatever the load.  The difference of
+    the exact and the linear platform screw without load is found once a configuration,
+    where deviations are largest first; effects of load stay linear.
+
+    Args:
+        here: R situations of a robot, as declared.
+
+    Returns:
+        The same, ``second_order`` given.
+    """
+    found = np.zeros((len(here), 6))
+    if virtual_joints(here.robot).cones.shape[1]:
+        return here  # where play rests without load is open
+    zero = np.zeros_like(here.load)
+    still = replace(here, load=zero, gravity=np.zeros_like(here.gravity), laws=())
+    size = np.linalg.norm(predict(still).deviation, axis=1)
+    _, which = in_groups(here.postures)
+    seen: set[int] = set()
+    for row in np.argsort(-np.nan_to_num(size), kind="stable").tolist():
+        if which[row] in seen or len(seen) == _CORRECTED:
+            continue
+        seen.add(int(which[row]))
+        try:
+            exact = assemble_row(replace(still, exact=True), row).platform_screw
+            linear = assemble_row(still, row).platform_screw
+        except (CannotAssemble, FreeMotion, SolverFailed):
+            continue
+        found[which == which[row]] = exact - linear
+    return replace(here, second_order=found)
 
 
 def settle(here: Conditions) -> Conditions:

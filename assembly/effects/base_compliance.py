@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from assembly.conditions import Conditions
-from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.effect import RIGID, Effect, Unknown, Values
 from assembly.robot import BASE, Frame, Robot
 from stiffness.screws import SCREW
 
@@ -51,7 +51,7 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()
-        if c > 0
+        if c > RIGID
     }
 
 

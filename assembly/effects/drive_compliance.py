@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import partial
 
 from assembly.conditions import Conditions
-from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.effect import RIGID, Effect, Unknown, Values
 from assembly.effects.places import drives, in_series, own_unit, with_frame
 from assembly.robot import Frame, Robot
 
@@ -27,7 +27,7 @@ def _unit(robot: Robot, name: str) -> str:
 def _public(robot: Robot, values: Values) -> dict[str, float]:
     """Stiffnesses from compliances; a rigid drive is none of the effect's."""
     ends = len(".compliance")
-    return {name[:-ends]: 1 / c for name, c in values.items() if c > 0}
+    return {name[:-ends]: 1 / c for name, c in values.items() if c > RIGID}
 
 
 DRIVE_COMPLIANCE = Effect(

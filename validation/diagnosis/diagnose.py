@@ -21,7 +21,7 @@ from assembly.closure import virtual_joints
 from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
-from assembly.predict import predict, settle
+from assembly.predict import predict, settle, with_second_order
 from validation.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
@@ -35,7 +35,7 @@ from validation.diagnosis.refit import (
     resting,
 )
 from validation.diagnosis.registration import device_frame, register
-from validation.diagnosis.scoring import Scored, Screen, inclusion
+from validation.diagnosis.scoring import Scored, Screen, inclusion, named
 from validation.diagnosis.signatures import (
     Signature,
     Tangents,
@@ -133,7 +133,7 @@ def diagnose(campaign: Campaign) -> Diagnosis:
         BadInput: the measuring frame is not known and cannot be found.
     """
     parts = split(campaign)
-    here = conditions_of(campaign)
+    here = with_second_order(conditions_of(campaign))
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
     outliers = np.zeros(len(campaign), dtype=bool)
@@ -363,7 +363,7 @@ def _judge(
     declared = lack_of_fit(fitting, found.tangents.residual, 0)
     sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
-    best = tuple(sorted(found.screen.effects[i] for i in found.sets[0].members))
+    best = named(found.screen, found.sets[0])
     said, claimed = verdict(sets, probability, lack.significant)
     after = apply_effects(here, found.fit.effects)
     measured = campaign.measured

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.registration import BASE
-from assembly.predict import predict
+from assembly.predict import predict, with_second_order
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix
 from validation.campaign import Campaign
@@ -51,7 +51,7 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
     """
     from validation.diagnosis.signatures import conditions_of
 
-    own = conditions_of(campaign)
+    own = with_second_order(conditions_of(campaign))
     start = _coarse(campaign, own)
     own = apply_effects(own, {"registration": start})
     here = apply_effects(here, {"registration": start})

@@ -66,9 +66,8 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
     robot = found.campaign.robot
     shown = []
     for k, h in enumerate(found.fit.hypotheses):
-        nuisance = h.effect == "registration" and h.effect not in found.best_by_score
-        if nuisance:
-            continue
+        if h.effect not in found.best_by_score:
+            continue  # a device's frame fitted anyway, or finite motions beside others
         shown.append({
             "name": h.effect,
             "where": list(h.where),

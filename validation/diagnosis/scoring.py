@@ -261,6 +261,17 @@ def inclusion(screen: Screen, sets: Sequence[Scored]) -> dict[str, float]:
     """Probability of every effect: the weight of all sets that have it."""
     found = dict.fromkeys(screen.effects, 0.0)
     for one, weight in zip(sets, posterior(sets), strict=True):
-        for i in one.members:
-            found[screen.effects[i]] += float(weight)
+        for name in named(screen, one):
+            found[name] += float(weight)
     return found
+
+
+def named(screen: Screen, one: Scored) -> tuple[str, ...]:
+    """Names of a set's effects, in alphabetical order.
+
+    Finite motions beside another effect only refine the model in which that one is
+    fitted (near singularities they show at any load); alone they are the effect.
+    """
+    names = sorted(screen.effects[i] for i in one.members)
+    others = [name for name in names if name != "geometric_stiffening"]
+    return tuple(others or names)

@@ -24,7 +24,7 @@ from assembly.resting_play import taken_up
 from validation.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
-_PROBED = 6  # rows
+_PROBED = 4  # rows
 _HARDLY = 2.0  # squared whitened change of all readings together
 _STEP = 1e-3  # of an unknown's plausible size, for its first derivative
 
@@ -153,7 +153,8 @@ class Tangents:
         """Whether an effect without unknowns hardly shows where loads are largest."""
         # the exact model is a hundred times slower than the linear one
         load = np.linalg.norm(self.here.load, axis=1)
-        rows = np.argsort(-load, kind="stable")[:_PROBED]
+        size = np.linalg.norm(predict(self.here).deviation[:, :3], axis=1)
+        rows = np.unique([*np.argsort(-load)[:_PROBED], *np.argsort(-size)[:_PROBED]])
         some, part = self.campaign.take(rows), self.here.take(rows)
         there = apply_effects(part, {hypothesis.effect: {}})
         change = predict(there).deviation - predict(part).deviation

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
-from validation.diagnosis.scoring import Scored, Screen, inclusion, posterior
+from validation.diagnosis.scoring import Scored, Screen, inclusion, named, posterior
 
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one stands against it
@@ -29,7 +29,7 @@ def by_names(screen: Screen, sets: Sequence[Scored]) -> Sets:
     """
     weights: dict[tuple[str, ...], float] = {}
     for one, weight in zip(sets, posterior(sets), strict=True):
-        names = tuple(sorted(screen.effects[i] for i in one.members))
+        names = named(screen, one)
         weights[names] = weights.get(names, 0.0) + float(weight)
     listed = sorted(weights.items(), key=lambda item: -item[1])
     return tuple((names, p) for names, p in listed if p >= _LISTED)
@@ -99,7 +99,7 @@ def calibrate(
     """
     rng = np.random.default_rng(0)
     signal = screen.shown(best)
-    truth = tuple(sorted(screen.effects[i] for i in best.members))
+    truth = named(screen, best)
     tally: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
     right = wrong = 0
     for k in range(2 * count):
