@@ -204,7 +204,7 @@ def flexibility(postures: Posture) -> Flexibility:
         clearance_bounds(robot),
         postures.transforms,
     ):
-        digest.update(np.ascontiguousarray(numbers))
+        digest.update(np.ascontiguousarray(numbers).tobytes())
     return _factorise(_Case(digest.digest(), postures, bodies, joints))
 
 

@@ -19,14 +19,14 @@ class Polytope(NamedTuple):
     """The points below a growing number of planes.
 
     Attributes:
-        corners: (4096, 3) the first ``count[0]`` are the body's; some may lie together.
+        corners: (4096, 3) the first ``used[0]`` are the body's; some may lie together.
         planes: (4096, 3) the planes through each.
-        count: (2,) corners, and planes so far.
+        used: (2,) corners, and planes so far.
     """
 
     corners: NDArray
     planes: NDArray
-    count: NDArray
+    used: NDArray
 
 
 @njit(cache=True)
@@ -55,7 +55,7 @@ def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> Non
             for a in range(3):
                 body.corners[i, a] += height * axes[axis, a]
             body.planes[i, axis] = 2 * axis + side
-    body.count[0], body.count[1] = 8, 6
+    body.used[0], body.used[1] = 8, 6
 
 
 @njit(cache=True)
@@ -71,8 +71,8 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
         Whether there was room for the new corners; if not, the body is as it was.
     """
     corners, planes = body.corners, body.planes
-    count, plane = body.count[0], body.count[1]
-    body.count[1] += 1
+    count, plane = body.used[0], body.used[1]
+    body.used[1] += 1
     above, size = np.empty(count), 0.0
     for i in range(count):
         above[i] = -height
@@ -111,7 +111,7 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
             if kept != i:
                 corners[kept], planes[kept] = corners[i], planes[i]
             kept += 1
-    body.count[0] = kept
+    body.used[0] = kept
     return True
 
 
@@ -119,7 +119,7 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
 def farthest_corner(body: Polytope) -> NDArray:
     """(3,) the corner farthest from the origin."""
     best, at = -1.0, 0
-    for i in range(body.count[0]):
+    for i in range(body.used[0]):
         size = 0.0
         for a in range(3):
             size += body.corners[i, a] ** 2

@@ -271,6 +271,13 @@ def named(screen: Screen, one: Scored) -> tuple[str, ...]:
 
     Finite motions beside another effect only refine the model in which that one is
     fitted (near singularities they show at any load); alone they are the effect.
+
+    Args:
+        screen: whose set.
+        one: the set.
+
+    Returns:
+        The names.
     """
     names = sorted(screen.effects[i] for i in one.members)
     others = [name for name in names if name != "geometric_stiffening"]
