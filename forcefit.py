@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import assembly.cli
-import assembly.statistics_cli  # noqa: F401  adds its commands
+import assembly.statistics.cli  # noqa: F401  adds its commands
 import stiffness.cli
 import validation.cli
 from stiffness.reading import BadInput

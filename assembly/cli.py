@@ -406,10 +406,10 @@ def sweep(
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
     """
-    from assembly.dataset import open_dataset
-    from assembly.maps import figure_of
-    from assembly.sweep import Solver, journal_path, run_sweep, solve_here
-    from assembly.sweep_request import ask_sweep, summary_of, summary_text
+    from assembly.sweeps.dataset import open_dataset
+    from assembly.sweeps.maps import figure_of
+    from assembly.sweeps.request import ask_sweep, summary_of, summary_text
+    from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
 
     asked = ask_sweep(
         robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
@@ -423,7 +423,7 @@ def sweep(
     done = [0]
     solver: Solver = solve_here
     if workers is not None or scheduler is not None:
-        from assembly.cluster import cluster_solver
+        from assembly.sweeps.cluster import cluster_solver
 
         solver = cluster_solver(workers, scheduler)
     try:
@@ -466,9 +466,9 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a saved file: maps or lines of a sweep, histograms, tornado, tolerances."""
-    from assembly.dataset import open_dataset
-    from assembly.maps import figure_of
-    from assembly.statistics_plot import KINDS, figure_of_draws
+    from assembly.statistics.plot import KINDS, figure_of_draws
+    from assembly.sweeps.dataset import open_dataset
+    from assembly.sweeps.maps import figure_of
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')

@@ -32,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh, svd
 
-from assembly.conic import SolverFailed, cone_sizes, into_cones
 from assembly.dead_load import (
     DeadLoads,
     curvature_of,
@@ -43,6 +42,7 @@ from assembly.dead_load import (
 )
 from assembly.finite import Placement
 from assembly.rims import PlayProblem, across_rims, move_play, rim_forces
+from assembly.solvers.conic import SolverFailed, cone_sizes, into_cones
 
 CLOSED = 1e-12  # [rad, reference lengths] what an answer may leave open
 LONGEST = 1.0  # [rad, reference lengths] of a step

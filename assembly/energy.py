@@ -33,10 +33,10 @@ from assembly.closure import (
     linearise,
     virtual_joints,
 )
-from assembly.conic import LeastEnergy, cone_sizes, minimise_energy
 from assembly.load import Forces, forces_on, weights
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion, Reduction, reduce_problem
+from assembly.solvers.conic import LeastEnergy, cone_sizes, minimise_energy
+from assembly.solvers.reduction import FreeMotion, Reduction, reduce_problem
 
 
 class CannotAssemble(Exception):

@@ -31,7 +31,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.clearance import clearance_bounds, clearance_excess, has_bounded_motion
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
-from assembly.conic import into_cones
 from assembly.dead_load import (
     DeadLoads,
     dead_loads,
@@ -54,6 +53,7 @@ from assembly.descent import (
 from assembly.energy import Assembly, solve_assembly
 from assembly.finite import LINK, PLAY, SPRING, FiniteRobot, Placement
 from assembly.posture import Posture
+from assembly.solvers.conic import into_cones
 from stiffness.screws import screw_map
 
 _STEPS = 80  # at most; 3 to 5 are usual

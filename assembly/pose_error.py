@@ -11,8 +11,9 @@ budget   everything that closes with at most (1 + eta) times the least energy
 ======== =================================================================
 
 The set of platform screws is convex; its farthest one is bracketed by
-:mod:`assembly.farthest`, compiled.  What that solver cannot certify is asked of
-Clarabel.  :func:`assembly.batch_error.bound_pose_errors` does many postures at once.
+:mod:`assembly.solvers.farthest`, compiled.  What that solver cannot certify is asked of
+Clarabel.  :func:`assembly.solvers.batch_error.bound_pose_errors` does many postures at
+once.
 """
 
 from dataclasses import dataclass, replace
@@ -25,13 +26,13 @@ from scipy.linalg import svd
 
 from assembly.clearance import has_bounded_motion
 from assembly.closure import VirtualJoints, virtual_joints
-from assembly.conic import cone_sizes, into_cones, minimise_energy
 from assembly.energy import Assembly, without_own_springs
-from assembly.reduction import NOISE, complement
+from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
+from assembly.solvers.reduction import NOISE, complement
 from stiffness.screws import skew
 
 if TYPE_CHECKING:
-    from assembly.support import Body
+    from assembly.solvers.support import Body
 
 READINGS = ("frozen", "free", "budget")
 _RANK = 1e-10
@@ -101,7 +102,7 @@ class Reach:
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.support import screw_at, within
+        from assembly.solvers.support import screw_at, within
 
         direction = np.asarray(direction, dtype=float)
         pull = self.map.T @ direction
@@ -122,7 +123,7 @@ class Reach:
     @property
     def body(self) -> "Body":
         """The set as the compiled search reads it."""
-        from assembly.support import Body
+        from assembly.solvers.support import Body
 
         starts = np.searchsorted(self.group, np.arange(self.group.max(initial=-1) + 2))
         centre, X, H, start = (
@@ -306,8 +307,8 @@ def _farthest(
     reach: Reach, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
     """Bounds of the largest size of half a screw, a screw, and the supports it took."""
-    from assembly.farthest import NEEDED, advance, begin, choose, learn
-    from assembly.polytope import empty_polytope
+    from assembly.solvers.farthest import NEEDED, advance, begin, choose, learn
+    from assembly.solvers.polytope import empty_polytope
 
     if reach.unbounded:
         return (np.inf, np.inf), reach.centre, 0

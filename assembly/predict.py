@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from assembly.closure import virtual_joints
 from assembly.conditions import Conditions, ContactLaw
-from assembly.conic import SolverFailed
 from assembly.effects.places import in_series, own_screw
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion
 from assembly.resting_play import at_rest, fractions, taken_up
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.reduction import FreeMotion
 from stiffness.screws import rotation_matrix, rotation_vector
 
 _STEPS = 100

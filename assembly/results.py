@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.conic import SolverFailed
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.mobility import mobility
 from assembly.pose_error import bound_pose_error, reachable_screws
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.reduction import FreeMotion
 from assembly.zone import zone_margin
 
 

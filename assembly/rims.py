@@ -6,8 +6,8 @@ A step of the exact equilibrium asks for the change v of the clearances u that m
 
 where S has directions of negative curvature: across the rims that joints press on,
 which is harmless, and now and then elsewhere.  Far from the answer S is made convex
-and :mod:`assembly.conic` is asked; near it Newton's method along the rims is exact to
-rounding, where the conic solver stops at half of the digits.
+and :mod:`assembly.solvers.conic` is asked; near it Newton's method along the rims is
+exact to rounding, where the conic solver stops at half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning
@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conic import cone_sizes, minimise_energy
+from assembly.solvers.conic import cone_sizes, minimise_energy
 
 _AT_RIM = 1e-5  # [-] below size 1 within which a cone counts as at its rim
 _INNER = 15  # steps along the rims

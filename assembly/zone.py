@@ -16,9 +16,9 @@ from scipy.linalg import svd
 
 from assembly.clearance import clearance_bounds, clearance_excess, scales_with_margin
 from assembly.closure import Linearisation, VirtualJoints, linearise, virtual_joints
-from assembly.conic import cone_sizes, least_factor
 from assembly.posture import Posture
-from assembly.reduction import Reduction, reduce_problem
+from assembly.solvers.conic import cone_sizes, least_factor
+from assembly.solvers.reduction import Reduction, reduce_problem
 
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 

@@ -13,7 +13,7 @@ from crosscheck_robots import drawn, hexapod, papers_robot, three_rrr
 from assembly.energy import solve_assembly
 from assembly.posture import Posture, home_posture, place_robot
 from stiffness.reading import BadInput
-from validation.multibody import SimulationFailed, simulate_assembly
+from validation.multibody.simulation import SimulationFailed, simulate_assembly
 from validation.pair import exact_answer
 from validation.playcheck import FLOOR_ENERGY
 

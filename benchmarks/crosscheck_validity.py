@@ -20,13 +20,13 @@ import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
 
-from assembly.conic import SolverFailed
 from assembly.links import link_compliance
 from assembly.posture import Posture, place_robot
 from assembly.robot import BeamLink, MeshLink, Robot
+from assembly.solvers.conic import SolverFailed
 from assembly.zone import zone_margin
 from validation.bushes import bush_margin
-from validation.multibody import without_clearance
+from validation.multibody.simulation import without_clearance
 from validation.round_bars import bar_compliance, bar_stiffness, with_bars
 from validation.validity import (
     Cost,

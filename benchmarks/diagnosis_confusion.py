@@ -6,9 +6,9 @@
 Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
 one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
 one that the design cannot tell from another.  The data come from the simulation's side
-(``validation.generator``); what else would explain them as well is worked out there too
-(``validation.generator_equivalents``).  FOLDER keeps campaigns, truths and answers, so
-that a run can be stopped and taken up again.
+(``validation.synthetic.generator``); what else would explain them as well is worked out
+there too (``validation.synthetic.equivalents``).  FOLDER keeps campaigns, truths and
+answers, so that a run can be stopped and taken up again.
 
 Counted as right: a definite verdict with the hidden effects or a set that explains the
 data as well.  A false claim is a definite verdict with any other set.
@@ -29,15 +29,20 @@ from random_robots import draw_robot
 
 from stiffness.reading import BadInput
 from stiffness.writing import plain, write_json
-from validation.generator import Noise, Synthetic, generate_campaign, write_campaign
-from validation.generator_design import Design
-from validation.generator_draws import NotApplicable, draw_effect
-from validation.generator_effects import LIBRARY, Parameters
-from validation.generator_equivalents import SAME, Alternative, alternatives
-from validation.generator_machine import Hidden
-from validation.generator_outside import OUTSIDE
-from validation.generator_truth import truth_of
-from validation.multibody import SimulationFailed
+from validation.multibody.simulation import SimulationFailed
+from validation.synthetic.design import Design
+from validation.synthetic.draws import NotApplicable, draw_effect
+from validation.synthetic.effects import LIBRARY, Parameters
+from validation.synthetic.equivalents import SAME, Alternative, alternatives
+from validation.synthetic.generator import (
+    Noise,
+    Synthetic,
+    generate_campaign,
+    write_campaign,
+)
+from validation.synthetic.machine import Hidden
+from validation.synthetic.outside import OUTSIDE
+from validation.synthetic.truth import truth_of
 
 MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
 STRENGTHS = (2.0, 5.0, 9.0)
@@ -165,7 +170,7 @@ def make(folder: Path, seed: int) -> None:
 
 def answer(folder: Path, seed: int) -> None:
     """Diagnose a case and write the answer, unless it is there."""
-    from validation.campaign_file import read_campaign
+    from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import diagnose
     from validation.diagnosis.results import table
 

@@ -11,10 +11,10 @@ import time
 
 import numpy as np
 
-from assembly.conic import SolverFailed
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
 from assembly.posture import place_many
+from assembly.solvers.conic import SolverFailed
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 COLUMNS = {

@@ -35,13 +35,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly import conic
-from assembly.batch import minimise_energies, zone_margins
-from assembly.batch_error import bound_pose_errors
 from assembly.energy import solve_assembly
 from assembly.pose_error import Reach, bound_pose_error, reachable_screws
 from assembly.posture import Posture, place_many
 from assembly.robot import Robot
+from assembly.solvers import conic
+from assembly.solvers.batch import minimise_energies, zone_margins
+from assembly.solvers.batch_error import bound_pose_errors
 from benchmarks.assembly_speed import paper_robot, workspace
 
 SAMPLE = 6  # points of the other solvers

@@ -17,12 +17,12 @@ from assembly.robots.five_bar import Parameters as FiveBar
 from assembly.robots.hexapod import Parameters as Hexapod
 from assembly.robots.placing import drive_stiffness
 from assembly.robots.three_rrr import Parameters as ThreeRRR
-from validation.generator_design import Design, plan_campaign
-from validation.generator_effects import Machine
-from validation.generator_machine import simulate_readings
-from validation.generator_springs import rest_on_springs
-from validation.motion import turn_of
-from validation.multibody import SimulationFailed, without_clearance
+from validation.multibody.motion import turn_of
+from validation.multibody.simulation import SimulationFailed, without_clearance
+from validation.synthetic.design import Design, plan_campaign
+from validation.synthetic.effects import Machine
+from validation.synthetic.machine import simulate_readings
+from validation.synthetic.springs import rest_on_springs
 
 KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
 _MOST = 1.5e-3  # [rad, m] anywhere within reach

@@ -20,12 +20,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from assembly.distributions import tolerance_sources
-from assembly.journal import open_journal
-from assembly.quantities import Question, record_type
 from assembly.robots import load_robot
-from assembly.sweep import Sweep, journal_path, run_sweep
-from assembly.targets import grid_targets, parse_grid
+from assembly.statistics.distributions import tolerance_sources
+from assembly.sweeps.journal import open_journal
+from assembly.sweeps.quantities import Question, record_type
+from assembly.sweeps.sweep import Sweep, journal_path, run_sweep
+from assembly.sweeps.targets import grid_targets, parse_grid
 
 _COUNT = struct.Struct("<Q")
 

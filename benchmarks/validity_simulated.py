@@ -14,7 +14,7 @@ from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
 from assembly.posture import Posture
 from validation.bushes import solve_bushes
-from validation.multibody import simulate_assembly
+from validation.multibody.simulation import simulate_assembly
 from validation.spread_weight import energy_between_ends
 
 ELEMENTS = 8  # of each beam under its weight

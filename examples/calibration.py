@@ -23,7 +23,7 @@ from assembly.posture import Posture, home_posture
 from assembly.robot import Robot
 from examples.campaign_folder import base_pose
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map, transform
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from assembly.robot import Robot
 from assembly.robot_file import write_robot
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_vector
-from validation.campaign import READING
+from validation.campaign.campaign import READING
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -18,10 +18,10 @@ The same sweep on the command line, on two processes:
 import argparse
 from pathlib import Path
 
-from assembly.dataset import open_dataset
-from assembly.maps import figure_of
-from assembly.sweep import run_sweep
-from assembly.sweep_request import ask_sweep
+from assembly.sweeps.dataset import open_dataset
+from assembly.sweeps.maps import figure_of
+from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.sweep import run_sweep
 
 HERE = Path(__file__).parent
 PLAY = "ball_3.clearance.axial"

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.dataset import open_dataset
 from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
-from assembly.maps import figure_of
 from assembly.robot_file import write_robot
 from assembly.robots import load_robot
-from assembly.sweep import run_sweep
-from assembly.sweep_request import ask_sweep
+from assembly.sweeps.dataset import open_dataset
+from assembly.sweeps.maps import figure_of
+from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.sweep import run_sweep
 from assembly.zone import ASSEMBLABLE
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from assembly.robot import Frame, Robot
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 
 ARM = """
 name = "arm"

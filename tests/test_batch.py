@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch import minimise_energies, zone_margins
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import Posture, home_posture, place_many
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.solvers.batch import minimise_energies, zone_margins
 from assembly.zone import zone_margin
 from tests.robots_for_tests import (
     NUMBERS,
@@ -270,7 +270,7 @@ def test_the_certificate_refuses_a_spoilt_point(grid):
 def test_a_spoilt_solver_is_caught_and_the_slower_road_taken(grid, monkeypatch):
     """The kernel's own certificate: asked for more than is possible, it refuses."""
     robot, postures = grid
-    from assembly import compiled_assembly
+    from assembly.solvers import compiled_assembly
 
     def spoilt(s, T, errors, mismatch, out):
         assemble = compiled_assembly._assemble

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch import minimise_energies
-from assembly.batch_error import bound_pose_errors
 from assembly.energy import solve_assembly
 from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture, place_many
 from assembly.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
+from assembly.solvers.batch import minimise_energies
+from assembly.solvers.batch_error import bound_pose_errors
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
 
 PARTS = ("rotation_error", "translation_error")

@@ -10,8 +10,8 @@ import pytest
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
 from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
-from validation.campaign import number_rows
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign import number_rows
+from validation.campaign.campaign_file import read_campaign
 
 
 def test_a_campaign_is_what_its_files_say(tmp_path):

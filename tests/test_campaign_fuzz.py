@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from stiffness.reading import BadInput
 from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
 
 LIGHT = settings(
     max_examples=300,

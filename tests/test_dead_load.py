@@ -17,7 +17,7 @@ from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 from tests.test_exact import moved_unknowns, only
-from validation.multibody import simulate_assembly, without_clearance
+from validation.multibody.simulation import simulate_assembly, without_clearance
 
 G = 9.81
 

@@ -25,7 +25,7 @@ from stiffness.reading import BadInput
 from stiffness.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
 from tests.test_cli import run  # noqa: F401
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
 from validation.diagnosis.results import corrected, effects, sentence, table, text
 

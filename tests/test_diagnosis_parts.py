@@ -10,7 +10,7 @@ from assembly.posture import place_robot
 from assembly.robot import BeamLink, Frame, Robot
 from stiffness.reading import BadInput
 from tests.planar_arm_for_tests import SIGMA
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.distributions import read_sources, tolerance_sources
 from assembly.robots import load_robot
+from assembly.statistics.distributions import read_sources, tolerance_sources
 from stiffness.reading import BadInput
 
 FILE = """

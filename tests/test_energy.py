@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import home_posture, place_robot
-from assembly.reduction import FreeMotion
 from assembly.reference import reference_energy
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.solvers.reduction import FreeMotion
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.estimates import mean, most_probable, proportion, quantile
+from assembly.statistics.estimates import mean, most_probable, proportion, quantile
 
 
 def test_no_success_in_n_draws_has_the_known_upper_bound():

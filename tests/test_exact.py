@@ -9,7 +9,6 @@ from scipy.optimize import brentq, root
 
 import assembly.exact as exact
 from assembly.closure import closure_signs, virtual_joints
-from assembly.conic import SolverFailed
 from assembly.descent import NotConverged
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.exact import solve_exact
@@ -28,6 +27,7 @@ from assembly.posture import home_posture, place_many, place_robot
 from assembly.robot import Clearance, Frame, Robot
 from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
+from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 from tests.robots_for_tests import (
     NUMBERS,
@@ -36,7 +36,7 @@ from tests.robots_for_tests import (
     random_robot,
     small_clearance,
 )
-from validation.multibody import without_clearance
+from validation.multibody.simulation import without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
 A, B, D = 0.3, 0.25, 0.4  # [m] sides of the triangle of two hinged bars
@@ -561,7 +561,7 @@ def test_the_simulation_agrees_at_full_errors(case, place):
     gradient to s^2 / 24 only: 1e-5 of the wrench in hinges turned by 2e-2 rad, and up
     to 1e-7 rad of the soft ones.
     """
-    from validation.multibody import simulate_assembly
+    from validation.multibody.simulation import simulate_assembly
 
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose=dict(zip(("tx", "tz"), place, strict=True)))
@@ -587,7 +587,7 @@ def test_the_simulation_agrees_at_full_errors(case, place):
 @pytest.mark.parametrize("case", CASES)
 def test_the_simulation_agrees_with_clearances_at_full_errors(case):
     """Its contacts yield by what twice their energy corrects to first order."""
-    from validation.multibody import simulate_assembly
+    from validation.multibody.simulation import simulate_assembly
 
     robot = irsbot2_with(CASES[case])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})

@@ -30,7 +30,7 @@ from examples.voron import study as voron
 from examples.voron.convert import convert as convert_voron
 from stiffness.reading import BadInput
 from stiffness.screws import transform
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
 
 
 def needs(name):

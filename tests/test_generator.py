@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from assembly.robot import BeamLink, Frame, Robot
-from validation.generator import generate_campaign
-from validation.generator_design import Design
-from validation.generator_effects import Row
-from validation.generator_machine import Hidden, simulate_readings
+from validation.synthetic.design import Design
+from validation.synthetic.effects import Row
+from validation.synthetic.generator import generate_campaign
+from validation.synthetic.machine import Hidden, simulate_readings
 
 pytestmark = pytest.mark.exudyn
 

@@ -5,11 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.distributions import tolerance_sources
-from assembly.importance import linear_importance, sobol_importance, source_groups
-from assembly.one_posture import prepare_energies
 from assembly.posture import place_robot
 from assembly.robots import load_robot
+from assembly.solvers.one_posture import prepare_energies
+from assembly.statistics.distributions import tolerance_sources
+from assembly.statistics.importance import (
+    linear_importance,
+    sobol_importance,
+    source_groups,
+)
 
 
 def test_ishigamis_function_has_its_known_indices():

@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
 from tests.test_cli import run  # noqa: F401
-from validation.campaign_counts import correlation
-from validation.campaign_file import read_campaign
-from validation.design_remarks import remarks_on
-from validation.design_signatures import design_signatures
-from validation.inspect import inspect_campaign
-from validation.measuring_order import revisits
-from validation.repeats import repeat_noise
+from validation.campaign.campaign_file import read_campaign
+from validation.campaign.counts import correlation
+from validation.campaign.design_remarks import remarks_on
+from validation.campaign.design_signatures import design_signatures
+from validation.campaign.inspection import inspect_campaign
+from validation.campaign.measuring_order import revisits
+from validation.campaign.repeats import repeat_noise
 
 BEAM = "link = { beam = { radius = 0.03 }, young = 7e10, poisson = 0.3 }\n"
 ELASTIC = ARM.replace(

@@ -8,7 +8,6 @@ from assembly.draw import ErrorDraw, draw_errors, frames_named
 from assembly.energy import solve_assembly
 from assembly.mobility import mobility
 from assembly.posture import home_posture, place_robot
-from assembly.reduction import reduce_problem
 from assembly.robots.irsbot2 import (
     ERROR_FRAMES,
     ERROR_LEAST,
@@ -17,6 +16,7 @@ from assembly.robots.irsbot2 import (
     drive_angle,
     irsbot2,
 )
+from assembly.solvers.reduction import reduce_problem
 from assembly.zone import zone_margin
 from stiffness.reading import BadInput
 from stiffness.screws import screw_map

@@ -10,52 +10,54 @@ import pytest
 ROOT = Path(__file__).parents[1]
 BELOW = {"stiffness": (), "assembly": ("stiffness",)}
 BELOW["validation"] = ("stiffness", "assembly")
+SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
     "pytetwild": ("stiffness/mesh.py", "stiffness/mesh_worker.py"),
     "skfem": ("stiffness/elements.py",),
     "meshio": ("stiffness/surface_files.py",),
     "gmsh": ("stiffness/surface_files.py",),
-    "clarabel": ("assembly/conic.py",),
+    "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
         "assembly/reference.py",
-        "assembly/allocation.py",
-        "assembly/worst_case.py",
+        "assembly/statistics/allocation.py",
+        "assembly/statistics/worst_case.py",
     ),
-    "exudyn": ("validation/multibody.py",),
+    "exudyn": (SIMULATION,),
     "numba": (
-        "assembly/compiled_reach.py",
-        "assembly/farthest.py",
-        "assembly/majorant.py",
-        "assembly/polytope.py",
-        "assembly/support.py",
-        "assembly/interior.py",
+        "assembly/solvers/compiled_reach.py",
+        "assembly/solvers/farthest.py",
+        "assembly/solvers/majorant.py",
+        "assembly/solvers/polytope.py",
+        "assembly/solvers/support.py",
+        "assembly/solvers/interior.py",
         "assembly/continuation.py",
-        "assembly/dual_newton.py",
-        "assembly/compiled_assembly.py",
-        "assembly/compiled_draws.py",
-        "assembly/compiled_reduction.py",
-        "assembly/compiled_zone.py",
-        "assembly/hit_and_run.py",
-        "assembly/householder.py",
+        "assembly/solvers/dual_newton.py",
+        "assembly/solvers/compiled_assembly.py",
+        "assembly/solvers/compiled_draws.py",
+        "assembly/solvers/compiled_reduction.py",
+        "assembly/solvers/compiled_zone.py",
+        "assembly/statistics/hit_and_run.py",
+        "assembly/solvers/householder.py",
     ),
     "xarray": (
-        "assembly/dataset.py",
-        "assembly/monte_carlo.py",
-        "assembly/importance.py",
-        "assembly/tolerances.py",
+        "assembly/sweeps/dataset.py",
+        "assembly/statistics/monte_carlo.py",
+        "assembly/statistics/importance.py",
+        "assembly/statistics/tolerances.py",
         "stiffness/library.py",
     ),
-    "h5netcdf": ("assembly/dataset.py",),
-    "distributed": ("assembly/cluster.py",),
+    "h5netcdf": ("assembly/sweeps/dataset.py",),
+    "distributed": ("assembly/sweeps/cluster.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # the second opinion must not share the first one's mechanics
 INDEPENDENT = (
-    "multibody.py", "open_robot.py", "motion.py", "contact.py", "beams.py",
-    "exudyn_parts.py", "exudyn_model.py", "exudyn_solids.py", "exudyn_solver.py",
-    "exudyn_reading.py", "generator_effects.py", "generator_outside.py",
-    "generator_machine.py", "generator_rest.py",
-)  # fmt: skip
+    "validation/multibody/",
+    "validation/synthetic/effects.py",
+    "validation/synthetic/machine.py",
+    "validation/synthetic/outside.py",
+    "validation/synthetic/rest.py",
+)
 
 
 def imports(path):
@@ -82,7 +84,7 @@ def wrong_imports(tree):
                 top = module.partition(".")[0]
                 upward = top in {*BELOW, "forcefit"} and top not in (folder, *below)
                 foreign = top in OWNERS and file not in OWNERS[top]
-                alone = folder == "validation" and path.name in INDEPENDENT
+                alone = file.startswith(INDEPENDENT)
                 shared = alone and top == "assembly"
                 shared = shared and not f"{module}.".startswith("assembly.robot.")
                 if upward or foreign or shared:
@@ -131,9 +133,21 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
         ("assembly/a/b.py", "import xarray as xr", "imports xarray"),
         ("assembly/zone.py", "def f():\n from clarabel import y", "imports clarabel.y"),
         ("validation/a.py", "if x:\n import cvxpy", "imports cvxpy"),
-        ("validation/multibody.py", "import assembly.energy", "imports assembly.en"),
-        ("validation/motion.py", "from assembly import zone", "imports assembly.z"),
-        ("validation/multibody.py", "import assembly.robot_file", "imports assembly.r"),
+        (
+            "validation/multibody/simulation.py",
+            "import assembly.energy",
+            "imports assembly.en",
+        ),
+        (
+            "validation/multibody/motion.py",
+            "from assembly import zone",
+            "imports assembly.z",
+        ),
+        (
+            "validation/multibody/simulation.py",
+            "import assembly.robot_file",
+            "imports assembly.r",
+        ),
     ],
 )
 def test_a_forbidden_import_is_found(file, code, message, tmp_path):

@@ -9,11 +9,11 @@ import pytest
 from assembly.energy import solve_assembly
 from assembly.link_stress import peak_stresses, safety_factors, stressed_links
 from assembly.posture import place_robot
-from assembly.quantities import Question
 from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import load_robot
-from assembly.sweep import Sweep, sweep_in_memory
-from assembly.targets import grid_targets, parse_grid
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.sweep import Sweep, sweep_in_memory
+from assembly.sweeps.targets import grid_targets, parse_grid
 from stiffness.reading import BadInput
 
 PLAIN = Path(__file__).parents[1] / "meshes" / "distal_plain.stl"

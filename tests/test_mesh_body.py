@@ -13,10 +13,10 @@ from stiffness.elements import assemble, lame, quadratic
 from stiffness.reading import BadInput
 from tests.solids_for_tests import box_solid
 from validation.crosscheck import crosscheck
-from validation.exudyn_parts import MeshBody, Solid
 from validation.link_models import link_models
-from validation.motion import placement
-from validation.multibody import simulate_assembly
+from validation.multibody.exudyn_parts import MeshBody, Solid
+from validation.multibody.motion import placement
+from validation.multibody.simulation import simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly import monte_carlo
-from assembly.distributions import tolerance_sources
 from assembly.energy import solve_assembly
-from assembly.estimates import summarise
 from assembly.link_stress import peak_stresses
-from assembly.monte_carlo import Experiment, parse_limit, run_draws
 from assembly.posture import place_robot
 from assembly.robots import load_robot
-from assembly.statistics_plot import (
+from assembly.statistics import monte_carlo
+from assembly.statistics.distributions import tolerance_sources
+from assembly.statistics.estimates import summarise
+from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
+from assembly.statistics.plot import (
     allocation_figure,
     histogram_figure,
     tornado_figure,
 )
-from assembly.sweep import journal_path
+from assembly.sweeps.sweep import journal_path
 from stiffness.reading import BadInput
 
 ERRORS = """

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation.exudyn_solver
+import validation.multibody.exudyn_solver
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
-from validation.exudyn_parts import OutOfTime
-from validation.motion import exponential, inverse, logarithm, placement
-from validation.multibody import (
+from validation.multibody.exudyn_parts import OutOfTime
+from validation.multibody.motion import exponential, inverse, logarithm, placement
+from validation.multibody.simulation import (
     SimulationFailed,
     closing_sequence,
     simulate_assembly,
@@ -537,7 +537,7 @@ def test_dynamic_relaxation_comes_to_rest_at_the_same_place(case, rng, monkeypat
     else:
         posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     static = simulate_assembly(posture)
-    monkeypatch.setattr(validation.exudyn_solver, "equilibrate", relax)
+    monkeypatch.setattr(validation.multibody.exudyn_solver, "equilibrate", relax)
     relaxed = simulate_assembly(posture)
     assert relaxed.energy == pytest.approx(static.energy, rel=1e-8)
     np.testing.assert_allclose(

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.distributions import tolerance_sources
 from assembly.energy import CannotAssemble, solve_assembly
-from assembly.one_posture import prepare_energies
 from assembly.posture import place_robot
-from assembly.posture_margins import prepare_margins
 from assembly.robots import load_robot
+from assembly.solvers.one_posture import prepare_energies
+from assembly.solvers.posture_margins import prepare_margins
+from assembly.statistics.distributions import tolerance_sources
 from assembly.zone import zone_margin
 from tests.robots_for_tests import random_robot
 

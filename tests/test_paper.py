@@ -10,8 +10,8 @@ import pytest
 from assembly.energy import solve_assembly
 from assembly.pose_error import bound_pose_error
 from assembly.posture import place_many
-from assembly.sweep import assemblable, sweep_poses
-from assembly.targets import parse_grid
+from assembly.sweeps.sweep import assemblable, sweep_poses
+from assembly.sweeps.targets import parse_grid
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 GRID = "tx=-0.8:0.8:0.025,tz=-0.8:0:0.025"

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.parameters import design_of, load_design, unit_of
 from assembly.robot_file import write_robot
 from assembly.robots import BUILT_IN, load_robot
-from assembly.sweep import robot_hash
+from assembly.sweeps.parameters import design_of, load_design, unit_of
+from assembly.sweeps.sweep import robot_hash
 from stiffness.reading import BadInput
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.distributions import draw_generator, tolerance_sources
-from assembly.hit_and_run import hit_and_run
 from assembly.nominal import size_of
-from assembly.one_posture import prepare_energies
-from assembly.play import STEPS, loaded_clearances, settle_play
 from assembly.posture import place_robot
 from assembly.robots import load_robot
+from assembly.solvers.one_posture import prepare_energies
+from assembly.statistics.distributions import draw_generator, tolerance_sources
+from assembly.statistics.hit_and_run import hit_and_run
+from assembly.statistics.play import STEPS, loaded_clearances, settle_play
 
 
 def generators(count, seed=3):

@@ -10,9 +10,15 @@ import pytest
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
-from validation.contact import Cone, Play, cone_energy, cone_pushes, joint_play
-from validation.exudyn_parts import OutOfTime
-from validation.multibody import simulate_assembly
+from validation.multibody.contact import (
+    Cone,
+    Play,
+    cone_energy,
+    cone_pushes,
+    joint_play,
+)
+from validation.multibody.exudyn_parts import OutOfTime
+from validation.multibody.simulation import simulate_assembly
 from validation.playcheck import playcheck
 
 pytestmark = pytest.mark.exudyn
@@ -130,13 +136,13 @@ def test_a_slow_simulation_ends_in_time_and_says_so(pause, monkeypatch):
 
     Unbounded, 0.05 s at each of some 3000 calls of the contact are minutes.
     """
-    import validation.exudyn_model
+    import validation.multibody.exudyn_model
 
     def slowly(*args):
         time.sleep(pause)
         return cone_pushes(*args)
 
-    monkeypatch.setattr(validation.exudyn_model, "cone_pushes", slowly)
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", slowly)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5, radial=1e-5))
     limit = 0.3 if pause else 0.03
     started = time.monotonic()
@@ -156,12 +162,12 @@ def test_a_time_limit_stays_with_its_simulation():
 
 def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
     """Exudyn makes an error of its own of Ctrl-C; it must not be tried again."""
-    import validation.exudyn_model
+    import validation.multibody.exudyn_model
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(validation.exudyn_model, "cone_pushes", interrupted)
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", interrupted)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
         simulate_assembly(posture, clearances=True)

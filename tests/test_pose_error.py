@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.spatial import HalfspaceIntersection
 
 from assembly.energy import solve_assembly
-from assembly.majorant import eigenvectors, largest_on_sphere
-from assembly.polytope import cut, empty_polytope, farthest_corner, start_box
 from assembly.pose_error import bound_pose_error, reachable_screws
 from assembly.posture import home_posture, place_robot
 from assembly.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
+from assembly.solvers.majorant import eigenvectors, largest_on_sphere
+from assembly.solvers.polytope import cut, empty_polytope, farthest_corner, start_box
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 CASES = [
@@ -239,7 +239,7 @@ def assert_same_corners(body, planes, rng, tolerance=1e-9):
     assert np.linalg.norm(farthest_corner(body)) == pytest.approx(
         farthest, rel=tolerance
     )
-    corners = body.corners[: body.count[0]]
+    corners = body.corners[: body.used[0]]
     for normal in itertools.chain(np.eye(3), rng.normal(size=(10, 3))):
         heights = [float((p @ normal).max()) for p in (corners, expected)]
         assert heights[0] == pytest.approx(heights[1], abs=tolerance)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from assembly.conic import cone_sizes
 from assembly.energy import solve_assembly
 from assembly.pose_error import Reach, _farthest, bound_pose_error, reachable_screws
 from assembly.posture import home_posture, place_robot
 from assembly.robots.irsbot2 import irsbot2
-from assembly.support import within
+from assembly.solvers.conic import cone_sizes
+from assembly.solvers.support import within
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
 

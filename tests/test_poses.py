@@ -7,7 +7,7 @@ import pytest
 from assembly.robot_file import write_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.crosscheck import crosscheck
-from validation.multibody import SimulationFailed
+from validation.multibody.simulation import SimulationFailed
 from validation.poses import check_poses, poses_table, poses_text
 
 pytestmark = pytest.mark.exudyn

@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from examples.campaign_folder import data_folder
 from stiffness.reading import BadInput
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.campaign.inspection import inspect_campaign
 from validation.diagnosis.signatures import Tangents, conditions_of
-from validation.inspect import inspect_campaign
 
 try:
     PRACTICE = data_folder("practice")

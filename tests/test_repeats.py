@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import chi2
 
 from tests.campaigns_for_tests import campaign_of
-from validation.measuring_order import revisits
-from validation.repeats import for_each_component, repeat_noise, slow_changes
+from validation.campaign.measuring_order import revisits
+from validation.campaign.repeats import for_each_component, repeat_noise, slow_changes
 
 SIGMA = np.array([1e-5] * 3 + [5e-6] * 3)
 

@@ -8,7 +8,7 @@ import pytest
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import place_robot
 from assembly.robots import load_robot
-from assembly.sensitivity import energy_slopes, margin_slopes
+from assembly.statistics.sensitivity import energy_slopes, margin_slopes
 from assembly.zone import zone_margin
 from tests.robots_for_tests import random_robot
 

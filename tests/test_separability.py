@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.separability import compare_signatures
+from validation.campaign.separability import compare_signatures
 
 
 def columns(*vectors):

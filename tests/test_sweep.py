@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import xarray
 
-from assembly.dataset import save_dataset
 from assembly.energy import solve_assembly
-from assembly.maps import map_figure
 from assembly.posture import place_robot
-from assembly.sweep import assemblable, sweep_poses
-from assembly.targets import parse_grid
+from assembly.sweeps.dataset import save_dataset
+from assembly.sweeps.maps import map_figure
+from assembly.sweeps.sweep import assemblable, sweep_poses
+from assembly.sweeps.targets import parse_grid
 from stiffness.reading import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
@@ -157,7 +157,7 @@ def test_progress_counts_points_block_by_block():
 
 def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
     """The solver gives up on one reading of one point: its neighbour is not touched."""
-    from assembly import points
+    from assembly.sweeps import points
 
     solve = points.zone_margins
 

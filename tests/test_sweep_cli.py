@@ -61,7 +61,7 @@ def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     grid = "tx=-0.01:0.01:0.01,ty=0.12:0.14:0.02"
     assert run("assembly", "sweep", "five_bar", "--grid", grid, "-o", file)[0] == 0
-    from assembly import points
+    from assembly.sweeps import points
 
     monkeypatch.setattr(points, "_solve_reached", None)
     status, out, err = run("assembly", "plot", file, "-o", picture)
@@ -97,7 +97,7 @@ def test_bad_input_is_one_message_and_nothing_is_written(run, tmp_path, monkeypa
 
 
 def test_a_journal_of_another_grid_is_refused(run, tmp_path):
-    from assembly.sweep import journal_path
+    from assembly.sweeps.sweep import journal_path
 
     file = tmp_path / "x.nc"
     journal = journal_path(file)

@@ -10,12 +10,12 @@ import time
 import numpy as np
 import pytest
 
-from assembly.cluster import cluster_solver, solve_task
-from assembly.distributions import tolerance_sources
-from assembly.quantities import Question
 from assembly.robots import load_robot
-from assembly.sweep import Sweep, run_sweep
-from assembly.targets import grid_targets, parse_grid
+from assembly.statistics.distributions import tolerance_sources
+from assembly.sweeps.cluster import cluster_solver, solve_task
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.sweep import Sweep, run_sweep
+from assembly.sweeps.targets import grid_targets, parse_grid
 from stiffness.reading import BadInput
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -44,7 +44,7 @@ def test_a_task_is_its_blocks():
 
 def test_draws_do_not_depend_on_who_makes_them():
     """Draw 2 of posture 5 is draw 2 of posture 0, in whatever block it falls."""
-    from assembly.points import solve_points
+    from assembly.sweeps.points import solve_points
 
     sweep = drawn_sweep("tx=0,ty=0.13")
     many = drawn_sweep("tx=-0.02:0.02:0.01,ty=0.13")

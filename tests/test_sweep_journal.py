@@ -11,12 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.dataset import slabs
-from assembly.journal import open_journal
-from assembly.quantities import Question, record_type
 from assembly.robots import load_robot
-from assembly.sweep import Sweep, journal_path, run_sweep, solve_here, sweep_in_memory
-from assembly.targets import grid_targets, parse_grid
+from assembly.sweeps.dataset import slabs
+from assembly.sweeps.journal import open_journal
+from assembly.sweeps.quantities import Question, record_type
+from assembly.sweeps.sweep import (
+    Sweep,
+    journal_path,
+    run_sweep,
+    solve_here,
+    sweep_in_memory,
+)
+from assembly.sweeps.targets import grid_targets, parse_grid
 from stiffness.reading import BadInput
 
 ROOT = Path(__file__).parents[1]

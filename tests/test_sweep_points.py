@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from assembly.distributions import read_sources
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
-from assembly.maps import figure_of
-from assembly.parameters import load_design
 from assembly.pose_error import bound_pose_error
 from assembly.posture import place_robot
-from assembly.quantities import Question
 from assembly.robot_file import write_robot
 from assembly.robots import load_robot
-from assembly.sweep import Sweep, sweep_in_memory, sweep_poses
-from assembly.sweep_request import ask_sweep, summary_of
-from assembly.targets import grid_targets, parse_grid
+from assembly.statistics.distributions import read_sources
+from assembly.sweeps.maps import figure_of
+from assembly.sweeps.parameters import load_design
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.request import ask_sweep, summary_of
+from assembly.sweeps.sweep import Sweep, sweep_in_memory, sweep_poses
+from assembly.sweeps.targets import grid_targets, parse_grid
 from stiffness.reading import BadInput
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
@@ -162,7 +162,7 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
 
 def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
     """The third of five postures raises in the middle of its block."""
-    from assembly import points
+    from assembly.sweeps import points
 
     solve, axes = points.minimise_energies, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)

@@ -16,16 +16,16 @@ from assembly.robot_file import read_robot
 from assembly.robots import load_robot
 from stiffness.reading import BadInput
 from stiffness.writing import plain
-from validation.campaign_file import read_campaign
-from validation.generator import Noise, generate_campaign, write_campaign
-from validation.generator_design import Design, plan_campaign
-from validation.generator_draws import NotApplicable, draw_effect, strengthened
-from validation.generator_effects import LIBRARY, Row
-from validation.generator_equivalents import alternatives
-from validation.generator_machine import Hidden, simulate_readings
-from validation.generator_outside import OUTSIDE
-from validation.generator_truth import truth_of
-from validation.multibody import without_clearance
+from validation.campaign.campaign_file import read_campaign
+from validation.multibody.simulation import without_clearance
+from validation.synthetic.design import Design, plan_campaign
+from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
+from validation.synthetic.effects import LIBRARY, Row
+from validation.synthetic.equivalents import alternatives
+from validation.synthetic.generator import Noise, generate_campaign, write_campaign
+from validation.synthetic.machine import Hidden, simulate_readings
+from validation.synthetic.outside import OUTSIDE
+from validation.synthetic.truth import truth_of
 
 CAMPAIGNS = Path(__file__).parent / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assembly.robots import load_robot
-from assembly.targets import goals_of, grid_targets, parse_grid, read_targets
+from assembly.sweeps.targets import goals_of, grid_targets, parse_grid, read_targets
 from stiffness.reading import BadInput
 
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.allocation import allocate
-from assembly.distributions import tolerance_sources
-from assembly.one_posture import prepare_energies
 from assembly.posture import place_robot
-from assembly.posture_margins import prepare_margins
-from assembly.requirement import Plan
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
-from assembly.tolerance_file import read_plan
-from assembly.tolerances import grid_postures, present_errors, present_text
-from assembly.worst_case import (
+from assembly.solvers.one_posture import prepare_energies
+from assembly.solvers.posture_margins import prepare_margins
+from assembly.statistics.allocation import allocate
+from assembly.statistics.distributions import tolerance_sources
+from assembly.statistics.requirement import Plan
+from assembly.statistics.tolerance_file import read_plan
+from assembly.statistics.tolerances import grid_postures, present_errors, present_text
+from assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
     random_corners,

@@ -6,12 +6,12 @@ from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.conic import SolverFailed
 from assembly.energy import CannotAssemble
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion
 from assembly.robot import BeamLink, beam_axis
-from validation.multibody import without_clearance
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.reduction import FreeMotion
+from validation.multibody.simulation import without_clearance
 from validation.round_bars import bar_compliance, bar_stiffness
 from validation.spread_weight import energy_between_ends
 from validation.validity import (

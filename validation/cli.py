@@ -24,9 +24,9 @@ from assembly.cli import (
 from assembly.posture import Posture
 from stiffness.reading import BadInput
 from stiffness.writing import write_json
+from validation.campaign.cli import inspect
 from validation.diagnosis.cli import diagnose
-from validation.generator_cli import generate
-from validation.inspect_cli import inspect
+from validation.synthetic.cli import generate
 
 app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
@@ -147,7 +147,7 @@ def _crosscheck_grid(
 ) -> None:
     """Every pose of a grid, with a progress bar."""
     from assembly.robots import load_robot
-    from assembly.targets import parse_grid
+    from assembly.sweeps.targets import parse_grid
     from validation.poses import check_poses, poses_table, poses_text
 
     machine, axes = load_robot(robot), parse_grid(grid)

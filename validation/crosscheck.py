@@ -27,10 +27,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.conic import SolverFailed
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.reduction import FreeMotion
 from validation.limits import (
     FLOOR,
     HALVES,
@@ -40,7 +40,7 @@ from validation.limits import (
     spring_limits,
 )
 from validation.link_models import link_models
-from validation.multibody import (
+from validation.multibody.simulation import (
     TIME_LIMIT,
     SimulationFailed,
     simulate_assembly,

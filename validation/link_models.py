@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from assembly.links import link_compliance
 from assembly.robot import BeamLink, Frame, Robot
 from stiffness.reading import BadInput
-from validation.exudyn_parts import MeshBody
+from validation.multibody.exudyn_parts import MeshBody
 from validation.solids import mesh_bodies
 
 KINDS = ("beam", "spring", "fem")

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.conic import SolverFailed
 from assembly.energy import Assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.posture import Posture
-from assembly.reduction import FreeMotion
 from assembly.robot import Clearance, Frame, Robot
-from validation.multibody import MultibodyAssembly
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.reduction import FreeMotion
+from validation.multibody.simulation import MultibodyAssembly
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.closure import linearise
-from assembly.conic import into_cones
 from assembly.energy import solve_assembly
 from assembly.links import link_compliance
 from assembly.posture import Posture
-from assembly.reduction import reduce_problem
+from assembly.solvers.conic import into_cones
+from assembly.solvers.reduction import reduce_problem
 from validation.crosscheck import ELEMENTS
 from validation.limits import extrapolate, limit_difference, limit_of
 from validation.link_models import link_models
-from validation.multibody import TIME_LIMIT, simulate_assembly
+from validation.multibody.simulation import TIME_LIMIT, simulate_assembly
 from validation.pair import Pair, exact_answer, scaled
 from validation.spread_weight import energy_between_ends
 from validation.verdict import (

@@ -84,7 +84,7 @@ def closing_figure(
     Args:
         posture: nominal.
         sequence: (k, n, 4, 4) frames of
-            :func:`validation.multibody.closing_sequence`.
+            :func:`validation.multibody.simulation.closing_sequence`.
         exaggeration: factor on displacements from the nominal posture; default: the
             widest open closure is drawn as a tenth of the robot.
 

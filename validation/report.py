@@ -33,7 +33,7 @@ def write_study(results: StudyResults) -> Path:
     Raises:
         BadInput: the folder cannot be written.
     """
-    from assembly.dataset import save_dataset
+    from assembly.sweeps.dataset import save_dataset
 
     folder = results.study.folder
     try:
@@ -278,7 +278,7 @@ def _significant(K: NDArray) -> NDArray:
 
 def _maps(results: StudyResults) -> str:
     """Maps over the grid."""
-    from assembly.maps import map_figure
+    from assembly.sweeps.maps import map_figure
 
     summary = map_summary(results.maps)
     rows = [

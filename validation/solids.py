@@ -7,7 +7,7 @@ from assembly.mesh_link import mesh_rotation
 from assembly.robot import MeshLink, Robot
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix
-from validation.exudyn_parts import MeshBody, Solid
+from validation.multibody.exudyn_parts import MeshBody, Solid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:

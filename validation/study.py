@@ -21,12 +21,16 @@ from assembly.posture import POSE, Posture, place_robot
 from assembly.results import pose_error_of, solution_of
 from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot
-from assembly.sweep import sweep_poses
-from assembly.targets import parse_grid
+from assembly.sweeps.sweep import sweep_poses
+from assembly.sweeps.targets import parse_grid
 from stiffness.reading import BadInput, Table, read_toml
 from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
-from validation.multibody import SimulationFailed, closing_sequence, without_clearance
+from validation.multibody.simulation import (
+    SimulationFailed,
+    closing_sequence,
+    without_clearance,
+)
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")

@@ -30,7 +30,7 @@ from examples.study_output import (
     run,
     write_results,
 )
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
 
 LOWER, UPPER = SEGMENTS
 REACH = {LOWER: 1.448, UPPER: 1.414}  # [m] overlap at zero, README of the data

@@ -31,7 +31,7 @@ from examples.study_output import (
     run,
     write_results,
 )
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign_file import read_campaign
 
 SIGMA = np.array([2e-4] * 3 + [1e-4] * 3)  # [rad, m] what a good model may leave
 ORDERS = tuple(range(1, 41))  # cycles per turn of a joint

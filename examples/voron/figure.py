@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 
 
 def draw(campaign: Campaign, left: dict[str, NDArray], out: Path) -> Path:

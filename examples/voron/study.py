@@ -17,8 +17,8 @@ from assembly.posture import Posture
 from assembly.predict import predict
 from examples.study_output import arguments, print_table, run, write_results
 from examples.voron.convert import convert
-from validation.campaign import Campaign
-from validation.campaign_file import read_campaign
+from validation.campaign.campaign import Campaign
+from validation.campaign.campaign_file import read_campaign
 
 DECLARED = 23.4e-6  # [1/K] that the printer's own compensation uses
 BLOCKS = 5  # of time, to choose among models on run b alone

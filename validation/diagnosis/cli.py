@@ -8,7 +8,7 @@ import typer
 from assembly.cli import JsonOption, progress_bars
 from assembly.robot_file import write_robot
 from stiffness.writing import check_writable, write_json
-from validation.inspect_cli import CampaignArgument
+from validation.campaign.cli import CampaignArgument
 
 
 def diagnose(
@@ -29,7 +29,7 @@ def diagnose(
     The verdict is explained, none_needed, ambiguous or outside_library; errors before
     and after are on rows that played no part in choosing or fitting.
     """
-    from validation.campaign_file import read_campaign
+    from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
 

@@ -22,7 +22,7 @@ from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.predict import predict, settle, with_second_order
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.campaign.separability import Separability, compare_signatures
 from validation.diagnosis.diagnose import Diagnosis
-from validation.separability import Separability, compare_signatures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 
 _FEWEST = 8  # configurations from which blocks can be kept aside
 _SHARE = 4  # one block in this many

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from validation.campaign import Campaign, number_rows
+from validation.campaign.campaign import Campaign, number_rows
 
 SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
 _LEVELS = 10  # of a covariate's range within which rows are alike

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from assembly.conditions import Conditions
 from assembly.effects import apply_effects
 from assembly.predict import predict
-from validation.campaign import LOAD, Campaign
+from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.refit import Fit
 
 _TRIED = 240  # situations looked at

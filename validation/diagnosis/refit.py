@@ -17,7 +17,7 @@ from assembly.effects import apply_effects
 from assembly.effects.effect import Values
 from assembly.predict import predict, settle
 from assembly.robot import Robot
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import whiten
 

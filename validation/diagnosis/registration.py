@@ -15,7 +15,7 @@ from assembly.effects.registration import BASE
 from assembly.predict import predict, with_second_order
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix
-from validation.campaign import Campaign
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.refit import refit
 

@@ -21,7 +21,7 @@ from assembly.effects.effect import Values
 from assembly.posture import Posture
 from assembly.predict import predict
 from assembly.resting_play import taken_up
-from validation.campaign import LOAD, Campaign
+from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
 _PROBED = 4  # rows

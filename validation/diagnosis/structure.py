@@ -18,7 +18,7 @@ from scipy.stats import f
 
 from assembly.conditions import Conditions
 from assembly.posture import POSE, pose_components
-from validation.campaign import LOAD, Campaign
+from validation.campaign.campaign import LOAD, Campaign
 
 _SEEN = 1e-3  # probability by chance below which something is reported
 _MOST = 6

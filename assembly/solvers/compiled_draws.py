@@ -1,0 +1,192 @@
+"""Problem (22) for many right sides h at one posture, compiled.
+
+The reduction is shared: only h differs from draw to draw.  The certificate is that of
+:mod:`assembly.solvers.compiled_assembly`, from matrices made once of the columns before
+any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from assembly.solvers.compiled_assembly import small_answer
+from assembly.solvers.compiled_zone import farthest, turn_first
+
+SOLVED, UNCERTIFIED = range(2)
+_GAP, _GAP_WITHOUT_PLAY = 1e-8, 1e-12  # as in assembly.solvers.compiled_assembly
+_STOP = 1e-2
+_PROJECTIONS, _INWARDS = 40, 0.98
+_MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def least_energies(
+    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, cones: NDArray,
+    gram: NDArray, slip: float, u: NDArray, y: NDArray, energy: NDArray,
+    bound: NDArray, road: NDArray,
+) -> None:  # fmt: skip
+    """Minimise |G u + h|^2 / 2 for every row of h.
+
+    Args:
+        Gt: (nu, r) columns of G as rows [sqrt(2 J)].
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        h: (k, r) [sqrt(2 J)].
+        inverse: (nu, r) pseudoinverse of G.
+        cones: (nu, r) how y pulls each clearance, before any elimination.
+        gram: (r, r) the springs' complementary energy is y.gram y / 2.
+        slip: [per size of y] how much the free motions may gain by rounding.
+        u: (k, nu) to fill: clearances in units of their cones.
+        y: (k, r) to fill: multipliers, scaled to the best proof.
+        energy: (k,) to fill [J].
+        bound: (k,) to fill [J], certified lower bound.
+        road: (k,) to fill: SOLVED or UNCERTIFIED.
+    """
+    nu, r = Gt.shape
+    norm = 0.0
+    for c in range(nu):
+        here = 0.0
+        for i in range(r):
+            here += Gt[c, i] * Gt[c, i]
+        norm = max(norm, np.sqrt(here))
+    own, right = np.empty(nu), np.empty(r)
+    G = np.empty((nu, r))
+    answer = np.empty(r)
+    for point in range(len(h)):
+        size = 0.0
+        for i in range(r):
+            size += h[point, i] * h[point, i]
+        without = 0.5 * size
+        size = max(np.sqrt(size), norm)
+        own[:] = 0.0
+        answer[:] = h[point]
+        if nu and without > 0.0 and _within(Gt, starts, h[point], inverse, own):
+            answer[:] = 0.0
+        elif nu and without > 0.0:
+            own[:] = 0.0
+            for i in range(r):
+                right[i] = h[point, i] / size
+                for c in range(nu):
+                    G[c, i] = Gt[c, i] / size
+            absolute = _STOP * _GAP_WITHOUT_PLAY * without / (size * size)
+            small_answer(G, right, starts, _STOP * _GAP, absolute, own, answer)
+            for i in range(r):
+                answer[i] *= size
+        total = 0.0
+        for i in range(r):
+            v = h[point, i]
+            for c in range(nu):
+                v += Gt[c, i] * own[c]
+            total += v * v
+        for c in range(nu):
+            u[point, c] = own[c]
+        energy[point] = 0.5 * total
+        worth, cost, pull_size = 0.0, 0.0, 0.0
+        for i in range(r):
+            worth += h[point, i] * answer[i]
+            pull_size += answer[i] * answer[i]
+            for l in range(r):
+                cost += answer[i] * gram[i, l] * answer[l]
+        worth -= slip * np.sqrt(pull_size)
+        for c in range(len(starts) - 1):
+            reach = 0.0
+            for a in range(starts[c], starts[c + 1]):
+                pull = 0.0
+                for i in range(r):
+                    pull += cones[a, i] * answer[i]
+                reach += pull * pull
+            worth -= np.sqrt(reach)
+        # any multiple of y is as good a proof: the best one, zero inside a zone
+        factor = max(0.0, worth) / cost if cost > 0.0 else 0.0
+        bound[point] = 0.5 * factor * factor * cost
+        for i in range(r):
+            y[point, i] = factor * answer[i]
+        allowed = _GAP * energy[point] + _GAP_WITHOUT_PLAY * without
+        # written so that a value that is not a number fails
+        fine = energy[point] - bound[point] <= allowed
+        road[point] = SOLVED if fine else UNCERTIFIED
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _within(
+    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
+) -> bool:
+    """Look for clearances within their cones with G u = -h: no energy at all."""
+    # y = h may prove that there are none; else project on the cones and that plane
+    nu, r = Gt.shape
+    worth = 0.0
+    for i in range(r):
+        worth += h[i] * h[i]
+    for c in range(len(starts) - 1):
+        reach = 0.0
+        for a in range(starts[c], starts[c + 1]):
+            pull = 0.0
+            for i in range(r):
+                pull += Gt[a, i] * h[i]
+            reach += pull * pull
+        worth -= np.sqrt(reach)
+    if worth > 0.0:
+        return False
+    left = np.empty(r)
+    for _ in range(_PROJECTIONS):
+        for i in range(r):
+            left[i] = h[i]
+            for c in range(nu):
+                left[i] += Gt[c, i] * u[c]
+        for c in range(nu):
+            for i in range(r):
+                u[c] -= inverse[c, i] * left[i]
+        outside = False
+        for c in range(len(starts) - 1):
+            size = 0.0
+            for a in range(starts[c], starts[c + 1]):
+                size += u[a] * u[a]
+            if size > 1.0:
+                outside = True
+                # a little further in, so that an end is reached
+                size = _INWARDS / np.sqrt(size)
+                for a in range(starts[c], starts[c + 1]):
+                    u[a] *= size
+        if not outside:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def least_margins(
+    B: NDArray, starts: NDArray, right: NDArray, margin: NDArray, bound: NDArray,
+    pulls: NDArray,
+) -> None:  # fmt: skip
+    """Least t with B u = right, |u_k| <= t, for every row of right.
+
+    Args:
+        B: (p, nu) orthonormal rows.
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        right: (k, p).
+        margin: (k,) to fill; not a number where the certificate falls short.
+        bound: (k,) to fill, certified lower bound.
+        pulls: (k, p) to fill: multipliers q that prove it, q.right = bound.
+    """
+    p = len(B)
+    for point in range(len(right)):
+        w = right[point].copy()
+        size = np.sqrt(np.sum(w * w))
+        pulls[point] = 0.0
+        if not size > 0.0:
+            margin[point], bound[point] = 0.0, 0.0
+            continue
+        own = B.copy()
+        turn_first(own, w, size)
+        u, pull = farthest(own, starts)
+        reach, most = np.sum(own[0] * u), 0.0
+        for c in range(len(starts) - 1):
+            part = 0.0
+            for i in range(starts[c], starts[c + 1]):
+                part += pull[i] * pull[i]
+            most += np.sqrt(part)
+        margin[point], bound[point] = size / reach, size / most
+        for i in range(p):
+            pulls[point, i] = np.sum(B[i] * pull) / most
+        if not (
+            reach > 0.0 and margin[point] - bound[point] <= _MARGIN_GAP * margin[point]
+        ):
+            margin[point] = np.nan

@@ -1,0 +1,276 @@
+"""Which platform screws (22) leaves possible, compiled; and how far they reach.
+
+Readings ``frozen`` and ``free`` of (27): deformations stay, unloaded clearances move,
+passive joints follow.  See :mod:`assembly.pose_error` for what is asked, and
+:mod:`assembly.solvers.farthest` for the search.  What hangs on rounding is handed back.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from assembly.solvers.compiled_reduction import (
+    Structure,
+    free_columns,
+    orthogonal_rows,
+    paths_of,
+    small_problem,
+)
+from assembly.solvers.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.solvers.farthest import DONE, advance, begin
+from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.polytope import empty_polytope
+from assembly.solvers.support import Body
+
+SOLVED, HANDED_BACK = range(2)
+MOST_SUPPORTS = 400
+_RANK = 1e-10  # as in assembly.solvers.reduction
+_UNBOUNDED = 1e-8  # as in assembly.pose_error
+_CLEAR = 10.0  # what is within this factor of a threshold decides nothing
+_APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
+
+
+class Loads(NamedTuple):
+    """What (22) says of k points' clearances.
+
+    Attributes:
+        structure: the robot as (22) saw it.
+        multipliers: (k, 6 closures) of the scaled closures.
+        clearances: (k, nu) in units of these cones.
+        energy: (k,) [J].
+        without_play: (k,) [J] energy if every clearance stayed at zero.
+        cone_of: (cones,) the cone here of each cone of the robot that is asked about.
+    """
+
+    structure: Structure
+    multipliers: NDArray
+    clearances: NDArray
+    energy: NDArray
+    without_play: NDArray
+    cone_of: NDArray
+
+
+class Bounds(NamedTuple):
+    """Rows of arrays filled by :func:`bound_all`, one row a point.
+
+    Attributes:
+        rotation: (k, 2) [rad] lower and upper.
+        translation: (k, 2) [m] likewise.
+        rotation_screw: (k, 6) [rad, m] attains the lower bound.
+        translation_screw: (k, 6) likewise.
+        supports: (k,) support functions computed.
+        road: (k,) SOLVED or HANDED_BACK.
+    """
+
+    rotation: NDArray
+    translation: NDArray
+    rotation_screw: NDArray
+    translation_screw: NDArray
+    supports: NDArray
+    road: NDArray
+
+
+@njit(cache=True, error_model="numpy")
+def bound_all(
+    s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray, clearances: NDArray,
+    loads: Loads, offset: NDArray, tolerance: NDArray, out: Bounds,
+) -> None:  # fmt: skip
+    """Bracket the largest pose errors of all points that are not handed back yet.
+
+    Args:
+        s: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        centre: (k, 6) [rad, m] platform screws of (22) at the platform's origin.
+        clearances: (k, nu) of (22), in these cones.
+        loads: which of them are held.
+        offset: (3,) [m] from the platform's origin to the point asked about.
+        tolerance: (2,) [rad, m] asked of upper minus lower bounds.
+        out: arrays to fill; rows whose road is HANDED_BACK are left out.
+    """
+    outer = empty_polytope()
+    for i in range(len(T)):
+        if out.road[i] != SOLVED:
+            continue
+        decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
+        found, body = body_of(
+            s, T[i], mismatch[i], centre[i], clearances[i], loaded, offset
+        )
+        if not (decided and found):
+            out.road[i] = HANDED_BACK
+            continue
+        for half in range(2):
+            search = begin(body, 3 * half, tolerance[half], MOST_SUPPORTS, outer)
+            if advance(body, search) != DONE:
+                out.road[i] = HANDED_BACK
+            out.supports[i] += search.counts[1]
+            if half == 0:
+                out.rotation[i] = search.bounds
+                out.rotation_screw[i] = search.best
+            else:
+                out.translation[i] = search.bounds
+                out.translation_screw[i] = search.best
+
+
+@njit(cache=True, error_model="numpy")
+def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
+    """Which clearances press on their bound, as in :mod:`assembly.pose_error`.
+
+    Load times slack is about the solver's gap, so one of the two is nearly zero.
+
+    Args:
+        loads: what (22) says.
+        P: (n, 6, 6) unit screws of every frame at the platform.
+        point: which one.
+
+    Returns:
+        Whether that is clear of all; (cones,) bool.
+    """
+    h, wrench = loads.structure, loads.multipliers[point]
+    energy = loads.energy[point]
+    scale = max(energy, 1e-9 * loads.without_play[point], 1e-300)
+    loaded, decided = np.zeros(len(loads.cone_of), np.bool_), True
+    for c in range(len(loaded)):
+        push, size = 0.0, 0.0
+        own = loads.cone_of[c]
+        for i in range(h.starts[own], h.starts[own + 1]):
+            j, pull = h.cone_frame[i], 0.0
+            for k in range(h.patterns.shape[1]):
+                sign = h.patterns[h.pattern_of[j], k]
+                if sign != 0.0:
+                    for a in range(6):
+                        pull += sign * wrench[6 * k + a] * P[j, h.cone_axis[i], a]
+            push += (pull * h.cone_size[i]) ** 2
+            size += loads.clearances[point, i] ** 2
+        load = np.sqrt(push) / scale
+        slack = max(0.0, 1.0 - np.sqrt(size))
+        loaded[c] = load > slack and load > 1e-9
+        apart = load > _APART * slack or slack > _APART * load
+        # written so that what is not a number is not clear
+        decided = decided and (apart or max(load, slack) <= 1e-9)
+    return decided, loaded
+
+
+@njit(cache=True, error_model="numpy")
+def body_of(
+    s: Structure, T: NDArray, mismatch: float, centre: NDArray, clearances: NDArray,
+    loaded: NDArray, offset: NDArray,
+) -> tuple[bool, Body]:  # fmt: skip
+    """The set of platform screws of one point, and whether it was found.
+
+    Args:
+        s: as in :func:`bound_all`, like all others, for one point.
+        T: see there.
+        mismatch: see there.
+        centre: see there.
+        clearances: see there.
+        loaded: see there.
+        offset: see there.
+
+    Returns:
+        Whether no rank hangs on rounding and the platform moves within bounds; the set.
+    """
+    tolerance = _RANK + 30.0 * mismatch
+    P = paths_of(T, s)
+    m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
+    F = free_columns(s, P, m)
+    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+    rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+    centre = _at_point(centre, offset)
+    nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
+    if rank < 0:
+        return False, Body(centre, *nothing)
+    bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
+    if not bounded:
+        return False, Body(centre, *nothing)
+    Z = orthogonal_rows(F, turns, rank, m)
+    columns, _ = small_problem(s, P, Z, len(Z), np.zeros(m))
+    kept = 0
+    for c in range(len(s.starts) - 1):
+        if not loaded[c]:
+            kept += s.starts[c + 1] - s.starts[c]
+    X, rows, start = np.zeros((6, kept)), np.zeros((len(Z), kept)), np.zeros(kept)
+    starts = np.zeros(len(s.starts), np.int64)
+    at, cones = 0, 0
+    for c in range(len(s.starts) - 1):
+        if loaded[c]:
+            continue
+        for i in range(s.starts[c], s.starts[c + 1]):
+            rows[:, at] = columns[i]
+            start[at] = clearances[i]
+            _move_platform(s, P, follow, i, X[:, at])
+            at += 1
+        cones += 1
+        starts[cones] = at
+    _into_cones(start, starts, cones)
+    for j in range(kept):
+        X[:, j] = _at_point(X[:, j].copy(), offset)
+    decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
+    return decided, Body(centre, X, B, start, starts[: cones + 1].copy())
+
+
+@njit(cache=True, error_model="numpy")
+def _follow(
+    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
+    order: NDArray, rank: int, m: int,
+) -> tuple[bool, NDArray]:  # fmt: skip
+    """What the platform does, scaled (6, m), as free motions follow the closures.
+
+    Returns:
+        False where free motions move the platform and no closure; what it does.
+    """
+    nq = len(s.free_frame)
+    follow, largest = np.zeros((6, m)), 0.0
+    for a in range(6):
+        drive = np.zeros(nq)
+        for i in range(nq):
+            j = s.free_frame[order[i]]
+            drive[i] = s.on_path[j] * P[j, s.free_axis[order[i]], a]
+            for l in range(min(i, rank)):
+                drive[i] -= F[i, l] * follow[a, l]
+            if i < rank:
+                follow[a, i] = drive[i] / diagonal[i]
+            else:
+                largest = max(largest, abs(drive[i]))
+        turn(F, turns, rank, follow[a])
+    return largest <= _UNBOUNDED / _CLEAR, follow
+
+
+@njit(cache=True, error_model="numpy")
+def _move_platform(
+    s: Structure, P: NDArray, follow: NDArray, i: int, screw: NDArray
+) -> None:
+    """(6,) [rad, m] what clearance i does to the platform, free motions following."""
+    j = s.cone_frame[i]
+    column, pattern = P[j, s.cone_axis[i]], s.patterns[s.pattern_of[j]]
+    for a in range(6):
+        screw[a] = s.on_path[j] * column[a]
+        for k in range(len(pattern)):
+            if pattern[k] != 0.0:
+                for b in range(6):
+                    screw[a] -= follow[a, 6 * k + b] * pattern[k] * column[b]
+        screw[a] *= s.cone_size[i] if a < 3 else s.cone_size[i] * s.size
+
+
+@njit(cache=True, error_model="numpy")
+def _at_point(screw: NDArray, offset: NDArray) -> NDArray:
+    """The same screw read at another point of the platform."""
+    moved = screw.copy()
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        moved[3 + a] += screw[b] * offset[c] - screw[c] * offset[b]
+    return moved
+
+
+@njit(cache=True, error_model="numpy")
+def _into_cones(u: NDArray, starts: NDArray, cones: int) -> None:
+    """Cones' vectors shortened to length 1 where rounding made them longer."""
+    for c in range(cones):
+        size = 0.0
+        for i in range(starts[c], starts[c + 1]):
+            size += u[i] * u[i]
+        if size > 1.0:
+            for i in range(starts[c], starts[c + 1]):
+                u[i] /= np.sqrt(size)

@@ -1,0 +1,317 @@
+"""The farthest point of a convex body of platform screws, bracketed: problem (27).
+
+Asked for is the largest rotation, or translation, in the body of
+:mod:`assembly.solvers.support`.  Three numbers matter, so its projection is cut from
+outside in three dimensions:
+
+- a support function gives a cut on the upper side and a point on the lower; where the
+  body is symmetric, the same answer serves the opposite direction too;
+- first the search climbs: a point's own direction gains more than the one it came from;
+- then a box along the direction found, and ever the farthest corner of what is left;
+- :mod:`assembly.solvers.majorant` closes round bodies, which would take many cuts.
+
+A direction in which the interior point's certificate falls short is handed back, with
+:data:`NEEDED`: the caller answers it by another solver and the search goes on.
+
+Sources:
+    Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
+    maximisation).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from assembly.solvers.majorant import eigenvectors, majorant_bound
+from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
+from assembly.solvers.support import Body, screw_at, support, symmetric, within
+
+DONE, NEEDED, GAVE_UP = range(3)
+_CLIMBING, _BOXING, _CUTTING = range(3)
+_CLIMBS = 8
+_GAIN = 1e-3  # [tolerances] a climb that gains less is over
+_SHARE = 0.1  # of the tolerance that a support is asked to leave open at most ..
+_POOR = 0.5  # .. and with which the search still goes on
+
+
+class Search(NamedTuple):
+    """How far a search has come.
+
+    Attributes:
+        part: 0 for the rotation, 3 for the translation.
+        tolerance: [rad or m] asked of upper minus lower bound.
+        bounds: (2,) [rad or m] lower and upper.
+        best: (6,) [rad, m] attains the lower bound.
+        direction: (3,) looked in next.
+        axes: (3, 3) rows of the box.
+        heights: (2, 3) of the box, low and high, NaN where not known.
+        cuts: (32, 4) planes found before there was a box.
+        counts: (5,) stage, supports, planes kept, whether the last improved, most.
+        outer: what the planes leave.
+    """
+
+    part: int
+    tolerance: float
+    bounds: NDArray
+    best: NDArray
+    direction: NDArray
+    axes: NDArray
+    heights: NDArray
+    cuts: NDArray
+    counts: NDArray
+    outer: Polytope
+
+
+@njit(cache=True, error_model="numpy")
+def begin(
+    body: Body, part: int, tolerance: float, most: int, outer: Polytope
+) -> Search:
+    """A search that has not looked anywhere yet.
+
+    Args:
+        body: what is searched.
+        part: 0 for the rotation, 3 for the translation.
+        tolerance: [rad or m] asked of upper minus lower bound.
+        most: supports after which it gives up.
+        outer: room for the planes.
+
+    Returns:
+        The search, its first direction chosen.
+    """
+    best = body.centre.copy()
+    size = 0.0
+    for a in range(3):
+        size += best[part + a] ** 2
+    size = np.sqrt(size)
+    search = Search(
+        part, tolerance, np.array([size, np.inf]), best, np.zeros(3), np.zeros((3, 3)),
+        np.full((2, 3), np.nan), np.empty((32, 4)), np.zeros(5, np.int64), outer,
+    )  # fmt: skip
+    search.counts[4] = most
+    if body.map.shape[1]:
+        _first_direction(body, search)
+    else:
+        search.bounds[1] = size
+    return search
+
+
+@njit(cache=True, error_model="numpy")
+def _first_direction(body: Body, search: Search) -> None:
+    """Where the body would reach farthest if no closure held it."""
+    p, nv = body.rows.shape
+    free = body.map[search.part : search.part + 3].copy()
+    for i in range(p):
+        for a in range(3):
+            along = np.sum(free[a] * body.rows[i])
+            for j in range(nv):
+                free[a, j] -= along * body.rows[i, j]
+    Q = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            Q[a, b] = np.sum(free[a] * free[b])
+    _, vectors = eigenvectors(Q)
+    most = -1.0
+    for candidate in range(4):
+        d = np.empty(3)
+        for a in range(3):
+            d[a] = body.centre[search.part + a]
+            if candidate < 3:
+                d[a] = vectors[a, candidate]
+        size = np.sqrt(np.sum(d * d))
+        if not size > 0.0:
+            continue
+        d /= size
+        middle, height = 0.0, 0.0
+        for a in range(3):
+            middle += d[a] * body.centre[search.part + a]
+        for c in range(len(body.starts) - 1):
+            pull = 0.0
+            for j in range(body.starts[c], body.starts[c + 1]):
+                own = d[0] * free[0, j] + d[1] * free[1, j] + d[2] * free[2, j]
+                pull += own * own
+                middle -= own * body.start[j]
+            height += np.sqrt(pull)
+        sign = 1.0 if middle >= 0.0 else -1.0
+        if height + abs(middle) > most:
+            most = height + abs(middle)
+            for a in range(3):
+                search.direction[a] = sign * d[a]
+
+
+@njit(cache=True, error_model="numpy")
+def advance(body: Body, search: Search) -> int:
+    """Look on until the bounds are as close as asked.
+
+    Args:
+        body: what is searched.
+        search: leaves holding the bounds.
+
+    Returns:
+        DONE; NEEDED where ``search.direction`` must be answered by :func:`learn`
+        first; GAVE_UP after as many supports as allowed.
+    """
+    while True:
+        if search.bounds[1] - search.bounds[0] <= search.tolerance:
+            return DONE
+        if search.counts[1] >= search.counts[4]:
+            return GAVE_UP
+        height, v, pulls, n = support(
+            body, search.part, search.direction, _SHARE * search.tolerance
+        )
+        screw = screw_at(body, v)
+        reached = 0.0
+        for a in range(3):
+            reached += search.direction[a] * screw[search.part + a]
+        # written so that a height that is not a number fails
+        if not height - reached <= _POOR * search.tolerance:
+            return NEEDED
+        learn(body, search, max(height, reached), screw, pulls)
+        if symmetric(body):
+            _learn_opposite(body, search, v, pulls)
+        choose(search)
+
+
+@njit(cache=True, error_model="numpy")
+def learn(
+    body: Body, search: Search, height: float, screw: NDArray, pulls: NDArray
+) -> None:
+    """Take in a support in ``search.direction``.
+
+    Args:
+        body: what is searched.
+        search: leaves knowing more.
+        height: [rad or m] certified upper bound along the direction.
+        screw: (6,) of the body.
+        pulls: (nv,) X^T d - H^T n.
+    """
+    search.counts[1] += 1
+    search.counts[3] = 0
+    _improve(search, screw)
+    part = search.part
+    search.bounds[1] = min(search.bounds[1], majorant_bound(
+        body.centre[part : part + 3], body.map[part : part + 3], body.rows, body.start,
+        body.starts, pulls,
+    ))  # fmt: skip
+    _add_plane(search, search.direction, height)
+    search.bounds[1] = max(search.bounds[1], search.bounds[0])
+
+
+@njit(cache=True, error_model="numpy")
+def _improve(search: Search, screw: NDArray) -> None:
+    """Keep a screw that is farther than the best."""
+    size = 0.0
+    for a in range(3):
+        size += screw[search.part + a] ** 2
+    size = np.sqrt(size)
+    if size > search.bounds[0]:
+        if size > search.bounds[0] + _GAIN * search.tolerance:
+            search.counts[3] = 1
+        search.bounds[0] = size
+        search.best[:] = screw
+
+
+@njit(cache=True, error_model="numpy")
+def _add_plane(search: Search, direction: NDArray, height: float) -> None:
+    """A new plane: of the box, or kept for it, or cut at once."""
+    stage = search.counts[0]
+    if stage == _CUTTING:
+        cut(search.outer, direction, height)
+        return
+    if stage == _BOXING:
+        _set_side(search, direction, height)
+        return
+    kept = search.counts[2]
+    if kept < len(search.cuts):
+        search.cuts[kept, :3] = direction
+        search.cuts[kept, 3] = height
+        search.counts[2] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def _set_side(search: Search, direction: NDArray, height: float) -> None:
+    """A side of the box, if the direction is one of its axes or the opposite."""
+    for axis in range(3):
+        if np.all(direction == search.axes[axis]):
+            search.heights[1, axis] = height
+        elif np.all(direction == -search.axes[axis]):
+            search.heights[0, axis] = -height
+
+
+@njit(cache=True, error_model="numpy")
+def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> None:
+    """What a symmetric body's support says of the other side: v turned round."""
+    start = body.start
+    screw = screw_at(body, within(body, -v))
+    _improve(search, screw)
+    height = 0.0
+    for a in range(3):
+        height -= search.direction[a] * body.centre[search.part + a]
+    for c in range(len(body.starts) - 1):
+        size = 0.0
+        for j in range(body.starts[c], body.starts[c + 1]):
+            size += pulls[j] * pulls[j]
+            height += pulls[j] * start[j]
+        height += np.sqrt(size)
+    reached = 0.0
+    for a in range(3):
+        reached -= search.direction[a] * screw[search.part + a]
+    _add_plane(search, -search.direction, max(height, reached))
+
+
+@njit(cache=True, error_model="numpy")
+def choose(search: Search) -> None:
+    """The next direction, and the stage that looks in it."""
+    counts, direction = search.counts, search.direction
+    if counts[0] == _CLIMBING:
+        if counts[3] and counts[1] < _CLIMBS:
+            _towards(search, search.best[search.part : search.part + 3])
+            return
+        _start_boxing(search)
+    if counts[0] == _BOXING:
+        for axis in range(3):
+            for side in range(2):
+                if np.isnan(search.heights[side, axis]):
+                    for a in range(3):
+                        direction[a] = (2 * side - 1) * search.axes[axis, a]
+                    return
+        start_box(search.outer, search.axes, search.heights[0], search.heights[1])
+        counts[0] = _CUTTING
+        for i in range(counts[2]):
+            cut(search.outer, search.cuts[i, :3].copy(), search.cuts[i, 3])
+    corner = farthest_corner(search.outer)
+    size = np.sqrt(np.sum(corner * corner))
+    search.bounds[1] = max(search.bounds[0], min(search.bounds[1], size))
+    # where the last step gained, its point's own direction gains more, and is where
+    # the second bound is sharpest; else wherever the cuts leave most room
+    if counts[3]:
+        _towards(search, search.best[search.part : search.part + 3])
+    else:
+        _towards(search, corner)
+
+
+@njit(cache=True, error_model="numpy")
+def _towards(search: Search, point: NDArray) -> None:
+    """Look towards a point."""
+    size = np.sqrt(np.sum(point * point))
+    for a in range(3):
+        search.direction[a] = point[a] / size
+
+
+@njit(cache=True, error_model="numpy")
+def _start_boxing(search: Search) -> None:
+    """A box along the best point's direction, its planes not known yet."""
+    search.counts[0] = _BOXING
+    own = search.direction
+    least = np.argmin(np.abs(own))
+    axes = search.axes
+    axes[0] = own
+    axes[1] = -own[least] * own
+    axes[1, least] += 1.0
+    axes[1] /= np.sqrt(np.sum(axes[1] * axes[1]))
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        axes[2, a] = own[b] * axes[1, c] - own[c] * axes[1, b]
+    for i in range(search.counts[2]):
+        _set_side(search, search.cuts[i, :3], search.cuts[i, 3])

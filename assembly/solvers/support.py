@@ -1,0 +1,137 @@
+"""How far a convex body of platform screws extends along a direction, compiled.
+
+The body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.  Its support
+function along d is a small cone programme; the multipliers n of its rows, whatever they
+are, prove an upper bound,
+
+    d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
+
+and its point is drawn into the body: height and point never depend on the solver.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from assembly.solvers.interior import interior_point
+
+_SYMMETRIC = 1e-14  # H start counts as zero
+_ROUNDING = 1e-14  # by which a cone counts as left
+
+
+class Body(NamedTuple):
+    """Platform screws that remain possible; see the head of this module.
+
+    Attributes:
+        centre: (6,) [rad, m] the screw at ``start``.
+        map: (6, nv) [rad, m] X.
+        rows: (p, nv) H, orthonormal.
+        start: (nv,) within the cones.
+        starts: (cones + 1,) first column of each cone, and nv.
+    """
+
+    centre: NDArray
+    map: NDArray
+    rows: NDArray
+    start: NDArray
+    starts: NDArray
+
+
+@njit(cache=True, error_model="numpy")
+def support(
+    body: Body, part: int, direction: NDArray, tolerance: float
+) -> tuple[float, NDArray, NDArray, NDArray]:
+    """Largest component of the body's screws along a direction.
+
+    Args:
+        body: what is searched.
+        part: first of the three components.
+        direction: (3,) unit vector.
+        tolerance: [rad or m] that may be left between height and point.
+
+    Returns:
+        The certified height, v (nv,) of the body, the pulls X^T d - H^T n (nv,) and n;
+        height and point may be farther apart where the interior point broke down.
+    """
+    p, nv = body.rows.shape
+    pulls, height, size = np.zeros(nv), 0.0, 0.0
+    n = np.zeros(p)
+    for a in range(3):
+        height += direction[a] * body.centre[part + a]
+        for j in range(nv):
+            pulls[j] += direction[a] * body.map[part + a, j]
+    for j in range(nv):
+        size += pulls[j] * pulls[j]
+        height -= pulls[j] * body.start[j]
+    size = np.sqrt(size)
+    if not size > 0.0:
+        return height, body.start.copy(), pulls, n
+    v = body.start.copy()
+    if p:
+        right = np.zeros(p)
+        for i in range(p):
+            for j in range(nv):
+                right[i] += body.rows[i, j] * body.start[j]
+        v, n, _ = interior_point(
+            np.zeros((0, nv)), np.zeros(0), pulls / size, body.rows, right, body.starts,
+            tolerance / size, 0.0,
+        )  # fmt: skip
+        n *= size
+        for i in range(p):
+            height += n[i] * right[i]
+            for j in range(nv):
+                pulls[j] -= n[i] * body.rows[i, j]
+    for c in range(len(body.starts) - 1):
+        pull = 0.0
+        for j in range(body.starts[c], body.starts[c + 1]):
+            pull += pulls[j] * pulls[j]
+        pull = np.sqrt(pull)
+        height += pull
+        if p == 0 and pull > 0.0:
+            for j in range(body.starts[c], body.starts[c + 1]):
+                v[j] = pulls[j] / pull
+    return height, within(body, v) if p else v, pulls, n
+
+
+@njit(cache=True, error_model="numpy")
+def within(body: Body, v: NDArray) -> NDArray:
+    """A nearby v that satisfies rows and cones to rounding."""
+    step = v - body.start
+    for i in range(len(body.rows)):
+        left = np.sum(body.rows[i] * step)
+        for j in range(len(step)):
+            step[j] -= left * body.rows[i, j]
+    # the longest part of the step, from a start that is inside, that leaves no cone
+    share = 1.0
+    for c in range(len(body.starts) - 1):
+        aa, ab, bb = 0.0, 0.0, -1.0 - _ROUNDING
+        for j in range(body.starts[c], body.starts[c + 1]):
+            aa += step[j] * step[j]
+            ab += body.start[j] * step[j]
+            bb += body.start[j] * body.start[j]
+        if aa + 2.0 * ab + bb > 0.0:
+            root = np.sqrt(max(ab * ab - aa * bb, 0.0))
+            share = min(share, -bb / (ab + root) if ab > 0.0 else (root - ab) / aa)
+    return body.start + max(share, 0.0) * step
+
+
+@njit(cache=True, error_model="numpy")
+def screw_at(body: Body, v: NDArray) -> NDArray:
+    """(6,) platform screw at v."""
+    screw = body.centre.copy()
+    for j in range(len(v)):
+        step = v[j] - body.start[j]
+        for a in range(6):
+            screw[a] += body.map[a, j] * step
+    return screw
+
+
+@njit(cache=True, error_model="numpy")
+def symmetric(body: Body) -> bool:
+    """Whether v -> -v leaves the rows satisfied."""
+    for i in range(len(body.rows)):
+        if not abs(np.sum(body.rows[i] * body.start)) <= _SYMMETRIC:
+            return False
+    return True

@@ -1,0 +1,1 @@
+"""What errors drawn at random do, and how loose tolerances may be."""

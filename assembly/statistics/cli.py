@@ -1,0 +1,200 @@
+"""The commands ``forcefit assembly statistics`` and ``tolerances``.
+
+Importing this module adds them to the application.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from assembly.cli import (
+    JointOption,
+    JsonOption,
+    PoseOption,
+    RobotArgument,
+    app,
+    posture_of,
+    progress_bars,
+    save_figure,
+)
+from stiffness.reading import BadInput, nearest
+from stiffness.writing import check_writable, write_json
+
+
+@app.command()
+def statistics(
+    robot: RobotArgument,
+    errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
+    play: Annotated[
+        str, typer.Option(help="Where play sits: least | uniform | contact.")
+    ] = "least",
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
+    ] = None,
+    yield_strength: Annotated[
+        float | None, typer.Option(help="[Pa] of the links: a limit on their stress.")
+    ] = None,
+    importance: Annotated[
+        int | None,
+        typer.Option(help="Base draws for the importance of errors.", min=16),
+    ] = None,
+    by: Annotated[
+        str, typer.Option(help="Importance by: source | frame | kind.")
+    ] = "kind",
+    margins: Annotated[
+        bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
+    ] = True,
+    confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
+    workers: Annotated[int, typer.Option(help="Threads.", min=1)] = 1,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw histograms, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Draw errors many times: yields, limits exceeded, pose errors, what matters.
+
+    With OUTPUT, finished draws are kept in OUTPUT.journal: the same command goes on
+    from there after a kill and ends in the same file.
+    """
+    from assembly.statistics.distributions import read_sources
+    from assembly.statistics.estimates import summarise, summary_text
+    from assembly.statistics.importance import importance_dataset
+    from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
+    from assembly.statistics.play import PLAY
+    from assembly.statistics.plot import histogram_figure
+    from assembly.sweeps.dataset import save_dataset
+
+    for option, word, valid in (
+        ("--play", play, PLAY), ("--by", by, ("source", "frame", "kind"))
+    ):  # fmt: skip
+        if word not in valid:
+            raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
+    if not 0 < confidence < 1:
+        raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
+    if yield_strength is not None and not 0 < yield_strength < float("inf"):
+        raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
+    limits = dict(map(parse_limit, limit or ()))
+    for path in filter(None, (output, figure)):
+        check_writable(path)
+    posture = posture_of(robot, pose, joint)
+    sources = read_sources(errors, posture.robot)
+    experiment = Experiment(posture, sources, seed, play, margins)
+    experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    try:
+        with progress_bars() as update:
+            data = run_draws(
+                experiment, draws, output, workers, lambda d, n: update("draws", d, n)
+            )
+            if importance is not None:
+                shares = importance_dataset(
+                    experiment, importance, by, confidence,
+                    lambda d, n: update("importance", d, n),
+                )  # fmt: skip
+                data = data.merge(shares, combine_attrs="no_conflicts")
+                if output is not None:
+                    save_dataset(data, output)
+    except KeyboardInterrupt:
+        kept = f"; finished draws are kept in {output}.journal" if output else ""
+        print(f"forcefit: interrupted{kept}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    if figure is not None:
+        save_figure(histogram_figure(data), figure)
+    summary = {
+        "robot": posture.robot.name, "pose": posture.pose(), "seed": seed, "play": play,
+        **summarise(data, limits, yield_strength, confidence),
+    }  # fmt: skip
+    write_json(summary, json)
+    if json != "-":
+        print(summary_text(summary))
+
+
+@app.command()
+def tolerances(
+    robot: RobotArgument,
+    grid: Annotated[
+        str, typer.Option(help="Workspace, such as tx=-0.2:0.2:0.1,tz=-0.5.")
+    ],
+    plan: Annotated[
+        Path | None, typer.Option(help="What tightness costs and must hold (TOML).")
+    ] = None,
+    compliant: Annotated[
+        str, typer.Option(help="Present errors: compliant joints free | rigid.")
+    ] = "free",
+    fresh: Annotated[
+        int, typer.Option(help="New draws that verify the answer.", min=0)
+    ] = 2000,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="NetCDF file.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the tolerances, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Say how much tighter errors must be; with a plan, how loose they may be.
+
+    Without --plan the robot's own errors are judged: the factor on all of them at which
+    it goes together everywhere, and which errors it owes its margin to.
+    """
+    from assembly.robots import load_robot
+    from assembly.statistics.allocation import allocate
+    from assembly.statistics.plot import allocation_figure
+    from assembly.statistics.tolerance_file import read_plan
+    from assembly.statistics.tolerances import (
+        allocation_of,
+        allocation_text,
+        grid_postures,
+        present_errors,
+        present_text,
+        tolerance_dataset,
+    )
+    from assembly.sweeps.dataset import save_dataset
+
+    if compliant not in {"free", "rigid"}:
+        hint = nearest(compliant, ("free", "rigid"))
+        raise BadInput(f'--compliant: found "{compliant[:60]}"{hint}')
+    if plan is None and (output or figure):
+        raise BadInput("tolerances: --output and --figure need a --plan")
+    for path in filter(None, (output, figure)):
+        check_writable(path)
+    machine = load_robot(robot)
+    asked = None if plan is None else read_plan(plan, machine)
+    postures = grid_postures(machine, grid)
+    results: dict = {"robot": machine.name, "postures": len(postures)}
+    said = []
+    with progress_bars() as update:
+        if machine.errors.any():
+            results["present"] = present_errors(
+                postures, compliant, lambda d, n: update("present errors", d, n)
+            )
+            said.append(present_text(results["present"]))
+        elif asked is None:
+            raise BadInput(
+                f"{machine.name}: its frames have no errors to judge; give them a "
+                "geometric_error, or ask for tolerances with --plan"
+            )
+        if asked is not None:
+            answer = allocate(postures, asked, fresh, update)
+            results["allocation"] = allocation_of(answer)
+            said.append(allocation_text(results["allocation"]))
+            data = tolerance_dataset(answer)
+            if output is not None:
+                save_dataset(data, output)
+            if figure is not None:
+                save_figure(allocation_figure(data), figure)
+    write_json(results, json)
+    if json != "-":
+        print("\n".join(said))
+    check = results.get("allocation", {}).get("verification") or {}
+    if check.get("verdict") == "contradicted":
+        raise typer.Exit(1)

@@ -1,0 +1,187 @@
+"""Figures of draws, importance and tolerances, from their data sets alone."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assembly.statistics.estimates import most_probable, quantile
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+KINDS = ("histogram", "tornado", "allocation")
+_SCALES = {
+    "rotation": (1e3, "mrad"), "translation": (1e3, "mm"), "energy": (1.0, "J"),
+    "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
+    "moment": (1.0, "N m"), "stress": (1e-6, "MPa"),
+}  # fmt: skip
+_NAMES = {
+    "rotation": "platform rotation error", "translation": "platform position error",
+    "energy": "assembly energy", "margin": "zone margin, compliant joints rigid",
+    "margin_free": "zone margin, compliant joints free",
+    "force": "largest force in a body", "moment": "largest moment in a body",
+    "stress": "largest stress in a link",
+}  # fmt: skip
+
+
+def figure_of_draws(data: "xarray.Dataset", kind: str | None) -> "Figure | None":
+    """The figure a data set is for, if it is one of this module's.
+
+    Args:
+        data: as saved by ``statistics`` or ``tolerances``, or any other.
+        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
+
+    Returns:
+        The figure; None for another kind of data set.
+
+    Raises:
+        ValueError: the data set has not what the kind needs.
+    """
+    if kind is None:
+        own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
+        found = [name for key, name in own.items() if key in (*data, *data.attrs)]
+        kind = found[0] if found else None
+    drawings = {
+        "histogram": histogram_figure, "tornado": tornado_figure,
+        "allocation": allocation_figure,
+    }  # fmt: skip
+    return drawings[kind](data) if kind is not None else None
+
+
+def histogram_figure(data: "xarray.Dataset") -> "Figure":
+    """Histograms with medians, 95 % quantiles and most probable values.
+
+    Args:
+        data: of :func:`assembly.statistics.monte_carlo.run_draws`.
+
+    Returns:
+        A panel for each quantity that varies; bands are 95 % confidence intervals.
+
+    Raises:
+        ValueError: the data set has no draws.
+    """
+    from matplotlib.figure import Figure
+
+    if "draw" not in data.dims or "energy" not in data:
+        raise ValueError("histograms need a data set of draws")
+    solved = data.isel(draw=np.flatnonzero(data["status"].values == 0))
+    names = [n for n in _SCALES if n in solved and solved[n].size]
+    figure = Figure(figsize=(12, 3.2 * -(-len(names) // 2)), layout="constrained")
+    panels = figure.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
+    for panel, name in zip(panels, names, strict=False):
+        _histogram(panel, name, solved[name].values)
+    for panel in panels[len(names) :]:
+        panel.set_axis_off()
+    figure.suptitle(
+        f"{data.attrs.get('robot', '')}: {data.sizes['draw']} draws, "
+        f"seed {data.attrs.get('seed', '')}"
+    )
+    return figure
+
+
+def _histogram(panel: Any, name: str, values: Any) -> None:
+    """One panel."""
+    scale, unit = _SCALES[name]
+    x = scale * (values.max(axis=1) if values.ndim == 2 else values)
+    x = x[np.isfinite(x)]
+    panel.set(xlabel=f"{_NAMES[name]} [{unit}]", ylabel="draws")
+    if len(x) < 2 or np.ptp(x) == 0:
+        panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center")
+        return
+    panel.hist(x, bins=60, color="lightsteelblue")
+    for label, colour, found in (
+        ("median", "navy", quantile(x, 0.5)),
+        ("95 %", "firebrick", quantile(x, 0.95)),
+        ("most probable", "darkgreen", most_probable(x, positive=True)),
+    ):
+        panel.axvline(
+            found["value"], color=colour, label=f"{label} {found['value']:.3g}"
+        )
+        if np.isfinite([found["lower"], found["upper"]]).all():
+            panel.axvspan(found["lower"], found["upper"], color=colour, alpha=0.25)
+    panel.legend(fontsize=8)
+
+
+def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
+    """Bars of importance, the largest on top, with their intervals.
+
+    Args:
+        data: with ``first_index`` and ``total_index``.
+        most: bars a panel.
+
+    Returns:
+        A panel for each quantity: the total share light, the share alone dark.
+
+    Raises:
+        ValueError: the data set has no importance.
+    """
+    from matplotlib.figure import Figure
+
+    if "total_index" not in data:
+        raise ValueError("a tornado needs a data set with importance")
+    some = data.isel(quantity=np.isfinite(data["total_index"].values).any(axis=(1, 2)))
+    names = [str(n) for n in some["quantity"].values]
+    rows = max(1, -(-len(names) // 2))
+    bars = min(most, some.sizes["group"])
+    figure = Figure(figsize=(12, rows * (1 + 0.28 * bars)), layout="constrained")
+    panels = figure.subplots(rows, 2, squeeze=False).ravel()
+    for panel, name in zip(panels, names, strict=False):
+        one = some.sel(quantity=name)
+        order = np.argsort(one["total_index"].sel(estimate="value").values)[-bars:]
+        for key, colour, width in (
+            ("total_index", "lightsteelblue", 0.8), ("first_index", "navy", 0.4)
+        ):  # fmt: skip
+            value, lower, upper = one[key].values[order].T
+            off = np.maximum(0.0, [value - lower, upper - value])
+            panel.barh(np.arange(bars), value, width, xerr=off, color=colour,
+                       error_kw={"lw": 0.8, "ecolor": "black"},
+                       label=key.replace("_index", ""))  # fmt: skip
+        panel.set_yticks(np.arange(bars), one["group"].values[order], fontsize=8)
+        panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
+        panel.legend(fontsize=8, loc="lower right")
+    for panel in panels[len(names) :]:
+        panel.set_axis_off()
+    return figure
+
+
+def allocation_figure(data: "xarray.Dataset") -> "Figure":
+    """Bars of the tolerances, angles and lengths apart, with what they may be at most.
+
+    Args:
+        data: of :func:`assembly.statistics.tolerances.tolerance_dataset`.
+
+    Returns:
+        A figure; above it the requirement and what the verification found.
+
+    Raises:
+        ValueError: the data set has no tolerances.
+    """
+    from matplotlib.figure import Figure
+
+    if "tolerance" not in data:
+        raise ValueError("bars of tolerances need a data set of tolerances")
+    figure = Figure(
+        figsize=(11, 2.2 + 0.35 * data.sizes["class"]), layout="constrained"
+    )
+    panels = figure.subplots(1, 2)
+    units = data["unit"].values.astype(str)
+    for panel, unit, scale, shown in (
+        (panels[0], "rad", 1e3, "mrad"), (panels[1], "m", 1e3, "mm")
+    ):  # fmt: skip
+        rows = np.flatnonzero(units == unit)
+        value = scale * data["tolerance"].values[rows]
+        most = scale * data["loosest_allowed"].values[rows]
+        panel.barh(np.arange(len(rows)), value, color="steelblue")
+        panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
+        panel.set_yticks(np.arange(len(rows)), data["class"].values[rows], fontsize=8)
+        panel.set(xlabel=f"tolerance, plus or minus [{shown}]", xscale="log")
+        if len(rows):
+            panel.set_xlim(value.min() / 3, 2 * most.max())
+            panel.legend(fontsize=8)
+        for i, one in enumerate(value):
+            panel.annotate(f" {one:.3g}", (one, i), va="center", fontsize=8)
+        if not len(rows):
+            panel.set_axis_off()
+    figure.suptitle(str(data.attrs.get("said", "")).replace("; ", "\n"), fontsize=9)
+    return figure

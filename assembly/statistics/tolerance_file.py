@@ -1,0 +1,122 @@
+"""Tolerance files: which errors there are, what tightness costs, what must hold.
+
+See ``docs/tolerances.md``.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from assembly.draw import frames_named
+from assembly.robot import Robot
+from assembly.statistics.distributions import KINDS, ErrorSources
+from assembly.statistics.monte_carlo import UNITS, limit_names
+from assembly.statistics.requirement import COSTS, Plan
+from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
+from stiffness.screws import SCREW
+
+_LOOSEST = (0.1, 0.01)  # [rad, m] beyond which no small screw is small
+
+
+def read_plan(path: Path, robot: Robot) -> Plan:
+    """The plan of a tolerance file.
+
+    Args:
+        path: TOML file.
+        robot: whose frames it names.
+
+    Returns:
+        The plan.
+
+    Raises:
+        BadInput: the file breaks a rule.
+    """
+    root = read_toml(path)
+    cost = _choice(root, "cost", COSTS)
+    law = _choice(root, "distribution", ("uniform", "truncated"))
+    asked = root.number("yield", "1", 1.0, above=0.0, largest=1.0)
+    deviations = root.number("deviations", "1", 3.0, above=0.0)
+    draws = root.number("draws", "1", 1000.0, least=1.0, largest=1e7)
+    seed = root.number("seed", "1", 1.0, least=0.0, largest=1e15)
+    if draws != int(draws) or seed != int(seed):
+        raise root.bad("draws", "expected whole numbers as draws and seed")
+    limits = _limits(root.table("limits")) if root.has("limits") else {}
+    tables = root.tables("tolerance")
+    root.finish()
+    if not tables:
+        raise root.bad("tolerance", "missing; expected tables [[tolerance]]")
+    rows: dict[tuple[int, int], int] = {}
+    names: list[str] = []
+    costs, least, most = [], [], []
+    for number, table in enumerate(tables):
+        places, unit = _places(table, robot)
+        for place in places:
+            if place in rows:
+                label = f"{robot.frames[place[0]].name}.{SCREW[place[1]]}"
+                first = quoted(names[rows[place]])
+                raise table.bad("", f"found {quoted(label)} again, first in {first}")
+            rows[place] = number
+        default = f"{robot.frames[places[0][0]].name}.{SCREW[places[0][1]]}"
+        names.append(table.text("name", default))
+        symbol = ("rad", "m")[unit]
+        costs.append(table.number("cost", "1", 1.0, above=0.0))
+        most.append(table.number("most", symbol, _LOOSEST[unit], above=0.0))
+        tightest = table.number("least", symbol, 0.0, least=0.0, below=most[-1])
+        least.append(tightest)
+        table.finish()
+    if len(set(names)) < len(names):
+        raise root.bad("tolerance", "two of them share a name; expected different ones")
+    frame, component = np.array(list(rows)).T
+    count = len(rows)
+    sources = ErrorSources(
+        robot, frame, component, np.full(count, KINDS.index(law)), np.zeros(count),
+        np.full(count, 1.0 / deviations if law == "truncated" else 1.0),
+        np.zeros(count), np.full(count, deviations), np.ones(count, dtype=bool),
+    )  # fmt: skip
+    return Plan(
+        sources, np.array(list(rows.values())), tuple(names), np.array(costs),
+        np.array(least), np.array(most), limits or {"margin_free": 1.0}, cost,
+        float(asked), int(draws), int(seed),
+    )  # fmt: skip
+
+
+def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
+    """One of some words, the first if absent."""
+    word = table.text(key, valid[0])
+    if word not in valid:
+        raise table.bad(key, f"found {quoted(word)}{nearest(word, valid)}")
+    return word
+
+
+def _limits(table: Table) -> dict[str, float]:
+    """Limits by quantity."""
+    valid = limit_names()
+    found = {}
+    for key in list(table.content):
+        if key not in valid:
+            raise table.bad("", f"unknown key {quoted(key)}{nearest(key, valid)}")
+        found[key] = table.number(key, UNITS[key], above=0.0)
+    return found
+
+
+def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
+    """Frames and components that share a tolerance; 0 if it is an angle, 1 a length."""
+    names = table.require("frames", "a list of frame names")
+    parts = table.require("components", 'a list such as ["TX"]')
+    for key, value in (("frames", names), ("components", parts)):
+        if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
+            raise table.bad(key, "expected a list of names")
+    for part in parts:
+        if part not in SCREW:
+            raise table.bad("components", f"found {quoted(part)}{nearest(part, SCREW)}")
+    units = {int(SCREW.index(part) >= 3) for part in parts}
+    if len(units) != 1:
+        raise table.bad("components", "expected angles only or lengths only, not none")
+    try:
+        frames = frames_named(robot, names)
+    except BadInput as error:
+        raise table.bad("frames", str(error)) from None
+    if not frames:
+        raise table.bad("frames", "expected at least one")
+    places = [(robot.index(f), SCREW.index(p)) for f in frames for p in parts]
+    return places, units.pop()

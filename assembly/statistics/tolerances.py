@@ -1,0 +1,197 @@
+"""Tolerances over a workspace: how much tighter errors must be, and how loose they may.
+
+The part between the command and :mod:`assembly.statistics.allocation`: postures of a
+grid, the errors a robot has now, results as plain values and as a data set.
+"""
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assembly.energy import CannotAssemble, solve_assembly
+from assembly.posture import Posture, place_many
+from assembly.robot import Robot
+from assembly.solvers.conic import SolverFailed
+from assembly.solvers.posture_margins import prepare_margins
+from assembly.statistics.allocation import Allocation
+from assembly.statistics.sensitivity import energy_slopes
+from assembly.sweeps.sweep import robot_hash
+from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
+from stiffness.reading import BadInput
+from stiffness.screws import SCREW
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def grid_postures(robot: Robot, grid: str) -> list[Posture]:
+    """Postures of a grid that the robot reaches.
+
+    Args:
+        robot: any.
+        grid: such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
+
+    Returns:
+        The postures, those out of reach left out.
+
+    Raises:
+        BadInput: the grid is not one, or none of it is reached.
+    """
+    targets = grid_targets(parse_grid(grid))
+    rows = targets.at(np.arange(int(np.prod(targets.shape))))
+    postures, reasons = place_many(robot, goals_of(targets.names, robot, rows))
+    reached = [p for p in postures if p is not None]
+    if not reached:
+        raise BadInput(f"grid: no posture is reached; the first: {reasons[0]}")
+    return reached
+
+
+def present_errors(
+    postures: Sequence[Posture],
+    compliant: str = "free",
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """How far the robot's own errors are from going together everywhere.
+
+    Args:
+        postures: of a robot with errors.
+        compliant: ``"free"`` or ``"rigid"``, reading of compliant joints.
+        progress: called with postures done and their number.
+
+    Returns:
+        The largest margin and where; the factor on all errors at which it is 1; slopes
+        of the margin and of the energy there, by error, the steepest first.
+    """
+    margins = []
+    for i, posture in enumerate(postures):
+        found = prepare_margins(posture, compliant).solve(posture.robot.errors[None])
+        margins.append(found)
+        progress(i + 1, len(postures))
+    values = np.array([m.margin[0] for m in margins])
+    worst = int(np.nanargmax(values))
+    posture, margin = postures[worst], float(values[worst])
+    robot = posture.robot
+    slopes = margins[worst].slopes[0]
+    try:
+        answer = solve_assembly(posture)
+        energy, energies = answer.energy, energy_slopes(answer)
+    except (CannotAssemble, SolverFailed):
+        energy, energies = float("nan"), np.full_like(slopes, np.nan)
+    present = np.argwhere(robot.errors != 0.0)
+    effect = np.array([slopes[i, c] * robot.errors[i, c] for i, c in present])
+    order = np.argsort(-np.nan_to_num(effect))
+    return {
+        "postures": len(postures),
+        "compliant": compliant,
+        "largest_margin": margin,
+        "at": posture.pose(),
+        "factor_on_errors": 1.0 / margin if margin > 0 else float("inf"),
+        "energy_there": energy,
+        "assemblable_share": float(np.mean(values <= 1.0 + 1e-6)),
+        "slopes": [
+            {
+                "error": f"{robot.frames[i].name}.{SCREW[c]}",
+                "value": robot.errors[i, c],
+                "margin_slope": slopes[i, c],
+                "share_of_margin": float(effect[k]) / margin if margin > 0 else 0.0,
+                "energy_slope": energies[i, c],
+            }
+            for k in order.tolist() for i, c in [present[k].tolist()]
+        ],
+    }  # fmt: skip
+
+
+def present_text(found: dict[str, Any]) -> str:
+    """What :func:`present_errors` says, for people: five errors that matter."""
+    where = ", ".join(f"{k} = {v:.4g}" for k, v in found["at"].items() if abs(v) > 1e-9)
+    lines = [
+        f"{found['postures']} postures, {found['assemblable_share']:.1%} go together; "
+        f"largest margin {found['largest_margin']:.4g} at {where or 'the origin'}",
+        f"everywhere with all errors times {found['factor_on_errors']:.4g}",
+    ]
+    for one in found["slopes"][:5]:
+        lines.append(
+            f"  {one['error']} = {one['value']:.3g} makes {one['share_of_margin']:.1%} "
+            "of that margin"
+        )
+    return "\n".join(lines)
+
+
+def allocation_of(answer: Allocation) -> dict[str, Any]:
+    """An allocation as plain values."""
+    plan = answer.plan
+    classes = [
+        {
+            "name": name, "tolerance": answer.tolerances[g], "unit": _unit(answer, g),
+            "cost": plan.costs[g], "loosest_allowed": plan.most[g],
+            "at_loosest": bool(answer.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
+        }
+        for g, name in enumerate(plan.names)
+    ]  # fmt: skip
+    return {
+        "limits": dict(plan.limits), "yield": plan.asked_yield, "cost": plan.cost,
+        "tolerances": classes, "price": answer.price,
+        "price_bound": answer.price_bound, "cuts": answer.cuts,
+        "worst": {k: {"found": a, "proven": b} for k, (a, b) in answer.worst.items()},
+        "proven_scale": answer.proven_scale, "verification": answer.verification,
+    }  # fmt: skip
+
+
+def _unit(answer: Allocation, group: int) -> str:
+    """Unit of a class of tolerances."""
+    first = int(np.flatnonzero(answer.plan.group == group)[0])
+    return "rad" if answer.plan.sources.component[first] < 3 else "m"
+
+
+def allocation_text(found: dict[str, Any]) -> str:
+    """An allocation for people."""
+    scales = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}
+    lines = []
+    for one in found["tolerances"]:
+        scale, unit = scales[one["unit"]]
+        said = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
+        lines.append(said + (" (the loosest allowed)" if one["at_loosest"] else ""))
+    for key, worst in found["worst"].items():
+        lines.append(
+            f"worst {key}: {worst['found']:.4g} found, at most {worst['proven']:.4g} "
+            f"proven, limit {found['limits'][key]:g}"
+        )
+    if np.isfinite(found["proven_scale"]):
+        lines.append(f"proven when scaled by {found['proven_scale']:.4f}")
+    check = found["verification"]
+    if check:
+        one = check["yield"]
+        lines.append(
+            f"{check['draws']} fresh draws at all postures: yield "
+            f"{one['probability']:.4f} ({one['lower']:.4f} to {one['upper']:.4f}), "
+            f"asked {found['yield']:g}: {check['verdict']}"
+        )
+    return "\n".join(lines)
+
+
+def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
+    """An allocation as a data set over ``class``."""
+    import xarray
+
+    plan, found = answer.plan, allocation_of(answer)
+    said = allocation_text(found | {"tolerances": []}).replace("\n", "; ")
+    units = np.array([c["unit"] for c in found["tolerances"]])
+    data = {
+        "tolerance": ("class", answer.tolerances, {"units": "rad or m, see unit"}),
+        "loosest_allowed": ("class", plan.most, {"units": "rad or m, see unit"}),
+        "cost": ("class", plan.costs, {"units": "1"}),
+        "unit": ("class", units),
+    }
+    robot = plan.sources.robot
+    limits = {f"limit.{key}": value for key, value in plan.limits.items()}
+    check = answer.verification
+    return xarray.Dataset(data, {"class": list(plan.names)}, {
+        "robot": robot.name, "robot_sha256": robot_hash(robot),
+        "program": f"forcefit {version('forcefit')}", "seed": plan.seed,
+        "yield": plan.asked_yield, "cost_law": plan.cost, "price": answer.price,
+        "price_bound": answer.price_bound, "said": said,
+        "verified_yield": check["yield"]["probability"] if check else float("nan"),
+        **limits,
+    })  # fmt: skip

@@ -1,0 +1,1 @@
+"""One question at many postures, draws and designs."""

@@ -1,0 +1,251 @@
+"""A sweep's results as an xarray data set, in memory or straight to a NetCDF file.
+
+Written block by block from the journal, a file never needs more memory than a few
+blocks, and its bytes depend on the sweep alone.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.sweeps.quantities import STATUSES, TEXTS, variables
+from stiffness.reading import BadInput
+
+if TYPE_CHECKING:
+    import xarray
+
+    from assembly.sweeps.sweep import Sweep
+
+Texts = dict[str, dict[int, str]]
+_TEXT = {
+    "status": "ok, or why there is no answer: " + ", ".join(STATUSES[1:]),
+    "reason": "what was said where the status is not ok",
+    "near_singularity": "singularities near by, with the joints that show them",
+}
+_TOGETHER = 64  # blocks written at a time
+
+
+def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
+    """The data set of a whole sweep in memory.
+
+    Args:
+        sweep: what was asked.
+        records: (points,) rows of all points.
+        texts: by name, the text of points that have one.
+
+    Returns:
+        The data set; units in the attribute ``units``.
+    """
+    import xarray
+
+    data: dict[str, Any] = {}
+    for name, one in variables(sweep.question).items():
+        values = records[name].reshape(*sweep.shape, *records[name].shape[1:])
+        data[name] = ((*sweep.dims, *one.dims), values.copy(), _attributes(one))
+    for name in _TEXT:
+        column = _text_column(name, records, texts).reshape(sweep.shape)
+        data[name] = (sweep.dims, column, {"long_name": _TEXT[name]})
+    coordinates = {
+        name: (dims, list(values) if values.dtype == object else values, attributes)
+        for name, (dims, values, attributes) in _coordinates(sweep).items()
+    }
+    return xarray.Dataset(data, coordinates, sweep.provenance)
+
+
+def write_sweep(
+    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
+) -> None:
+    """The same data set as a NetCDF file, whole or not at all.
+
+    Args:
+        sweep: what was asked.
+        read: rows and texts of a block.
+        path: of the new file; it replaces an old one only once it is complete.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        _write(sweep, read, part)
+        part.replace(path)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else error
+        raise BadInput(f"{path}: cannot be written: {reason}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write(
+    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
+) -> None:
+    """The file, from its coordinates to its last block."""
+    import h5netcdf
+    import h5py
+
+    text = h5py.string_dtype()
+    coordinates, asked = _coordinates(sweep), variables(sweep.question)
+    sizes = dict(zip(sweep.dims, sweep.shape, strict=True))
+    for one in asked.values():
+        sizes |= {dim: len(labels) for dim, labels in one.dims.items()}
+    with h5netcdf.File(path, "w") as file:
+        file.dimensions = sizes
+        for name, (dims, values, attributes) in coordinates.items():
+            kind = text if values.dtype == object else values.dtype
+            variable = file.create_variable(name, dims, kind, data=values)
+            variable.attrs.update(attributes)
+        for name, one in asked.items():
+            dims = (*sweep.dims, *one.dims)
+            file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
+        for name, meaning in _TEXT.items():
+            variable = file.create_variable(name, sweep.dims, text)
+            variable.attrs["long_name"] = meaning
+        file.attrs.update(sweep.provenance)
+        beside = [name for name in coordinates if name not in sizes]
+        if beside:
+            file.attrs["coordinates"] = " ".join(beside)
+        for first in range(0, sweep.blocks, _TOGETHER):
+            last = min(first + _TOGETHER, sweep.blocks)
+            start = first * sweep.block_size
+            records, texts = _joined([read(block) for block in range(first, last)])
+            for name in (*asked, *_TEXT):
+                values = (
+                    _text_column(name, records, texts) if name in _TEXT
+                    else records[name]
+                )  # fmt: skip
+                _put(file[name], sweep.shape, start, values)
+
+
+def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> None:
+    """Values of consecutive points into their places of a variable."""
+    done = 0
+    for slab in slabs(shape, first, first + len(values)):
+        size = [s.stop - s.start for s in slab]
+        count = int(np.prod(size))
+        some = values[done : done + count]
+        variable[slab] = some.reshape(*size, *values.shape[1:])
+        done += count
+
+
+def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice, ...]]:
+    """Boxes that together hold the points ``first`` .. ``last - 1`` of an array.
+
+    Args:
+        shape: of the array.
+        first: point, counted in C order.
+        last: the one after the last point.
+
+    Yields:
+        A slice for each axis; the boxes follow one another as the points do.
+    """
+    if len(shape) == 1:
+        yield (slice(first, last),)
+        return
+    inner = int(np.prod(shape[1:]))
+    row, column = divmod(first, inner)
+    while first < last:
+        whole = (last - first) // inner if column == 0 else 0
+        if whole:
+            yield (slice(row, row + whole), *(slice(0, n) for n in shape[1:]))
+            row, first = row + whole, first + whole * inner
+            continue
+        stop = min(inner, column + last - first)
+        for slab in slabs(shape[1:], column, stop):
+            yield (slice(row, row + 1), *slab)
+        first += stop - column
+        row, column = row + 1, 0
+
+
+def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
+    """Blocks one after the other."""
+    texts: Texts = {name: {} for name in TEXTS}
+    start = 0
+    for records, said in blocks:
+        for name in TEXTS:
+            texts[name] |= {start + row: text for row, text in said[name].items()}
+        start += len(records)
+    return np.concatenate([records for records, _ in blocks]), texts
+
+
+def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
+    """(k,) of objects: a text variable of some points."""
+    if name == "status":
+        return np.array(STATUSES, dtype=object)[records["status"]]
+    column = np.full(len(records), "", dtype=object)
+    for row, text in texts[name].items():
+        column[row] = text
+    return column
+
+
+def _attributes(variable: Any) -> dict[str, str]:
+    """Unit and meaning of a variable."""
+    return {"units": variable.unit, "long_name": variable.meaning}
+
+
+def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
+    """Name: axes, values, attributes of everything that labels an axis."""
+    table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
+    units = sweep.units
+    for path, values in zip(sweep.question.varied, sweep.values, strict=True):
+        table[path] = (path,), values, {"units": units[path]}
+    targets = sweep.targets
+    if targets.labels is not None:
+        labels = np.array(targets.labels, dtype=object)
+        table["posture"] = ("posture",), labels, {}
+    for name, values in zip(targets.names, targets.values, strict=True):
+        dims = (name,) if targets.labels is None else ("posture",)
+        table[name] = dims, values, {"units": units[name]}
+    if sweep.draws:
+        table["draw"] = ("draw",), np.arange(sweep.draws), {}
+    for one in variables(sweep.question).values():
+        for dim, names in one.dims.items():
+            table[dim] = (dim,), np.array(names, dtype=object), {}
+    return table
+
+
+def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
+    """Write a data set as NetCDF, whole or not at all.
+
+    Args:
+        data: any.
+        path: of the new file; it replaces an old one only once it is complete.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        data.to_netcdf(part, engine="h5netcdf")
+        part.replace(path)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else error
+        raise BadInput(f"{path}: cannot be written: {reason}") from None
+
+
+def open_dataset(path: Path | str) -> "xarray.Dataset":
+    """A data set from its file.
+
+    Args:
+        path: of a NetCDF file.
+
+    Returns:
+        The data set, all in memory.
+
+    Raises:
+        BadInput: the file is absent or no NetCDF file.
+    """
+    import xarray
+
+    path = Path(path)
+    if not path.is_file():
+        raise BadInput(f"{path}: no such file; expected a data set of a sweep")
+    try:
+        return xarray.load_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError, KeyError) as error:
+        reason = str(error).partition("\n")[0][:200]
+        raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None

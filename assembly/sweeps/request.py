@@ -1,0 +1,203 @@
+"""A sweep asked for in words, checked before any work; what it found, summed up."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.link_stress import stressed_names
+from assembly.pose_error import READINGS
+from assembly.robot import Robot
+from assembly.robots import load_robot
+from assembly.sweeps.parameters import Design, load_design
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.sweep import Sweep
+from assembly.sweeps.targets import (
+    Targets,
+    grid_targets,
+    parse_grid,
+    parse_values,
+    read_targets,
+)
+from stiffness.reading import BadInput, nearest
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def ask_sweep(
+    robot: str,
+    *,
+    grid: str | None = None,
+    poses: Path | None = None,
+    vary: Sequence[str] = (),
+    errors: Path | None = None,
+    draws: int | None = None,
+    seed: int = 1,
+    reading: str = "frozen",
+    play_alone: bool = False,
+    wrench: Sequence[str] = (),
+    linearisation: bool = False,
+    near: float = 0.02,
+    yield_strength: float | None = None,
+) -> Sweep:
+    """The sweep that options of ``forcefit assembly sweep`` ask for.
+
+    Args:
+        robot: a robot file, or a built-in name.
+        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
+        poses: a table of postures.
+        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``.
+        errors: file that says how errors are distributed, see docs/statistics.md.
+        draws: how many are drawn.
+        seed: of the draws.
+        reading: of problem (27), or ``"none"``.
+        play_alone: bound (27) also without errors.
+        wrench: frames whose wrench is kept.
+        linearisation: compare each point with finite motions.
+        near: distance below which a singularity is named.
+        yield_strength: [Pa] of the links, to find their stress and safety.
+
+    Returns:
+        The sweep, everything in it checked.
+
+    Raises:
+        BadInput: an option, a file it names or the robot breaks a rule.
+    """
+    said = {k: v for k, v in locals().items() if k != "robot"}
+    machine = load_robot(robot)
+    if machine.effects:
+        names = ", ".join(machine.effects)
+        raise BadInput(
+            f"{robot}: found effects ({names}), which sweeps do not know; expected a "
+            "robot without [[effect]], or assembly solve at single postures"
+        )
+    if (grid is None) == (poses is None):
+        raise BadInput("sweep: expected --grid or --poses, one of them")
+    if reading not in (*READINGS, "none"):
+        hint = nearest(reading, [*READINGS, "none"])
+        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
+    if not 0 <= near <= 1:
+        raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
+    for name in wrench:
+        machine.index(name)
+    if yield_strength is not None:
+        if not 0 < yield_strength < float("inf"):
+            raise BadInput(f"--yield-strength: found {yield_strength:g}, expected > 0")
+        if not stressed_names(machine):
+            raise BadInput(
+                f"--yield-strength: no link of {machine.name} has a shape from which "
+                "its stress follows"
+            )
+    design = load_design(robot) if vary else None
+    varied = _vary(design, vary) if design is not None else {}
+    sources = None
+    if (errors is None) != (draws is None):
+        raise BadInput("sweep: --errors and --draws go together; found one of them")
+    if errors is not None:
+        from assembly.statistics.distributions import read_sources
+
+        sources = read_sources(errors, machine)
+        drawn = [path for path in varied if ".geometric_error." in path]
+        if drawn:
+            raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")
+    targets = _targets(machine, grid, poses)
+    question = Question(
+        machine, design, tuple(varied), targets.names, sources, seed,
+        None if reading == "none" else reading, play_alone, tuple(wrench),
+        linearisation, near, yield_strength,
+    )  # fmt: skip
+    return Sweep(
+        question, targets, tuple(varied.values()), draws or 0, _command(robot, said)
+    )
+
+
+def _targets(robot: Robot, grid: str | None, poses: Path | None) -> Targets:
+    """The postures."""
+    if poses is not None:
+        return read_targets(poses, robot)
+    return grid_targets(parse_grid(grid or "", robot))
+
+
+def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
+    """Values by path; refused if a robot file could not say the least and largest."""
+    found: dict[str, NDArray] = {}
+    owner: dict[str, str] = {}
+    for text in texts:
+        path, equals, specs = (piece.strip() for piece in text.partition("="))
+        if not (equals and specs):
+            raise BadInput(
+                f'--vary: found "{text[:80]}", expected PATH=VALUE,.. or '
+                "PATH=START:STOP:STEP"
+            )
+        for full in design.find(path):
+            if full in owner:
+                raise BadInput(f"--vary {path}: {full} varies already")
+            owner[full] = path
+        parts = [parse_values(f"--vary {path}", spec) for spec in specs.split(",")]
+        values = np.concatenate(parts)
+        if len(np.unique(values)) < len(values):
+            raise BadInput(f"--vary {path}: found a value twice")
+        for value in (float(values.min()), float(values.max())):
+            design.check({path: value})
+        found[path] = values
+    return found
+
+
+def _command(robot: str, options: Mapping[str, Any]) -> str:
+    """The command that asks for the same numbers, options at their default left out."""
+    default = {"seed": 1, "reading": "frozen", "near": 0.02}
+    words = ["forcefit", "assembly", "sweep", robot]
+    for key, value in options.items():
+        name = "--" + key.replace("_", "-")
+        if value is True:
+            words.append(name)
+        elif isinstance(value, list | tuple):
+            words += [word for one in value for word in (name, str(one))]
+        elif value not in (None, False) and value != default.get(key):
+            words += [name, str(value)]
+    return shlex.join(words)
+
+
+def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
+    """What a sweep found, for machines.
+
+    Args:
+        data: of a sweep.
+
+    Returns:
+        Axes, how many points have each status, and of each quantity the least, median
+        and largest finite value with its unit.
+    """
+    names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
+    axes = {str(d): data.sizes[d] for d in data["status"].dims}
+    table = {}
+    for name, variable in data.data_vars.items():
+        if variable.dtype.kind == "f":
+            values = variable.values[np.isfinite(variable.values)]
+            spread = [np.min(values), np.median(values), np.max(values)]
+            table[str(name)] = {
+                "units": variable.attrs.get("units", ""),
+                **dict(zip(("min", "median", "max"), spread, strict=True)),
+            } if values.size else None  # fmt: skip
+    return {
+        **{str(k): v for k, v in data.attrs.items() if k != "coordinates"},
+        "axes": axes,
+        "points": int(np.prod(list(axes.values()))),
+        "status": dict(zip(names.tolist(), counts.tolist(), strict=True)),
+        "quantities": table,
+    }
+
+
+def summary_text(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
+    """The same for people: statuses, and the first reason of each that is not ok."""
+    lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
+    status = data["status"].values.astype(str).ravel()
+    for name in summary["status"]:
+        if name not in {"ok", "out of reach"} and "reason" in data:
+            first = int(np.flatnonzero(status == name)[0])
+            lines.append(f"{name}, for one: {data['reason'].values.ravel()[first]}")
+    return "\n".join(lines)

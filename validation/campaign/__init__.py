@@ -1,0 +1,1 @@
+"""Measured data: what is there, and what can it tell?"""

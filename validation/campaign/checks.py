@@ -1,0 +1,140 @@
+"""Is a campaign plausible?  A deviation of 153 m is a unit mistake and is refused.
+
+Everything checked here is a well-formed number; what is refused is one that no machine
+gives, with the mistake that usually makes it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.posture import POSE
+from assembly.robot import Robot
+from validation.campaign.campaign import LOAD, READING
+from validation.campaign.measurement_table import MeasurementTable
+
+_TURNS = 8 * np.pi  # [rad] no joint is commanded further; 25 or more is degrees
+_FORCE = 1e7  # [N], [N m] no platform carries more
+_WARMEST = 250.0  # [K] from calibration; 293 is an absolute temperature
+_LATEST = 3e8  # [s] ten years; more is a date
+_ROOM = 1000.0  # [m] where a measuring device may stand
+_FINEST = 1e-15  # [rad, m] no device reads finer
+_UNITS = "; if it is in other units say so in [units] of campaign.toml"
+
+
+def check_commands(table: MeasurementTable, robot: Robot) -> None:
+    """Refuse commands, loads and covariates that no machine sees.
+
+    Args:
+        table: as read.
+        robot: of the campaign.
+
+    Raises:
+        BadInput: the first such cell, with what it may be.
+    """
+    reach = _body_length(robot)
+    for name, values in table.columns.items():
+        group, _, rest = name.partition(".")
+        turning = group == "q" and robot.frame(rest).joint == "revolute"
+        if turning:
+            _within(table, name, values, _TURNS, f"an angle in rad{_UNITS}")
+        elif group == "q":
+            _within(table, name, values, 10 * reach, f"a travel in m{_UNITS}")
+        elif group == "pose":
+            largest = 2 * np.pi if rest in POSE[3:] else 10 * reach
+            what = "a rotation vector in rad" if rest in POSE[3:] else "a position in m"
+            _within(table, name, values, largest, f"{what}{_UNITS}")
+        elif group == "load":
+            unit = "N m" if rest in LOAD[:3] else "N"
+            _within(table, name, values, _FORCE, f"a load in {unit}{_UNITS}")
+    _check_covariates(table)
+
+
+def _check_covariates(table: MeasurementTable) -> None:
+    """Temperature, time and approach mean something; other covariates may be all."""
+    columns = table.columns
+    if "cov.temperature" in columns:
+        what = "the deviation from the temperature of calibration, in K"
+        _within(table, "cov.temperature", columns["cov.temperature"], _WARMEST, what)
+    if "cov.time" in columns:
+        time, what = columns["cov.time"], "seconds since the first measurement"
+        _within(table, "cov.time", time, _LATEST, what)
+        for i in np.flatnonzero(time < 0)[:1]:
+            found = f"found {time[i]:g} s, expected {what}, >= 0"
+            raise table.bad(int(i), "cov.time", found)
+    if "cov.approach" in columns:
+        side = columns["cov.approach"]
+        for i in np.flatnonzero(np.abs(side) != 1)[:1]:
+            found = f"found {side[i]:g}, expected -1 or 1"
+            raise table.bad(int(i), "cov.approach", found)
+
+
+def check_readings(table: MeasurementTable, sigma: NDArray, registration: str,
+                   extent: float) -> None:  # fmt: skip
+    """Refuse deviations larger than the robot, and sigma that is none.
+
+    Args:
+        table: as read.
+        sigma: (R, 6) [rad, m] of each reading, NaN where none is stated.
+        registration: ``"unknown"`` lets the device stand anywhere in a room.
+        extent: [m] of the robot over all configurations.
+
+    Raises:
+        BadInput: the first such reading, with what it may be.
+    """
+    measured = table.stack("meas", READING, np.nan)
+    for i in np.flatnonzero(np.isnan(measured).all(axis=1))[:1]:
+        message = "no measured cell; expected at least one of meas.rx ... meas.tz"
+        raise table.bad(int(i), "", message)
+    for k, name in enumerate(READING):
+        for i in np.flatnonzero(np.isfinite(measured[:, k]) & np.isnan(sigma[:, k]))[
+            :1
+        ]:
+            key = "rotation" if k < 3 else "position"
+            message = (
+                f"no sigma; expected a cell here or [noise] {key} in campaign.toml"
+            )
+            raise table.bad(int(i), f"sigma.{name}", message)
+        unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)
+        for i in np.flatnonzero(~(sigma[:, k] >= _FINEST) & ~np.isnan(sigma[:, k]))[:1]:
+            found = f"found {sigma[i, k]:g} {unit}"
+            message = f"{found}, expected one standard deviation > 0"
+            raise table.bad(int(i), f"sigma.{name}", message)
+        expected = (
+            f"at most half a turn in rad{_UNITS}"
+            if k < 3
+            else f"a length in m, at most the robot's {extent:.3g}{_UNITS}"
+        )
+        _within(table, f"sigma.{name}", sigma[:, k], largest, expected)
+        if registration == "unknown" and k >= 3:
+            largest, expected = max(_ROOM, extent), f"a length in m{_UNITS}"
+        _within(table, f"meas.{name}", measured[:, k], largest, expected)
+
+
+def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
+    """[m] diagonal of the box around all origins, the base and the points measured.
+
+    Args:
+        transforms: (k, n, 4, 4) frames of the configurations.
+        reference_points: (k, 3) [m] base axes.
+
+    Returns:
+        The diagonal; 1 if all of them are one point.
+    """
+    origins = transforms[..., :3, 3].reshape(-1, 3)
+    points = np.concatenate([np.zeros((1, 3)), origins, reference_points])
+    return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
+
+def _body_length(robot: Robot) -> float:
+    """[m] length of all bodies together, at least the largest travel at home."""
+    lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
+    slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
+    return float(lengths + sum(slides)) or 1.0
+
+
+def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
+            expected: str) -> None:  # fmt: skip
+    """Refuse the first value whose size is larger than any sound one."""
+    for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
+        found = f"found {values[i]:g}"
+        raise table.bad(int(i), name, f"{found}, expected {expected}")

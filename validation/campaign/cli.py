@@ -1,0 +1,31 @@
+"""The command ``forcefit validation inspect``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from assembly.cli import JsonOption, progress_bars
+from stiffness.writing import write_json
+
+CampaignArgument = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN", help="Folder with campaign.toml in it.")
+]
+
+
+def inspect(campaign: CampaignArgument, json: JsonOption = None) -> None:
+    """Say what measured data can and cannot tell, before any diagnosis.
+
+    Rows, loads and covariates; noise from repeats against the stated sigma; which
+    effects would show, and which this design cannot tell apart.
+    """
+    from validation.campaign.campaign_file import read_campaign
+    from validation.campaign.inspection import inspect_campaign
+    from validation.campaign.text import inspection_text
+
+    data = read_campaign(campaign)
+    with progress_bars() as update:
+        found = inspect_campaign(data, lambda done, n: update("effects", done, n))
+    write_json(found.table(), json)
+    if json != "-":
+        print(inspection_text(found))

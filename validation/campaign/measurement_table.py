@@ -1,0 +1,228 @@
+"""The table of a campaign: text to numbers, every cell accounted for.
+
+The reader understands what is declared and nothing else: delimiter, decimal mark and
+units come from ``campaign.toml``; a table that looks like another dialect is refused
+with the key that would declare it.
+"""
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.posture import POSE
+from assembly.robot import Robot
+from stiffness.reading import BadInput, nearest, quoted, read_text
+from validation.campaign.campaign import LOAD, READING
+from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
+
+_LARGEST = 1e15  # no reading in any unit
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementTable:
+    """A table as numbers in SI.
+
+    Attributes:
+        file: its name, for messages.
+        ids: label of each row, unique.
+        lines: line of the file on which each row ends, for messages.
+        columns: (R,) by name, in the order of the file, without ``id``; NaN where a
+            cell is empty.
+        dialect: how it was written.
+    """
+
+    file: str
+    ids: tuple[str, ...]
+    lines: tuple[int, ...]
+    columns: dict[str, NDArray]
+    dialect: Dialect
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def bad(self, row: int, column: str, message: str) -> BadInput:
+        """The error for a cell, to be raised by the caller."""
+        place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
+        where = f"{place}, {column}" if column else place
+        return BadInput(f"{self.file}: {where}: {message}")
+
+    def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
+        """(R, k) the columns of a group; ``absent`` where there is no such column."""
+        empty = np.full(len(self), absent)
+        return np.column_stack([
+            self.columns.get(f"{prefix}.{n}", empty) for n in names
+        ])
+
+
+def read_table(path: Path, robot: Robot, dialect: Dialect) -> MeasurementTable:
+    """A table of measurements.
+
+    Args:
+        path: a CSV file with a header.
+        robot: whose actuated joints may be columns.
+        dialect: how it is written.
+
+    Returns:
+        The table in SI.
+
+    Raises:
+        BadInput: not such a table; the line and the column are named.
+    """
+    lines, rows = _cells(path, dialect)
+    if not rows:
+        raise BadInput(f"{path}: empty; expected a header and one row a measurement")
+    header = _header(path, rows[0], robot, dialect)
+    lines, rows = lines[1:], rows[1:]
+    if not rows:
+        raise BadInput(f"{path}: no rows; expected one row a measurement")
+    for line, row in zip(lines, rows, strict=True):
+        if len(row) != len(header):
+            raise BadInput(
+                f"{path}: line {line}: found {len(row)} cells, expected {len(header)} "
+                f"as in the header{_dialect_hint(row, len(header), dialect)}"
+            )
+    ids = _labels(path, [row[header.index("id")] for row in rows], lines)
+    table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect)
+    for k, name in enumerate(header):
+        if name != "id":
+            table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
+    return table
+
+
+def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
+    """Cells without the blanks around them, and the line each row ends on."""
+    lines, rows = [], []
+    text = io.StringIO(read_text(path), newline="")
+    reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
+    try:
+        for row in reader:
+            if row:  # not a blank line
+                lines.append(reader.line_num)
+                rows.append([cell.strip() for cell in row])
+    except csv.Error as error:
+        raise BadInput(f"{path}: line {reader.line_num}: not CSV: {error}") from None
+    return lines, rows
+
+
+def _header(path: Path, names: list[str], robot: Robot, dialect: Dialect) -> list[str]:
+    """The first line, if every name in it is a column's."""
+    q = [f"q.{f.name}" for f in robot.frames if f.actuated]
+    groups = {"pose": POSE, "load": LOAD, "meas": READING, "sigma": READING}
+    known = ["id", *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
+    known += ["cov.temperature", "cov.time", "cov.approach"]
+    if not any(name in known or name.startswith("cov.") for name in names):
+        # not printed: it may be a file that was never meant to be read
+        raise BadInput(
+            f"{path}: line 1 names no column of a table of measurements"
+            f"{_other(names)}; expected id, q.<frame> or pose.tx ..., meas.tx ..."
+        )
+    for k, name in enumerate(names, 1):
+        if not name:
+            raise BadInput(f"{path}: line 1: column {k} has no name")
+        if name in names[: k - 1]:
+            raise BadInput(f"{path}: line 1: column {quoted(name)} is there twice")
+        if name not in known and not (name.startswith("cov.") and name != "cov."):
+            hint = nearest(name, known)
+            raise BadInput(
+                f"{path}: line 1: unknown column {quoted(name)}{_passive(name, robot)}"
+                f"{hint} (further covariates begin with cov.)"
+            )
+    if "id" not in names:
+        raise BadInput(f'{path}: line 1: missing column "id"')
+    return names
+
+
+def _passive(name: str, robot: Robot) -> str:
+    """Why a joint of the robot cannot be commanded, if that is the matter."""
+    frames = {f"q.{f.name}": f for f in robot.frames}
+    if name not in frames:
+        return ""
+    joint = frames[name].joint
+    return f": that joint is {'fixed' if joint == 'fixed' else 'passive'}"
+
+
+def _other(names: list[str]) -> str:
+    """Which key would make a header of one cell readable."""
+    for word, mark in DELIMITERS.items():
+        if len(names) == 1 and mark in names[0]:
+            return f'; it has {word} in it: if that parts the cells, say [table] ' \
+                   f'delimiter = "{word}" in campaign.toml'  # fmt: skip
+    return ""
+
+
+def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
+    """What a row with another number of cells may be."""
+    if dialect.delimiter == "," and len(row) > expected:
+        return (
+            '; if decimals are written with a comma, part cells by ";" and say '
+            '[table] delimiter = ";", decimal = "," in campaign.toml'
+        )
+    return ""
+
+
+def _labels(path: Path, labels: list[str], lines: list[int]) -> tuple[str, ...]:
+    """The ids, if each is there and is its own."""
+    seen: dict[str, int] = {}
+    for label, line in zip(labels, lines, strict=True):
+        if not label:
+            raise BadInput(f"{path}: line {line}, id: empty; expected a label")
+        if label in seen:
+            raise BadInput(
+                f"{path}: line {line}, id: found {quoted(label)}, already the label of "
+                f"line {seen[label]}; expected another"
+            )
+        seen[label] = line
+    return tuple(labels)
+
+
+def _numbers(
+    table: MeasurementTable, robot: Robot, name: str, cells: list[str]
+) -> NDArray:
+    """A column in SI; a reading not taken is NaN."""
+    key = _unit_key(name, robot)
+    unit = table.dialect.unit(key) if key else ""
+    factor = table.dialect.factor(key) if key else 1.0
+    values = np.empty(len(cells))
+    for i, cell in enumerate(cells):
+        if not cell and name.startswith(("meas.", "sigma.")):
+            values[i] = math.nan
+            continue
+        if not cell:
+            raise table.bad(i, name, "empty; only meas. and sigma. cells may be")
+        values[i] = parse_number(cell, table.dialect.decimal)
+        if not abs(values[i]) <= _LARGEST:
+            expected = f"expected a finite number{f' [{unit}]' if unit else ''}"
+            hint = _number_hint(name, cell, table.dialect)
+            raise table.bad(i, name, f"found {quoted(cell)}, {expected}{hint}")
+    return values * factor
+
+
+def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
+    """What a cell that is no number may have been meant to be."""
+    other = "," if dialect.decimal == "." else "."
+    if math.isfinite(parse_number(cell, other)):
+        return f'; for decimals with "{other}" say [table] decimal = "{other}"'
+    if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:
+        taken = name.startswith(("meas.", "sigma."))
+        return "; leave the cell empty if it was not measured" if taken else ""
+    return ""
+
+
+def _unit_key(name: str, robot: Robot) -> str:
+    """Which key of ``[units]`` a column follows, empty for none."""
+    group, _, rest = name.partition(".")
+    if group in {"meas", "sigma"}:
+        return "rotation" if rest[0] == "r" else "position"
+    if group == "pose":
+        return "command_rotation" if rest[0] == "r" else "command_position"
+    if group == "q":
+        turns = robot.frame(rest).joint == "revolute"
+        return "command_rotation" if turns else "command_position"
+    if group == "load":
+        return "moment" if rest[0] == "m" else "force"
+    return "time" if name == "cov.time" else ""

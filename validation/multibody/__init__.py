@@ -1,0 +1,1 @@
+"""The forced assembly in Exudyn: shares nothing with the model but the robot."""

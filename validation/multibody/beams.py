@@ -1,0 +1,55 @@
+"""Beams of the simulation: where they run, and what their sections resist.
+
+Written apart from :mod:`assembly.links`: only a section's own constants are shared.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink, Frame
+from stiffness.beam import declared_section
+from validation.multibody.motion import turned
+
+
+def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
+    """[m] length of a beam, and (3,) its direction in the frame's axes, any length."""
+    if link.length is not None and link.axis is not None:
+        return link.length, np.array(link.axis)
+    x = turned(frame.rotation).T @ frame.translation
+    return float(np.linalg.norm(x)), x
+
+
+def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
+    """Columns: along the beam, across, up; up is y unless the beam lies along y."""
+    x = x / np.linalg.norm(x)
+    if up is None:
+        up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
+    y = np.cross(up, x)
+    y /= np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def element_stiffness(link: BeamLink, step: float) -> NDArray:
+    """EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
+
+    An element of constant strain lacks the deflection step^3 / 12 EI of its own
+    bending; given to its shear, the tip of a cantilever is exact for any number.
+
+    Args:
+        link: the beam.
+        step: [m] length of an element.
+
+    Returns:
+        (6, 6) diagonal [N, N m^2].
+    """
+    section = declared_section(link.section, link.poisson)
+    E, G = link.young, link.young / (2 * (1 + link.poisson))
+    bending = E * np.array([section.I_y, section.I_z])
+    shear = step**2 / (12 * bending[::-1])  # a force along y bends about z
+    if link.theory == "timoshenko":
+        shares = np.array([section.shear_y, section.shear_z])
+        shear = shear + 1 / (G * section.area * shares)
+    return np.diag([E * section.area, *(1 / shear), G * section.J, *bending])

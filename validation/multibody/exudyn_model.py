@@ -1,0 +1,169 @@
+"""An Exudyn model while it is built: bodies, springs, beams, contacts, closures, loads.
+
+Bodies are massless to the static solver; places are points and axes fixed to bodies;
+elastic parts and locked joints stand between two places.  Exudyn orders screws and
+wrenches [T R]; everything in and out of here is [R T] like in the whole library.
+How a model is solved is in :mod:`validation.multibody.exudyn_solver`, what can be asked
+of it in :mod:`validation.multibody.exudyn_reading`.
+"""
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from validation.multibody.contact import WIDE, Play, cone_pushes
+from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
+from validation.multibody.motion import inverse, shifted
+
+_SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
+_CENTRING = 1e3  # [N/m] of bounded play; 1e-3 of it in N m/rad, 1e-6 about own axes
+
+
+class Model:
+    """An Exudyn model and the state of its solution.
+
+    Attributes:
+        robot: its name, for messages.
+        closing: [N m/rad, N/m] of the connectors that shut closures.
+        ground: the base.
+        width: [-] of the contacts' smoothing, in sizes of their cones.
+        deadline: [s] of ``time.monotonic``, after which the solver stops.
+        broken: what was raised inside a function that Exudyn calls; it would tell
+            only that there was an error.
+        watched: places whose way from open to shut is kept.
+        seen: where they were: (places, 4, 4) at each step.
+    """
+
+    def __init__(
+        self, exudyn: Any, items: Any, fem: Any, robot: str, closing: float
+    ) -> None:
+        self.exu, self.item, self.fem = exudyn, items, fem
+        self.robot, self.closing = robot, closing
+        self.container = self.exu.SystemContainer()
+        self.mbs = self.container.AddSystem()
+        ground = self.mbs.AddObject(self.item.ObjectGround())
+        self.ground = Place(int(ground), np.eye(4), np.eye(4))
+        self.width, self.deadline = WIDE, math.inf
+        self.broken: BaseException | None = None
+        self.watched: list[Place] = []
+        self.seen: list[NDArray] = []
+
+    def discard(self) -> None:
+        """Give the memory back; Exudyn keeps models and user functions otherwise."""
+        self.mbs.SetPreStepUserFunction(0)
+        self.mbs.Reset()
+        self.container.Reset()
+
+    def add_body(self, T: NDArray) -> Place:
+        """A rigid body built at ``T``; statics never sees its mass."""
+        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+        node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
+        body = self.item.ObjectRigidBody(
+            mass=1.0, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=self.mbs.AddNode(node)
+        )
+        return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
+
+    def add_marker(self, place: Place) -> int:
+        """A marker at a place."""
+        marker = self.item.MarkerBodyRigid(
+            bodyNumber=place.body, localHT=self.transform(place.local)
+        )
+        return int(self.mbs.AddMarker(marker))
+
+    def add_spring(self, place: Place, K: NDArray) -> Elastic:
+        """A new body at the place, held there by a spring; ``inf`` locks an axis."""
+        far = self.add_body(place.built)
+        markers = [self.add_marker(place), self.add_marker(far)]
+        soft = np.isfinite(np.diag(K))
+        if not soft.all():
+            lock = [int(locked) for locked in ~soft[_SWAP]]
+            joint = self.item.GenericJoint(markerNumbers=markers, constrainedAxes=lock)
+            self.mbs.AddObject(joint)
+        spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
+        return Elastic(place, far, (spring,))
+
+    def add_contact(self, place: Place, play: Play) -> Contact:
+        """A new body at the place that may play; a weak spring centres it."""
+        rows = np.array(play.loose, dtype=int)
+        centring = np.full(6, np.inf)
+        centring[rows] = _CENTRING * np.where(rows < 3, 1e-3, 1.0)
+        centring[2] *= 1e-3
+        spring = self.add_spring(place, np.diag(centring))
+        weak = np.where(np.isfinite(centring), centring, 0.0).tolist()
+
+        def push(mbs: Any, t: float, item: int, shift: Any, turn: Any, *_: Any) -> Any:
+            try:
+                self.check_time()
+                screw = [*turn, *shift]
+                wrench = [k * s for k, s in zip(weak, screw, strict=True)]
+                for cone in play.cones:
+                    for row, value in cone_pushes(cone, screw, self.width):
+                        wrench[row] += value
+            except BaseException as error:
+                self.broken = error
+                raise
+            return wrench[3:] + wrench[:3]
+
+        name = "springForceTorqueUserFunction"
+        self.mbs.SetObjectParameter(spring.parts[0], name, push)
+        return Contact(place, spring.far, play)
+
+    def add_beam(
+        self, base: Place, length: float, K: NDArray, elements: int
+    ) -> tuple[tuple[int, ...], tuple[Place, ...]]:
+        """Elements along the base's x, clamped there, and their ends."""
+        section = self.exu.BeamSection()
+        section.stiffnessMatrix = K
+        step = length / elements
+        bodies = [self.add_spring(base, np.diag([np.inf] * 6)).far]
+        parts = []
+        for k in range(1, elements + 1):
+            bodies.append(self.add_body(base.built @ shifted([k * step, 0.0, 0.0])))
+            beam = self.item.ObjectBeamGeometricallyExact(
+                nodeNumbers=[self.node(body) for body in bodies[-2:]],
+                length=step,
+                sectionData=section,
+            )
+            parts.append(int(self.mbs.AddObject(beam)))
+        return tuple(parts), tuple(bodies)
+
+    def add_closure(self, first: Place, second: Place, shut: NDArray) -> Closure:
+        """A connector that is stress-free while the closure is open."""
+        gap = inverse(first.built) @ second.built
+        marker = self.add_marker(first.moved(gap))
+        markers = [marker, self.add_marker(second)]
+        connector = self._connect(markers, np.eye(6) * self.closing)
+        return Closure(first, second, marker, connector, shut)
+
+    def add_load(self, place: Place, wrench: NDArray) -> None:
+        """A wrench at a place, base axes, whose direction stays."""
+        marker = self.add_marker(place)
+        torque, force = self.item.LoadTorqueVector, self.item.LoadForceVector
+        for kind, vector in ((torque, wrench[:3]), (force, wrench[3:])):
+            self.mbs.AddLoad(kind(markerNumber=marker, loadVector=vector.tolist()))
+
+    def check_time(self) -> None:
+        """Raise ``TimeoutError`` after the deadline."""
+        if time.monotonic() > self.deadline:
+            raise TimeoutError
+
+    def node(self, place: Place) -> Any:
+        """Exudyn's node of a place's body."""
+        return self.mbs.GetObjectParameter(place.body, "nodeNumber")
+
+    def transform(self, T: NDArray) -> Any:
+        """Exudyn's own kind of transform."""
+        return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
+
+    def _connect(self, markers: list[int], K: NDArray) -> int:
+        """A 6 by 6 spring between two markers."""
+        spring = self.item.RigidBodySpringDamper(
+            markerNumbers=markers,
+            stiffness=K[np.ix_(_SWAP, _SWAP)],
+            useIntrinsicFormulation=True,
+        )
+        return int(self.mbs.AddObject(spring))

@@ -1,0 +1,155 @@
+"""What a model of the simulation is built of: places on bodies, and parts between them.
+
+Numbers are Exudyn's; screws and wrenches are ordered [R T] like in the whole library.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from validation.multibody.contact import Play
+
+
+class SimulationFailed(RuntimeError):
+    """No equilibrium was found.
+
+    Attributes:
+        robot: name of the robot.
+        status: what happened, in a few words.
+    """
+
+    def __init__(self, robot: str, status: str) -> None:
+        super().__init__(f"{robot}: the multibody simulation failed: {status}")
+        self.robot = robot
+        self.status = status
+
+
+class OutOfTime(SimulationFailed):
+    """The time limit was reached first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point and axes fixed to a body of the model.
+
+    Attributes:
+        body: Exudyn's number of the body.
+        start: (4, 4) where the body is built, seen from the base.
+        local: (4, 4) the place seen from the body.
+    """
+
+    body: int
+    start: NDArray
+    local: NDArray
+
+    @property
+    def built(self) -> NDArray:
+        """(4, 4) where the place is built, seen from the base."""
+        return self.start @ self.local
+
+    def moved(self, T: NDArray) -> "Place":
+        """Another place on the same body; ``T`` is how this one sees it."""
+        return replace(self, local=self.local @ T)
+
+
+@dataclass(frozen=True, eq=False)
+class Elastic:
+    """An elastic part between two places that coincide when it is stress-free.
+
+    Attributes:
+        near: place on the inner body.
+        far: place on the outer body.
+        parts: Exudyn's numbers, of one connector or of the elements of a beam.
+        beam: which of the two.
+        nodes: places along a beam, from base to tip, at equal distances.
+        modes: of a meshed body, which is one part and no beam; None otherwise.
+    """
+
+    near: Place
+    far: Place
+    parts: tuple[int, ...]
+    beam: bool = False
+    nodes: tuple[Place, ...] = ()
+    modes: "Modes | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A link as finite elements, with two rigid interfaces, in its mesh's axes.
+
+    Attributes:
+        nodes: (n, 3) [m].
+        stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
+        base: (k,) nodes of the interface at the parent's side.
+        tip: (m,) nodes of the interface at the frame's side.
+        centers: (2, 3) [m] where base and tip are read.
+    """
+
+    nodes: NDArray
+    stiffness: Any
+    base: NDArray
+    tip: NDArray
+    centers: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeshBody:
+    """A solid put where a robot has it.
+
+    Attributes:
+        solid: shared by all links of one shape; it is condensed once.
+        turn: (3, 3) the mesh's axes seen from the frame's.
+    """
+
+    solid: Solid
+    turn: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Interface modes of a meshed body, seen from its base.
+
+    Attributes:
+        node: Exudyn's number of the node of their coordinates.
+        stiffness: (6, 6) reduced to the modes.
+        wrench: (6, 6) from mode coordinates to the wrench at the tip, frame's axes.
+    """
+
+    node: int
+    stiffness: NDArray
+    wrench: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """Two places that a connector pulls together.
+
+    Attributes:
+        first: place on the first chain.
+        second: place on the second chain.
+        marker: Exudyn's number of the connector's end on the first chain; it is moved.
+        connector: Exudyn's number of the connector.
+        shut: (4, 4) the second place seen from the first when closed, nominally.
+    """
+
+    first: Place
+    second: Place
+    marker: int
+    connector: int
+    shut: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A joint with play between two places.
+
+    Attributes:
+        near: place on the inner body.
+        far: place on the outer body.
+        play: how it may move.
+    """
+
+    near: Place
+    far: Place
+    play: Play

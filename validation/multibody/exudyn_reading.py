@@ -1,0 +1,84 @@
+"""What can be asked of a solved Exudyn model: places, energies, wrenches."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.multibody.contact import cone_energy
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Modes, Place
+from validation.multibody.motion import inverse, logarithm, matrix
+
+
+def pose(model: Model, place: Place) -> NDArray:
+    """(4, 4) where a place is now, seen from the base."""
+    read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
+    R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
+    return matrix(R, read(place.body, kind.Position)) @ place.local
+
+
+def left_open(model: Model, closure: Closure) -> NDArray:
+    """(6,) [rad, m] screw from the closed position to the present one."""
+    first = pose(model, closure.first) @ closure.shut
+    return logarithm(inverse(first) @ pose(model, closure.second))
+
+
+def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
+    """(6,) [rad, m] logarithm of the far place seen from the near one."""
+    return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
+
+
+def energy(model: Model, part: Elastic) -> float:
+    """[J] stored in an elastic part."""
+    if part.modes is not None:
+        q = _mode_coordinates(model, part.modes)
+        return float(q @ part.modes.stiffness @ q) / 2
+    kind, mbs = model.exu.OutputVariableType.PotentialEnergy, model.mbs
+    read = mbs.GetObjectOutputBody if part.beam else mbs.GetObjectOutput
+    return float(sum(read(number, kind) for number in part.parts))
+
+
+def contact_energy(model: Model, contact: Contact) -> float:
+    """[J] by which the contact's bounds yield."""
+    screw = screw_between(model, contact).tolist()
+    return sum(cone_energy(cone, screw, model.width) for cone in contact.play.cones)
+
+
+def wrench(model: Model, part: Elastic) -> NDArray:
+    """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
+    if part.modes is not None:
+        near, far = (pose(model, p)[:3, :3] for p in (part.near, part.far))
+        halves = part.modes.wrench @ _mode_coordinates(model, part.modes)
+        return np.concatenate([far.T @ near @ half for half in np.split(halves, 2)])
+    if not part.beam:
+        return _connector_wrench(model, part.parts[0])
+    last = model.exu.ObjectIndex(part.parts[-1])
+    force = model.mbs.ComputeItem(last, model.exu.ComputeItemType.ODE2LHS)[7:]
+    total = model.exu.OutputVariableType.CoordinatesTotal
+    a, b, c, d = model.mbs.GetNodeOutput(model.node(part.far), total)[3:7]
+    # the forces of Euler parameters are G^T times the moment, and G G^T = 4
+    G = 2 * np.array([[-b, a, -d, c], [-c, d, a, -b], [-d, -c, b, a]])
+    R = pose(model, part.far)[:3, :3]
+    return np.concatenate([R.T @ G @ force[3:] / 4, R.T @ force[:3]])
+
+
+def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
+    """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
+    T = pose(model, closure.second)
+    own = _connector_wrench(model, closure.connector).reshape(2, 3)
+    moment, force = (T[:3, :3] @ half for half in own)
+    return np.concatenate([moment + np.cross(T[:3, 3] - point, force), force])
+
+
+def _connector_wrench(model: Model, number: int) -> NDArray:
+    """(6,) [N m, N] K times the screw of its outer end."""
+    kind, read = model.exu.OutputVariableType, model.mbs.GetObjectOutput
+    return np.concatenate([
+        read(number, kind.TorqueLocal),
+        read(number, kind.ForceLocal),
+    ])
+
+
+def _mode_coordinates(model: Model, modes: Modes) -> NDArray:
+    """(6,) of a meshed body."""
+    kind = model.exu.OutputVariableType.Coordinates
+    return np.array(model.mbs.GetNodeOutput(modes.node, kind))

@@ -1,0 +1,247 @@
+"""The open, stress-free robot: bodies as their chains place them, errors included.
+
+At a frame the body's error comes first, then the link's deformation, then the joint's,
+as in the paper; rotation vector and translation of an error are both in the frame's
+axes.  Passive joints without a spring turn or slide freely along their own z.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
+from stiffness.beam import declared_section
+from stiffness.reading import BadInput
+from validation.multibody.beams import beam_axes, beam_span, element_stiffness
+from validation.multibody.contact import joint_play
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import Closure, Contact, Elastic, MeshBody, Place
+from validation.multibody.exudyn_solids import add_mesh
+from validation.multibody.motion import inverse, matrix, placement, shifted
+
+_IDLE = 1e-6  # [N m/rad, N/m] holds passive joints that nothing else holds
+
+
+class Placed(Protocol):
+    """What is asked of a posture."""
+
+    @property
+    def robot(self) -> Robot:
+        """The manipulator."""
+
+    @property
+    def coordinates(self) -> NDArray:
+        """(n,) [rad or m] joint coordinates at which the nominal closures hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is to be built.
+
+    Attributes:
+        posture: the robot and its joint coordinates.
+        scale: factor on its geometric errors and clearances.
+        springs: by frame, K_E of links that are springs; see :func:`link_springs`.
+        meshes: by frame, links that are solids.
+        elements: of each other link, a beam.
+        clearances: whether joints play.
+        bushes: whether pins play in two bushes each.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+    """
+
+    posture: Placed
+    scale: float
+    springs: Mapping[str, NDArray]
+    meshes: Mapping[str, MeshBody]
+    elements: int
+    clearances: bool
+    bushes: bool
+    load: NDArray
+    gravity: NDArray
+
+
+def link_springs(
+    robot: Robot,
+    links: str,
+    given: Mapping[str, NDArray],
+    meshes: Mapping[str, MeshBody],
+) -> dict[str, NDArray]:
+    """Stiffness of every link that is to be neither a beam nor a mesh.
+
+    Args:
+        robot: whose links are asked about.
+        links: ``"beam"`` or ``"spring"``.
+        given: K_E (6, 6) [N m/rad .. N/m] by frame.
+        meshes: solids by frame.
+
+    Returns:
+        K_E by frame.
+
+    Raises:
+        BadInput: a stiffness is missing.
+    """
+    springs = {}
+    for frame in robot.frames:
+        link = frame.link
+        beam = isinstance(link, BeamLink) and links == "beam"
+        if link is None or beam or frame.name in meshes:
+            continue
+        if isinstance(link, MatrixLink):
+            springs[frame.name] = given.get(frame.name, link.stiffness)
+        elif frame.name in given:
+            springs[frame.name] = given[frame.name]
+        else:
+            raise BadInput(
+                f"simulate_assembly: the link of frame '{frame.name}' is to be a "
+                "spring, expected its 6 by 6 matrix in `stiffness`"
+            )
+    return springs
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """What was built.
+
+    Attributes:
+        bodies: places of the frames on their bodies, before any play or joint spring.
+        before: places of the frames before their own motion.
+        links: elastic bodies by frame.
+        joints: joint springs by frame.
+        idle: the springs of free motions by frame.
+        contacts: joints with play by frame.
+        closures: in the robot's order.
+        platform: (4, 4) nominal platform, seen from the base.
+    """
+
+    bodies: dict[str, Place]
+    before: dict[str, Place]
+    links: dict[str, Elastic]
+    joints: dict[str, Elastic]
+    idle: dict[str, Elastic]
+    contacts: dict[str, Contact]
+    closures: list[Closure]
+    platform: NDArray
+
+
+def build(model: Model, case: Case) -> Tree:
+    """The open, stress-free robot with its errors, its closures and its loads.
+
+    Args:
+        model: empty.
+        case: what is to be built.
+
+    Returns:
+        Where everything is in the model.
+    """
+    posture, robot = case.posture, case.posture.robot
+    bodies: dict[str, Place] = {}
+    before: dict[str, Place] = {}
+    after = {BASE: model.ground}
+    links: dict[str, Elastic] = {}
+    joints: dict[str, Elastic] = {}
+    idle: dict[str, Elastic] = {}
+    contacts: dict[str, Contact] = {}
+    for frame, q in zip(robot.frames, posture.coordinates, strict=True):
+        error = case.scale * frame.geometric_error
+        place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
+        place = place.moved(placement(error[:3], error[3:]))
+        if frame.name in case.meshes:
+            links[frame.name] = add_mesh(model, place, case.meshes[frame.name])
+            place = links[frame.name].far
+        elif frame.name in case.springs:
+            links[frame.name] = model.add_spring(place, case.springs[frame.name])
+            place = links[frame.name].far
+        elif isinstance(frame.link, BeamLink):
+            links[frame.name] = _add_beam(model, place, frame, case.elements)
+            place = links[frame.name].far
+        bodies[frame.name] = place
+        play = joint_play(frame, case.scale, case.bushes)
+        if case.clearances and play.cones:
+            contacts[frame.name] = model.add_contact(place, play)
+            place = contacts[frame.name].far
+        K = frame.joint_stiffness
+        if K is not None and np.isfinite(np.diag(K)).any():
+            joints[frame.name] = model.add_spring(place, K)
+            place = joints[frame.name].far
+        elif frame.passive and not frame.compliant and frame.name not in contacts:
+            axes = np.arange(6) == frame.own_axis
+            K = np.diag(np.where(axes, _IDLE, np.inf))
+            idle[frame.name] = model.add_spring(place, K)
+            place = idle[frame.name].far
+        before[frame.name] = place
+        after[frame.name] = place.moved(_own_motion(frame, q))
+    nominal = _nominal(posture)
+    closures = []
+    for a, b in robot.closures:
+        shut = inverse(nominal[a]) @ nominal[b]  # what rounded files leave is no error
+        closures.append(model.add_closure(before[a], before[b], shut))
+    platform = nominal[robot.platform]
+    tree = Tree(bodies, before, links, joints, idle, contacts, closures, platform)
+    if case.load.any():
+        model.add_load(before[robot.platform], case.load)
+    if case.gravity.any():
+        _weigh(model, robot, tree, case.gravity)
+    return tree
+
+
+def _nominal(posture: Placed) -> dict[str, NDArray]:
+    """(4, 4) of every frame without imperfections, before its own motion."""
+    T: dict[str, NDArray] = {}
+    after = {BASE: np.eye(4)}
+    for frame, q in zip(posture.robot.frames, posture.coordinates, strict=True):
+        own = placement(frame.rotation, frame.translation)
+        T[frame.name] = after[frame.parent] @ own
+        after[frame.name] = T[frame.name] @ _own_motion(frame, q)
+    return T
+
+
+def _own_motion(frame: Frame, q: float) -> NDArray:
+    """(4, 4) the joint's motion about or along z."""
+    if frame.joint == "prismatic":
+        return shifted([0.0, 0.0, q])
+    return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
+
+
+def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
+    """A straight beam, clamped to the place's body so that it ends at the place."""
+    link = frame.link
+    assert isinstance(link, BeamLink)
+    length, x = beam_span(frame, link)
+    axes = matrix(beam_axes(x, link.up), np.zeros(3))
+    base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
+    K = element_stiffness(link, length / elements)
+    parts, nodes = model.add_beam(base, length, K, elements)
+    return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
+
+
+def _weigh(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
+    """Loads of everything that has a mass.
+
+    A beam's weight acts at its nodes, with the moments at its ends of a clamped beam
+    under uniform load: the tip of a cantilever is then exact for any number of nodes.
+    """
+    for frame in robot.frames:
+        if frame.mass:
+            centre = tree.bodies[frame.name].moved(shifted(frame.centre_of_mass))
+            model.add_load(centre, np.concatenate([np.zeros(3), frame.mass * gravity]))
+        link = frame.link
+        if not isinstance(link, BeamLink) or link.density is None:
+            continue
+        length, x = beam_span(frame, link)
+        line = x / np.linalg.norm(x) * length
+        part = tree.links[frame.name]
+        nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
+        step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
+        section = declared_section(link.section, link.poisson)
+        weight = link.density * section.area * length * gravity
+        weight = weight / (len(nodes) - 1)
+        moment = np.cross(step, weight) / 12
+        for k, node in enumerate(nodes):
+            first, last = k == 0, k == len(nodes) - 1
+            force = weight * (0.5 if first or last else 1.0)
+            couple = moment * (float(first) - float(last))
+            model.add_load(node, np.concatenate([couple, force]))

@@ -1,0 +1,280 @@
+"""The forced assembly as a multibody simulation: an independent second opinion.
+
+Every body is placed open and stress-free, with its full geometric error; the closures
+are then pulled shut by force, and Exudyn finds the static equilibrium with finite
+rotations.  Nothing but the robot's data and its joint coordinates is shared with the
+virtual-joint model: placement, beams and equilibrium are found anew.
+
+At a frame the body's error comes first, then the link's deformation, then the joint's,
+as in the paper; rotation vector and translation of an error are both in the frame's
+axes.  Joints are tight here: passive ones turn or slide freely along their own z.
+A closure is shut by a connector whose target is shifted until nothing is left open, so
+overconstrained rigid loops (parallelograms) are no special case.
+
+Sources:
+    Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
+    systems", for the solver; Sonneville, Cardona & Bruels (2014), "Geometrically exact
+    beam finite element formulated on the special Euclidean group", for its beam.
+"""
+
+import contextlib
+import io
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.robot import Robot
+from stiffness.reading import BadInput
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
+from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed
+from validation.multibody.exudyn_reading import (
+    closure_wrench,
+    contact_energy,
+    energy,
+    pose,
+    screw_between,
+    wrench,
+)
+from validation.multibody.exudyn_solver import largest_gap, solve
+from validation.multibody.motion import turn_of
+from validation.multibody.open_robot import Case, Placed, Tree, build, link_springs
+
+LINKS = ("beam", "spring")
+TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
+# [N m/rad, N/m] of the connectors that shut closures, tried in turn; beside contacts
+# they must hardly be softer than these
+_CLOSING = (1e10,)
+_CLOSING_CONTACTS = (1e12, 1e11)
+
+
+@dataclass(frozen=True, eq=False)
+class MultibodyAssembly:
+    """A robot forced together, as the simulation found it.
+
+    Rows are frames in the robot's order; screws and wrenches are at the frame, in its
+    axes, zero where the frame has no such spring.
+
+    Attributes:
+        platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T and
+            difference of the platform's origin, base axes.
+        energy: [J] of all links and joint springs.
+        link_screws: (n, 6) [rad, m] deformations: logarithm of the relative motion.
+        link_wrenches: (n, 6) [N m, N] what acts on the link's tip from outside.
+        joint_screws: (n, 6) [rad, m] deformations of the joint springs.
+        joint_wrenches: (n, 6) [N m, N] what acts on their outer side.
+        clearance_screws: (n, 6) [rad, m] play, and own motions of passive joints.
+        closure_wrenches: (closures, 6) [N m, N] what each closure's second chain
+            exerts on its first, at the platform's nominal origin, base axes.
+        transforms: (n, 4, 4) frames seen from the base, before their own motion.
+        gap: [rad, m] largest component left open in a closure.
+        idle_energy: [J] in the springs that hold free motions; a check, nearly zero.
+        contact_energy: [J] by which contacts yield.
+        seconds: [s] taken.
+    """
+
+    platform_screw: NDArray
+    energy: float
+    link_screws: NDArray
+    link_wrenches: NDArray
+    joint_screws: NDArray
+    joint_wrenches: NDArray
+    clearance_screws: NDArray
+    closure_wrenches: NDArray
+    transforms: NDArray
+    gap: float
+    idle_energy: float
+    contact_energy: float
+    seconds: float
+
+    @property
+    def rigid_energy(self) -> float:
+        """[J] energy that rigid contacts would leave, to first order of their yield."""
+        return self.energy + 2 * self.contact_energy
+
+
+def simulate_assembly(
+    posture: Placed,
+    scale: float = 1.0,
+    links: str = "beam",
+    stiffness: Mapping[str, ArrayLike] | None = None,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    elements: int = 4,
+    clearances: bool = False,
+    meshes: Mapping[str, MeshBody] | None = None,
+    bushes: bool = False,
+    time_limit: float = TIME_LIMIT,
+) -> MultibodyAssembly:
+    """Force a robot together in Exudyn.
+
+    Args:
+        posture: the robot and its joint coordinates; actuated joints are locked there.
+        scale: factor on the robot's geometric errors.
+        links: ``"beam"``: links with a section are geometrically exact beams, the
+            others 6 by 6 springs; ``"spring"``: all of them are springs.
+        stiffness: by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its axes, of
+            links that become springs and whose matrix the robot does not give.
+        load: (6,) [N m, N] on the platform at its origin, base axes; its direction
+            stays.
+        gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
+            weigh; other links, whose mass is not known, do not.
+        elements: beam elements per link.
+        clearances: whether joints play, scaled like the errors; tight otherwise.
+        meshes: by frame, links that are solids of finite elements in a floating frame.
+        bushes: whether joints with radial play and tilt are pins in two bushes each,
+            see :func:`validation.multibody.contact.joint_play`, instead of a disc and a
+            cone.
+        time_limit: [s] after which the simulation fails.
+
+    Returns:
+        The assembled robot.
+
+    Raises:
+        BadInput: an unknown kind of link, or a spring's stiffness is missing.
+        SimulationFailed: no equilibrium was found.
+        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+    """
+    if links not in LINKS:
+        raise BadInput(f"simulate_assembly: links = {links!r}, expected one of {LINKS}")
+    started = time.monotonic()
+    given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
+    solids = dict(meshes or {})
+    springs = link_springs(posture.robot, links, given, solids)
+    case = Case(
+        posture, scale, springs, solids, elements, clearances, bushes,
+        _vector(load, 6), _vector(gravity, 3),
+    )  # fmt: skip
+    *first, last = _CLOSING_CONTACTS if clearances else _CLOSING
+    for closing in first:
+        try:
+            return _simulate(case, closing, started, time_limit)
+        except OutOfTime:
+            raise
+        except SimulationFailed:
+            continue
+    return _simulate(case, last, started, time_limit)
+
+
+def _vector(given: ArrayLike | None, size: int) -> NDArray:
+    """(size,) what is given, or zeros."""
+    return np.zeros(size) if given is None else np.asarray(given, dtype=float)
+
+
+def _simulate(
+    case: Case, closing: float, started: float, limit: float
+) -> MultibodyAssembly:
+    """Build, solve, read, and give the memory back."""
+    robot = case.posture.robot
+    model = Model(*_import_exudyn(), robot.name, closing)
+    model.deadline = started + limit
+    try:
+        tree = build(model, case)
+        solve(model, tree.closures, narrow=bool(tree.contacts))
+        return _read(model, robot, tree, started)
+    finally:
+        model.discard()
+
+
+def closing_sequence(
+    posture: Placed, steps: int = 8, scale: float = 1.0, load: ArrayLike | None = None
+) -> NDArray:
+    """Where the frames are while the closures of a tight robot are pulled shut.
+
+    Args:
+        posture: as in :func:`simulate_assembly`; links with a section are beams, the
+            others must be given by a matrix.
+        steps: in which the closures are shut, at least 4.
+        scale: factor on the geometric errors.
+        load: (6,) [N m, N] on the platform, which grows meanwhile.
+
+    Returns:
+        (k, n, 4, 4) frames seen from the base: open and stress-free first, shut last;
+        k is at least ``steps + 1``.
+
+    Raises:
+        BadInput: a link's stiffness is not known.
+        SimulationFailed: no equilibrium was found.
+    """
+    robot = posture.robot
+    springs = link_springs(robot, "beam", {}, {})
+    case = Case(
+        posture, scale, springs, {}, 4, False, False, _vector(load, 6), np.zeros(3)
+    )
+    model = Model(*_import_exudyn(), robot.name, _CLOSING[-1])
+    model.deadline = time.monotonic() + TIME_LIMIT
+    try:
+        tree = build(model, case)
+        model.watched = [tree.before[frame.name] for frame in robot.frames]
+        solve(model, tree.closures, steps=steps)
+        return np.array(model.seen)
+    finally:
+        model.discard()
+
+
+def without_clearance(robot: Robot) -> Robot:
+    """The same robot with every joint tight, to compare with a simulation.
+
+    Args:
+        robot: any.
+
+    Returns:
+        A robot without play; its passive joints move along their z without bound.
+    """
+    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    return replace(robot, frames=frames)
+
+
+def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAssembly:
+    """Everything asked of the equilibrium."""
+    count = len(robot.frames)
+    screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "play")}
+    wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}
+    kinds: tuple[tuple[str, Mapping[str, Elastic | Contact]], ...] = (
+        ("link", tree.links),
+        ("joint", tree.joints),
+        ("play", tree.idle),
+        ("play", tree.contacts),
+    )
+    for kind, parts in kinds:
+        for name, part in parts.items():
+            row = robot.index(name)
+            screws[kind][row] = screw_between(model, part)
+            if kind in wrenches and isinstance(part, Elastic):
+                wrenches[kind][row] = wrench(model, part)
+    transforms = np.array([pose(model, tree.before[f.name]) for f in robot.frames])
+    T = transforms[robot.index(robot.platform)]
+    turn = turn_of(T[:3, :3] @ tree.platform[:3, :3].T)
+    origin = tree.platform[:3, 3]
+    closings = [closure_wrench(model, c, origin) for c in tree.closures]
+    springs = (*tree.links.values(), *tree.joints.values())
+    return MultibodyAssembly(
+        platform_screw=np.concatenate([turn, T[:3, 3] - origin]),
+        energy=sum(energy(model, part) for part in springs),
+        link_screws=screws["link"],
+        link_wrenches=wrenches["link"],
+        joint_screws=screws["joint"],
+        joint_wrenches=wrenches["joint"],
+        clearance_screws=screws["play"],
+        closure_wrenches=np.reshape(closings, (-1, 6)),
+        transforms=transforms,
+        gap=largest_gap(model, tree.closures),
+        idle_energy=sum(energy(model, part) for part in tree.idle.values()),
+        contact_energy=sum(contact_energy(model, c) for c in tree.contacts.values()),
+        seconds=time.monotonic() - started,
+    )
+
+
+def _import_exudyn() -> tuple[Any, Any, Any]:
+    """Exudyn without windows and without a word on the console."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        import exudyn
+        from exudyn import FEM, itemInterface
+
+    exudyn.special.userInterface.SuppressAll(True)
+    exudyn.config.printToConsole = False
+    return exudyn, itemInterface, FEM

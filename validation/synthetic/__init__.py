@@ -1,0 +1,1 @@
+"""Measured data of a simulated machine with hidden effects."""

@@ -1,0 +1,220 @@
+"""Which configurations, loads and conditions a synthetic campaign measures."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.nominal import Target, follow
+from assembly.posture import POSE, home_posture, pose_components
+from assembly.robot import Robot
+from stiffness.reading import BadInput
+from validation.synthetic.effects import Row
+
+TEMPERATURES = ("swing", "around", "constant")
+_PERIOD = 2400.0  # [s] of the temperature's swing
+_STEP = 60.0  # [s] between measurements
+_DRAWS = 40  # times the configurations asked for, before giving up
+_DIGITS = 6  # of commanded coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """How a campaign is to be measured.
+
+    Attributes:
+        configurations: number of different ones.
+        rows: number of measurements, interleaved over the session.
+        reach: [rad] largest change of a turning drive from its home position; of a
+            sliding one this much times ``size``.
+        size: [m] see reach.
+        load: [N] largest force on the platform.
+        levels: of the load: ``"many"`` sizes and directions; ``"one"``: always the
+            same force.
+        temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
+            ``"constant"``: 6 K.
+        command: ``"joints"`` or ``"pose"``, what is written as commanded.
+        humidity: whether a covariate of that name is recorded [%].
+    """
+
+    configurations: int = 24
+    rows: int = 116
+    reach: float = 0.6
+    size: float = 0.1
+    load: float = 40.0
+    levels: str = "many"
+    temperature: str = "swing"
+    command: str = "joints"
+    humidity: bool = False
+
+    def __post_init__(self) -> None:
+        choices = (
+            ("levels", ("many", "one")),
+            ("temperature", TEMPERATURES),
+            ("command", ("joints", "pose")),
+        )
+        for name, valid in choices:
+            if getattr(self, name) not in valid:
+                raise BadInput(
+                    f'design: {name}: found "{getattr(self, name)}", expected '
+                    + " | ".join(valid)
+                )
+        if not 0 < self.configurations <= self.rows:
+            raise BadInput(
+                f"design: found {self.configurations} configurations in {self.rows} "
+                "rows; expected at least one, and no more than rows"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The rows of a design on a robot.
+
+    Attributes:
+        rows: in the order of measurement.
+        configuration: (rows,) number of each row's configuration.
+        commands: (rows, m) as written.
+        columns: names of the m columns.
+    """
+
+    rows: tuple[Row, ...]
+    configuration: NDArray
+    commands: NDArray
+    columns: tuple[str, ...] = field(default_factory=tuple)
+
+
+def plan_campaign(robot: Robot, design: Design, rng: np.random.Generator) -> Plan:
+    """Draw configurations, loads and conditions.
+
+    Args:
+        robot: declared.
+        design: what is wanted.
+        rng: of the draws.
+
+    Returns:
+        The plan.
+
+    Raises:
+        BadInput: hardly any configuration within the reach closes.
+    """
+    coordinates = _configurations(robot, design, rng)
+    commands, columns, coordinates = _commands(robot, design, coordinates)
+    order = _interleaved(design, rng)
+    loads = _loads(design, order, rng)
+    count = design.rows
+    time = np.cumsum(np.r_[0.0, _STEP * rng.uniform(0.7, 1.3, count - 1)]).round(1)
+    conditions = {
+        "temperature": _temperature(design, time, rng),
+        "time": time,
+        "approach": rng.choice([-1.0, 1.0], count),
+    }
+    if design.humidity:
+        phase = rng.uniform(0, 2 * np.pi)
+        humidity = 40 + 8 * np.sin(2 * np.pi * time / 4100 + phase)
+        conditions["humidity"] = (humidity + rng.normal(0, 0.5, count)).round(1)
+    names = [frame.name for frame in robot.frames]
+    rows = tuple(
+        Row(
+            dict(zip(names, coordinates[order[i]].tolist(), strict=True)),
+            loads[i],
+            {name: float(values[i]) for name, values in conditions.items()},
+        )
+        for i in range(count)
+    )
+    return Plan(rows, order, commands[order], columns)
+
+
+def _configurations(robot: Robot, design: Design, rng: np.random.Generator) -> NDArray:
+    """(k, n) joint coordinates at which the nominal closures hold."""
+    home = home_posture(robot)
+    spans = np.array([
+        0.0 if not f.actuated
+        else design.reach * (design.size if f.joint == "prismatic" else 1.0)
+        for f in robot.frames
+    ])  # fmt: skip
+    actuated = np.array([f.actuated for f in robot.frames])
+    found: list[NDArray] = []
+    for _ in range(_DRAWS):
+        draws = rng.uniform(-1, 1, (design.configurations, len(spans)))
+        goal = (home.coordinates + spans * draws).round(_DIGITS)
+        target = Target(coordinates=np.where(actuated, goal, np.nan))
+        track = follow(robot, home.coordinates, target)
+        good = track.reached & (track.mismatch < 1e-9)
+        found += list(track.coordinates[good])
+        if len(found) >= design.configurations:
+            return np.array(found[: design.configurations])
+    raise BadInput(
+        f"{robot.name}: hardly any configuration closes within {design.reach:g} rad of "
+        "home; expected a smaller reach"
+    )
+
+
+def _commands(
+    robot: Robot, design: Design, coordinates: NDArray
+) -> tuple[NDArray, tuple[str, ...], NDArray]:
+    """What is written as commanded, its columns, and what it makes the coordinates."""
+    driven = [i for i, f in enumerate(robot.frames) if f.actuated]
+    if design.command == "joints":
+        columns = tuple(f"q.{robot.frames[i].name}" for i in driven)
+        return coordinates[:, driven], columns, coordinates
+    home = home_posture(robot).coordinates
+    held = Target(coordinates=coordinates)
+    T = follow(robot, home, held).transforms[:, robot.index(robot.platform)]
+    poses = pose_components(T).round(_DIGITS)
+    track = follow(robot, home, Target(pose=poses))
+    if not track.reached.all():
+        raise BadInput(
+            f"{robot.name}: a full platform pose cannot be commanded; expected a robot "
+            'of six freedoms, or command = "joints"'
+        )
+    return poses, tuple(f"pose.{name}" for name in POSE), track.coordinates
+
+
+def _interleaved(design: Design, rng: np.random.Generator) -> NDArray:
+    """(rows,) configuration of each row: every pass visits all in another order."""
+    passes = -(-design.rows // design.configurations)
+    orders = [rng.permutation(design.configurations) for _ in range(passes)]
+    return np.concatenate(orders)[: design.rows]
+
+
+def _loads(design: Design, order: NDArray, rng: np.random.Generator) -> NDArray:
+    """(rows, 6) [N m, N]: of each configuration's rows two repeat an earlier load."""
+    loads = np.zeros((design.rows, 6))
+    if design.levels == "one":
+        loads[:, 3:] = (design.load * _direction(rng)).round(3)
+        return loads
+    for configuration in range(design.configurations):
+        visits = np.flatnonzero(order == configuration)
+        fresh = max(len(visits) - 2, 1)
+        drawn = [_load(design.load, rng) for _ in range(fresh)]
+        if configuration % 2:
+            drawn[rng.integers(fresh)] = np.zeros(3)
+        again = [drawn[rng.integers(fresh)] for _ in range(len(visits) - fresh)]
+        forces = np.array([*drawn, *again])
+        loads[visits, 3:] = forces[rng.permutation(len(visits))]
+    return loads
+
+
+def _load(largest: float, rng: np.random.Generator) -> NDArray:
+    """(3,) [N] along an axis, in full or by half, or in any direction."""
+    if rng.random() < 0.5:
+        axis = np.zeros(3)
+        axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
+        return largest * axis
+    return (largest * rng.uniform(0.4, 1.0) * _direction(rng)).round(3)
+
+
+def _direction(rng: np.random.Generator) -> NDArray:
+    """(3,) unit vector of any direction."""
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def _temperature(design: Design, time: NDArray, rng: np.random.Generator) -> NDArray:
+    """(rows,) [K]."""
+    if design.temperature == "constant":
+        return np.full(len(time), 6.0)
+    middle, size = (3.0, 3.5) if design.temperature == "swing" else (0.0, 4.0)
+    phase = rng.uniform(0, 2 * np.pi)
+    wave = middle + size * np.sin(2 * np.pi * time / _PERIOD + phase)
+    return (wave + rng.normal(0, 0.05, len(time))).round(2)

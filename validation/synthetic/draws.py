@@ -1,0 +1,243 @@
+"""Plausible parameters of hidden effects, and how to make an effect stronger."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from assembly.robot import BeamLink, Frame, Robot
+from stiffness.reading import BadInput
+from validation.synthetic.effects import LIBRARY, SCREW, Parameters, own_compliance
+from validation.synthetic.machine import Hidden
+from validation.synthetic.outside import OUTSIDE
+
+
+class NotApplicable(ValueError):
+    """A robot has nothing that an effect could act on."""
+
+
+def draw_effect(
+    name: str, robot: Robot, duration: float, rng: np.random.Generator
+) -> Hidden:
+    """An effect with plausible parameters, some at one place and some at all.
+
+    Args:
+        name: of the effect.
+        robot: that is to have it.
+        duration: [s] of the session.
+        rng: of the draws.
+
+    Returns:
+        The effect; its strength is for :func:`strengthened` to set.
+
+    Raises:
+        BadInput: there is no such effect.
+        NotApplicable: the robot has nothing that it could act on.
+    """
+    if name not in (*LIBRARY, *OUTSIDE):
+        raise BadInput(
+            f'effect: found "{name[:60]}", expected one of '
+            + ", ".join((*LIBRARY, *OUTSIDE))
+        )
+    return Hidden(name, _DRAWS[name](robot, duration, rng))
+
+
+def strengthened(effect: Hidden, factor: float) -> Hidden:
+    """The same effect, its contribution to the readings times about a factor.
+
+    Args:
+        effect: any.
+        factor: [-] > 0.
+
+    Returns:
+        Weaker springs, larger errors, whatever makes more of it.
+    """
+    name, given = effect.name, dict(effect.parameters)
+    for key, value in given.items():
+        last = key.rpartition(".")[2]
+        if last in ("phase", "exponent", "time_constant"):
+            continue
+        if name in ("drive_compliance", "base_compliance", "_pose_stiffness"):
+            given[key] = value / factor
+        elif name == "contact_stiffening":
+            exponent = given[key.removesuffix("coefficient") + "exponent"]
+            given[key] = value / factor**exponent
+        elif name == "modulus_scale":  # its compliance grows in proportion
+            given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
+        elif name == "load_gain" and key == "factor":
+            given[key] = 1.0 + factor * (value - 1.0)
+        else:
+            given[key] = value * factor
+    return Hidden(name, given)
+
+
+def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
+    """One of the frames, or all of them."""
+    if not frames:
+        raise NotApplicable("no frame that the effect could act on")
+    if rng.random() < 0.5:
+        return [frames[rng.integers(len(frames))].name]
+    return [frame.name for frame in frames]
+
+
+def _beams(robot: Robot) -> list[Frame]:
+    return [f for f in robot.frames if isinstance(f.link, BeamLink)]
+
+
+def _drives(robot: Robot) -> list[Frame]:
+    return [f for f in robot.frames if f.actuated]
+
+
+def _turning(robot: Robot) -> list[Frame]:
+    return [f for f in _drives(robot) if f.joint == "revolute"]
+
+
+def _weight(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    heavy = any(f.mass for f in robot.frames) or any(
+        isinstance(f.link, BeamLink) and f.link.density for f in robot.frames
+    )
+    if not heavy:
+        raise NotApplicable("nothing of the robot has a declared mass")
+    tilt = rng.uniform(-0.2, 0.2, 2) if rng.random() < 0.5 else np.zeros(2)
+    down = np.array([*np.sin(tilt), -1.0])
+    g = 9.81 * down / np.linalg.norm(down)
+    return dict(zip(("g.x", "g.y", "g.z"), g.tolist(), strict=True))
+
+
+def _expansion(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return dict.fromkeys(_some(_beams(robot), rng), 2e-5)
+
+
+def _drive_springs(
+    robot: Robot, duration: float, rng: np.random.Generator
+) -> Parameters:
+    return {n: 1e5 * rng.uniform(0.6, 1.6) for n in _some(_drives(robot), rng)}
+
+
+def _foundation(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    size = np.where(np.arange(6) < 3, 1e5, 1e6) * rng.uniform(0.5, 2.0, 6)
+    return {f"stiffness.{k}": v for k, v in zip(SCREW, size.tolist(), strict=True)}
+
+
+def _offsets(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return _errors(_some(_drives(robot), rng), rng)
+
+
+def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return _errors(_some(_beams(robot), rng), rng)
+
+
+def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
+    """1e-4 rad or m, either sign, none of them much smaller."""
+    signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
+    return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
+
+
+def _eccentric(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    given = {}
+    for name in _some(_turning(robot), rng):
+        given[f"{name}.amplitude"] = 1e-4 * rng.uniform(0.5, 1.0)
+        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+    return given
+
+
+def _registered(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    base = 1e-4 * rng.uniform(-1, 1, 6)
+    given = {f"base.{k}": v for k, v in zip(SCREW, base.tolist(), strict=True)}
+    if rng.random() < 0.5:
+        tool = 1e-4 * rng.uniform(-1, 1, 3)
+        names = (f"tool.{k}" for k in SCREW[3:])
+        given |= dict(zip(names, tool.tolist(), strict=True))
+    return given
+
+
+def _softer(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return dict.fromkeys(_some(_beams(robot), rng), 0.8)
+
+
+def _play(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    joints = [f for f in robot.frames if f.actuated and f.clearance is None]
+    given: dict[str, float] = {}
+    for name in _some(joints, rng):
+        given |= {f"{name}.radial": 2e-5, f"{name}.axial": 2e-5, f"{name}.tilt": 2e-4}
+    return given
+
+
+def _friction(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    elastic = [f for f in _drives(robot) if own_compliance(f) > 0.0]
+    names = _some(elastic, rng)
+    compliance = {n: own_compliance(robot.frame(n)) for n in names}
+    return {n: 1e-5 / c * rng.uniform(0.6, 1.4) for n, c in compliance.items()}
+
+
+def _contacts(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    given = {}
+    for name in _some(_drives(robot), rng):
+        given[f"{name}.coefficient"] = 1e7 * rng.uniform(0.6, 1.6)
+        given[f"{name}.exponent"] = 1.5
+    return given
+
+
+def _gain(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    factor = 1.0 + rng.choice([-0.08, 0.08])
+    if rng.random() < 0.5:
+        return {"factor": factor}
+    offset = rng.uniform(-2, 2, 3).round(3)
+    names = ("offset.fx", "offset.fy", "offset.fz")
+    return {"factor": factor, **dict(zip(names, offset.tolist(), strict=True))}
+
+
+def _stiffening(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {}
+
+
+def _drifting(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    size = rng.choice([-1.0, 1.0], 6) * rng.uniform(0.3, 1.0, 6) * 1e-5
+    given = {f"amplitude.{k}": v for k, v in zip(SCREW, size.tolist(), strict=True)}
+    return given | {"time_constant": duration * rng.uniform(0.15, 0.6)}
+
+
+def _swelling(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return dict.fromkeys(_some(_beams(robot), rng), 1e-5)
+
+
+def _mesh(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {f.name: 1e5 for f in _turning(robot)} or _nothing()
+
+
+def _nothing() -> Parameters:
+    raise NotApplicable("no turning drive")
+
+
+def _stand(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    c = 1e-5 * rng.uniform(-1, 1, 6)
+    return {f"c.{k}": v for k, v in zip(SCREW, c.tolist(), strict=True)}
+
+
+def _sagging(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {"rate": 1e-6}
+
+
+_DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
+    "self_weight": _weight,
+    "thermal_expansion": _expansion,
+    "drive_compliance": _drive_springs,
+    "base_compliance": _foundation,
+    "encoder_offset": _offsets,
+    "encoder_eccentricity": _eccentric,
+    "link_length": _lengths,
+    "registration": _registered,
+    "modulus_scale": _softer,
+    "joint_clearance": _play,
+    "friction_hysteresis": _friction,
+    "contact_stiffening": _contacts,
+    "load_gain": _gain,
+    "geometric_stiffening": _stiffening,
+    "drift": _drifting,
+    "_pose_stiffness": _mesh,
+    "_humidity": _swelling,
+    "_quadratic_temperature": _swelling,
+    "_second_harmonic": _eccentric,
+    "_stand": _stand,
+    "_sag": _sagging,
+}

@@ -1,0 +1,325 @@
+"""Effects put into a simulated machine as what they physically are.
+
+A machine is a robot of frames, and most effects are more frames: an elastic drive
+is a spring after its joint, an encoder that reads wrong is a finite turn after it, a
+yielding foundation is a spring below everything.  Others change a body (a beam is built
+longer or softer, a joint gets play), what acts on it (weight, a load that is not the
+one recorded), where the measuring frame stands, or the reading alone.
+
+Nothing of this is shared with the effects that a diagnosis fits: a mistake in those
+must not reach the data they are judged by.  Names and parameters are the public ones;
+joints are sprung, turned and slid about or along their own z.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BASE, BeamLink, Clearance, Frame, Robot
+from validation.multibody.beams import beam_span
+from validation.multibody.motion import placement, turned
+
+SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
+WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
+SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] rigid for all that matters; tells its load
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One measurement, as commanded.
+
+    Attributes:
+        coordinates: [rad or m] of every joint in the nominal configuration, by frame.
+        load: (6,) [N m, N] recorded, at the reference point, base axes.
+        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and any others.
+    """
+
+    coordinates: Mapping[str, float]
+    load: NDArray
+    covariates: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A joint spring with load = coefficient x abs(deflection)^exponent.
+
+    Attributes:
+        coefficient: [N m/rad^n or N/m^n].
+        exponent: [-] n, at least 1.
+    """
+
+    coefficient: float
+    exponent: float
+
+    def secant(self, deflection: float) -> float:
+        """[N m/rad or N/m] at a deflection, of a nanometre at least."""
+        bent = max(abs(deflection), 1e-9)
+        return float(self.coefficient * bent ** (self.exponent - 1.0))
+
+
+@dataclass(frozen=True)
+class Rattle:
+    """Play of a joint on an open chain, where the load leaves no choice.
+
+    Attributes:
+        clearance: its bounds.
+    """
+
+    clearance: Clearance
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """What is simulated for a row.
+
+    Attributes:
+        robot: with the frames that effects have added; its platform is where the load
+            acts and the pose is read.
+        coordinates: [rad or m] of every joint, 0 where absent.
+        load: (6,) [N m, N] that acts in truth.
+        gravity: (3,) [m/s^2] base axes.
+        laws: by frame, what its spring or its place follows while the machine comes
+            to rest; see :mod:`validation.synthetic.rest`.
+    """
+
+    robot: Robot
+    coordinates: Mapping[str, float]
+    load: NDArray
+    gravity: NDArray = field(default_factory=lambda: np.zeros(3))
+    laws: Mapping[str, "Contact | Rattle"] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Where a machine comes to rest; rows are frames.
+
+    Attributes:
+        transforms: (n, 4, 4) before the joint's own motion, seen from the base.
+        joint_wrenches: (n, 6) [N m, N] what joint springs carry, frame's axes.
+        joint_screws: (n, 6) [rad, m] how far they give way.
+    """
+
+    transforms: NDArray
+    joint_wrenches: NDArray
+    joint_screws: NDArray
+
+
+Change = Callable[[Machine, Row, Parameters], Machine]
+Moved = Callable[[NDArray, Row, Parameters], NDArray]
+
+
+def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
+    """A robot with a fixed frame between a joint and everything it carries."""
+    new = f"{name}~{suffix}"
+    frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
+    return replace(robot, frames=(*frames, Frame(new, name, **given)))
+
+
+def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
+    """(6,) a value along a joint's motion, another one everywhere else."""
+    screw = np.full(6, others)
+    screw[frame.own_axis] = value
+    return screw
+
+
+def sprung(frame: Frame, stiffness: float) -> NDArray:
+    """(6, 6) stiffness along a joint's own motion, rigid otherwise."""
+    return np.diag(along_own_axis(frame, stiffness, math.inf))
+
+
+def beam_length(robot: Robot, name: str) -> float:
+    """[m] declared length of a frame's beam."""
+    frame = robot.frame(name)
+    assert isinstance(frame.link, BeamLink)
+    return beam_span(frame, frame.link)[0]
+
+
+def lengthened(robot: Robot, name: str, change: float) -> Robot:
+    """A robot one of whose beams is built longer [m], along its own actual axis."""
+    frame = robot.frame(name)
+    assert isinstance(frame.link, BeamLink)
+    length, x = beam_span(frame, frame.link)
+    axis = x / np.linalg.norm(x)
+    error = frame.geometric_error.copy()
+    error[3:] += turned(error[:3]) @ axis * change
+    link = replace(frame.link, length=length + change, axis=tuple(axis.tolist()))
+    return with_frame(robot, replace(frame, link=link, geometric_error=error))
+
+
+def with_frame(robot: Robot, frame: Frame) -> Robot:
+    """The same robot with the frame of that name replaced."""
+    frames = (frame if f.name == frame.name else f for f in robot.frames)
+    return replace(robot, frames=tuple(frames))
+
+
+def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
+    """A machine one of whose joints stands off its command [rad or m]."""
+    screw = along_own_axis(machine.robot.frame(name), change)
+    robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
+    return replace(machine, robot=robot)
+
+
+def own_compliance(frame: Frame) -> float:
+    """[rad/(N m) or m/N] of a declared joint along its own motion, 0 if rigid."""
+    K = frame.joint_stiffness
+    if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
+        return 0.0
+    soft = np.flatnonzero(np.isfinite(np.diag(K)))
+    k = int(np.searchsorted(soft, frame.own_axis))
+    return float(np.linalg.inv(K[np.ix_(soft, soft)])[k, k])
+
+
+def _self_weight(machine: Machine, row: Row, given: Parameters) -> Machine:
+    g = np.array([given.get(f"g.{k}", 0.0) for k in "xyz"])
+    return replace(machine, gravity=machine.gravity + g)
+
+
+def _thermal_expansion(machine: Machine, row: Row, given: Parameters) -> Machine:
+    kelvin, robot = row.covariates["temperature"], machine.robot
+    for name, strain in given.items():
+        robot = lengthened(robot, name, strain * kelvin * beam_length(robot, name))
+    return replace(machine, robot=robot)
+
+
+def _link_length(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot = machine.robot
+    for name, change in given.items():
+        robot = lengthened(robot, name, change)
+    return replace(machine, robot=robot)
+
+
+def _drive_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot = machine.robot
+    for name, stiffness in given.items():
+        K = sprung(robot.frame(name), stiffness)
+        robot = insert_after(robot, name, "drive", joint_stiffness=K)
+    return replace(machine, robot=robot)
+
+
+def _base_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
+    K = np.diag([given.get(f"stiffness.{k}", math.inf) for k in SCREW])
+    new = "base~foundation"
+    frames = [
+        replace(f, parent=new) if f.parent == BASE else f for f in machine.robot.frames
+    ]
+    foundation = Frame(new, BASE, joint_stiffness=K)
+    robot = replace(machine.robot, frames=(foundation, *frames))
+    return replace(machine, robot=robot)
+
+
+def _encoder_offset(machine: Machine, row: Row, given: Parameters) -> Machine:
+    for name, change in given.items():
+        machine = misread(machine, name, "offset", change)
+    return machine
+
+
+def _encoder_eccentricity(machine: Machine, row: Row, given: Parameters) -> Machine:
+    for name in named(given, "amplitude"):
+        angle = row.coordinates[name] + given[f"{name}.phase"]
+        change = given[f"{name}.amplitude"] * math.sin(angle)
+        machine = misread(machine, name, "eccentric", change)
+    return machine
+
+
+def _modulus_scale(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot = machine.robot
+    for name, factor in given.items():
+        frame = robot.frame(name)
+        assert isinstance(frame.link, BeamLink)
+        link = replace(frame.link, young=factor * frame.link.young)
+        robot = with_frame(robot, replace(frame, link=link))
+    return replace(machine, robot=robot)
+
+
+def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot, laws = machine.robot, dict(machine.laws)
+    for name in dict.fromkeys(key.rpartition(".")[0] for key in given):
+        kinds = ("radial", "axial", "tilt")
+        play = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
+        if robot.closures:  # who takes up how much is for the simulation to find
+            robot = with_frame(robot, replace(robot.frame(name), clearance=play))
+            continue
+        K = np.repeat(SENSOR, 3)
+        K[robot.frame(name).own_axis] = math.inf
+        robot = insert_after(robot, name, "play", joint_stiffness=np.diag(K))
+        laws[f"{name}~play"] = Rattle(play)
+    return replace(machine, robot=robot, laws=laws)
+
+
+def _friction_hysteresis(machine: Machine, row: Row, given: Parameters) -> Machine:
+    # a constant torque on a linear spring: its rest position is shifted
+    for name, torque in given.items():
+        compliance = own_compliance(machine.robot.frame(name))
+        change = -torque * row.covariates["approach"] * compliance
+        machine = misread(machine, name, "friction", change)
+    return machine
+
+
+def _contact_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot, laws = machine.robot, dict(machine.laws)
+    for name in named(given, "coefficient"):
+        law = Contact(given[f"{name}.coefficient"], given[f"{name}.exponent"])
+        K = sprung(robot.frame(name), law.secant(1e-5))
+        robot = insert_after(robot, name, "contact", joint_stiffness=K)
+        laws[f"{name}~contact"] = law
+    return replace(machine, robot=robot, laws=laws)
+
+
+def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
+    offset = np.array([given.get(f"offset.{k}", 0.0) for k in WRENCH])
+    return replace(machine, load=given.get("factor", 1.0) * machine.load + offset)
+
+
+def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
+    return machine  # the simulation has it anyway; a linear model lacks it
+
+
+def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
+    """The point measured is off the reference point, the measuring frame stands off."""
+    screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
+    tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
+    measured = pose.copy()
+    measured[:3, 3] += pose[:3, :3] @ tool
+    return placement(screw[:3], screw[3:]) @ measured
+
+
+def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
+    amplitude = np.array([given.get(f"amplitude.{k}", 0.0) for k in SCREW])
+    return reading + amplitude * -math.expm1(
+        -row.covariates["time"] / given["time_constant"]
+    )
+
+
+def named(given: Parameters, component: str) -> list[str]:
+    """Frames that a component is given for, as in ``<frame>.<component>``."""
+    end = f".{component}"
+    return [key.removesuffix(end) for key in given if key.endswith(end)]
+
+
+CHANGES: dict[str, Change] = {
+    "self_weight": _self_weight,
+    "thermal_expansion": _thermal_expansion,
+    "drive_compliance": _drive_compliance,
+    "base_compliance": _base_compliance,
+    "encoder_offset": _encoder_offset,
+    "encoder_eccentricity": _encoder_eccentricity,
+    "link_length": _link_length,
+    "modulus_scale": _modulus_scale,
+    "joint_clearance": _joint_clearance,
+    "friction_hysteresis": _friction_hysteresis,
+    "contact_stiffening": _contact_stiffening,
+    "load_gain": _load_gain,
+    "geometric_stiffening": _geometric_stiffening,
+}
+POSES: dict[str, Moved] = {"registration": _registration}  # of the pose (4, 4)
+READINGS: dict[str, Moved] = {"drift": _drift}  # of the reading (6,)
+COVARIATES: dict[str, tuple[str, ...]] = {  # that change the machine
+    "thermal_expansion": ("temperature",),
+    "friction_hysteresis": ("approach",),
+}
+LIBRARY = (*CHANGES, *POSES, *READINGS)

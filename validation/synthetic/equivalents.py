@@ -1,0 +1,204 @@
+"""Which effects could be mistaken for the hidden ones, on a campaign's own design.
+
+Every public effect's signature, to first order and whitened by the noise, is taken from
+the program of springs, never from the model that is to be judged.  A set of effects
+whose signatures span what the hidden ones add, but for less than noise would hide,
+explains the data as well, and naming it is no false claim.
+
+Signatures of one turned drive or lengthened beam depend on the configuration only, and
+those of temperature, approach and contact follow from them: 600 solutions for an arm,
+not 5000.  Play and geometric stiffening have no linear signature and are left out.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BeamLink
+from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
+from validation.synthetic.generator import Synthetic
+from validation.synthetic.machine import Hidden, simulate_readings
+
+SAME = 10.0  # left of a chi square below which noise hides the difference
+_DRIFTS = (0.1, 0.3, 1.0)  # time constants tried, in durations
+_STEP = 1e-5  # [rad, m] of a finite difference
+_SOFT = 1e9  # [N m/rad, N/m] of a spring put in for a finite difference
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A set of effects held against what is hidden.
+
+    Attributes:
+        names: of the effects.
+        parameters: their number.
+        left: [-] chi square of what they cannot explain, noise apart.
+    """
+
+    names: tuple[str, ...]
+    parameters: int
+    left: float
+
+
+def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
+    """All small sets of public effects, best first.
+
+    Args:
+        campaign: with what is hidden in it.
+        size: of the largest sets.
+
+    Returns:
+        Sets with what each leaves of the contribution of the hidden effects.
+    """
+    known = np.isfinite(campaign.readings)
+    target = (campaign.added / campaign.sigma)[known]
+    columns = {n: c[known.ravel()] for n, c in signatures(campaign).items()}
+    frame = columns["registration"][:, :6]
+    nuisance = frame if campaign.registration == "unknown" else frame[:, :0]
+    found = []
+    for count in range(1, size + 1):
+        for names in combinations(columns, count):
+            if len({name.partition("(")[0] for name in names}) < count:
+                continue
+            A = np.hstack([nuisance, *(columns[name] for name in names)])
+            found.append(Alternative(names, A.shape[1], _left(A, target)))
+    return sorted(found, key=lambda one: one.left)
+
+
+def _left(A: NDArray, target: NDArray) -> float:
+    """Squared part of a vector outside the span of columns."""
+    norms = np.linalg.norm(A, axis=0)
+    A = A[:, norms > 0] / norms[norms > 0]
+    if not A.shape[1]:
+        return float(target @ target)
+    u, size, _ = np.linalg.svd(A, full_matrices=False)
+    u = u[:, size > 1e-9 * size[0]]
+    rest = target - u @ (u.T @ target)
+    return float(rest @ rest)
+
+
+def signatures(campaign: Synthetic) -> dict[str, NDArray]:
+    """Whitened columns of every public effect that the robot can have.
+
+    Args:
+        campaign: whose design and noise are used.
+
+    Returns:
+        By name ``(6 rows, parameters)``, drift by its time constant.
+    """
+    found = dict(_raw(campaign))
+    sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
+    return {
+        name: columns.reshape(len(sigma), -1) / sigma[:, None]
+        for name, columns in found.items()
+        if columns.size
+    }
+
+
+def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
+    """(rows, 6, parameters) by effect."""
+    robot, rows, lab = campaign.robot, campaign.plan.rows, _Lab(campaign)
+    drives = [f.name for f in robot.frames if f.actuated]
+    turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
+    beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
+    covariate = {
+        name: np.array([row.covariates[name] for row in rows])[:, None]
+        for name in ("temperature", "time", "approach")
+    }
+    offsets = {n: lab.still("encoder_offset", n, _STEP) for n in drives}
+    lengths = [lab.still("link_length", f.name, _STEP) for f in beams]
+    softer = {n: lab.each("drive_compliance", n, _SOFT, 1 / _SOFT) for n in drives}
+    yield "encoder_offset", _columns(list(offsets.values()))
+    angles = {n: np.array([[row.coordinates[n]] for row in rows]) for n in turning}
+    yield (
+        "encoder_eccentricity",
+        _columns([
+            wave(angles[n]) * offsets[n] for n in turning for wave in (np.sin, np.cos)
+        ]),
+    )
+    yield "link_length", _columns(lengths)
+    warm = covariate["temperature"]
+    yield "thermal_expansion", _columns([warm * length for length in lengths])
+    yield "drive_compliance", _columns(list(softer.values()))
+    elastic = [n for n in drives if own_compliance(robot.frame(n)) > 0]
+    yield (
+        "friction_hysteresis",
+        _columns([covariate["approach"] * offsets[n] for n in elastic]),
+    )
+    yield (
+        "contact_stiffening",
+        _columns([_stiffening(softer[n], offsets[n]) for n in drives]),
+    )
+    yield (
+        "base_compliance",
+        _columns([
+            lab.each("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
+            for k in SCREW
+        ]),
+    )
+    yield (
+        "modulus_scale",
+        _columns([lab.each("modulus_scale", f.name, 0.99, 0.01) for f in beams]),
+    )
+    yield (
+        "self_weight",
+        _columns([lab.still("self_weight", f"g.{k}", 1.0) for k in "xyz"]),
+    )
+    pushed = [lab.still("load_gain", f"offset.{k}", 1.0) for k in WRENCH]
+    loads = np.array([row.load for row in rows])
+    recorded = [k for k in range(6) if loads[:, k].any()]
+    gain = sum(loads[:, [k]] * pushed[k] for k in range(6))
+    yield "load_gain", _columns([np.asarray(gain), *(pushed[k] for k in recorded)])
+    yield (
+        "registration",
+        _columns([
+            lab.still("registration", key, _STEP)
+            for key in (*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz")
+        ]),
+    )
+    time = covariate["time"]
+    for share in _DRIFTS:
+        rise = -np.expm1(-time / (share * time.max()))
+        yield f"drift({share:g})", _columns([rise * axis for axis in np.eye(6)])
+
+
+def _columns(screws: Sequence[NDArray]) -> NDArray:
+    """(rows, 6, parameters)."""
+    return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
+
+
+class _Lab:
+    """A campaign's robot without what is hidden, and its readings without noise."""
+
+    def __init__(self, campaign: Synthetic) -> None:
+        self._robot, self._point = campaign.robot, campaign.reference_point
+        self._of = campaign.plan.configuration
+        self._rows = list(campaign.plan.rows)
+        first = np.unique(self._of, return_index=True)[1]
+        self._unloaded = [replace(self._rows[i], load=np.zeros(6)) for i in first]
+        self._loaded_readings = self._read(self._rows, ())
+        self._unloaded_readings = self._read(self._unloaded, ())
+
+    def _read(self, rows: list[Row], effects: Sequence[Hidden]) -> NDArray:
+        return simulate_readings(self._robot, self._point, rows, effects, "springs")
+
+    def each(self, name: str, key: str, value: float, step: float) -> NDArray:
+        """(rows, 6) what an effect adds for a unit of its parameter."""
+        found = self._read(self._rows, [Hidden(name, {key: value})])
+        return (found - self._loaded_readings) / step
+
+    def still(self, name: str, key: str, step: float) -> NDArray:
+        """The same of an effect that no load changes: once for each configuration."""
+        found = self._read(self._unloaded, [Hidden(name, {key: step})])
+        return ((found - self._unloaded_readings) / step)[self._of]
+
+
+def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
+    """A Hertz contact: the offset by its load^(2/3), which the drive's spring tells."""
+    scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # [1/m] lengths like angles
+    a, b = softer * scale, offset * scale
+    moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)
+    return offset * (np.sign(moments) * np.abs(moments) ** (2 / 3))[:, None]

@@ -1,0 +1,300 @@
+"""Synthetic campaigns: measured data of a simulated machine with hidden effects.
+
+The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
+not by the model that is later to explain it.  Each effect is made as strong as asked
+for: the rms of what it alone adds to the readings is a multiple of the noise.  Weight
+and geometric stiffening have no strength of their own; with them the noise is set.
+
+The folder written holds what a measuring lab would hand over.  What was hidden is kept
+apart from it, in the layout of the practice campaigns' truth.
+"""
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.robot import Robot
+from assembly.robot_file import write_robot
+from stiffness.reading import BadInput
+from stiffness.writing import check_writable
+from validation.synthetic.design import Design, Plan, plan_campaign
+from validation.synthetic.draws import draw_effect, strengthened
+from validation.synthetic.effects import SCREW, WRENCH, Row
+from validation.synthetic.machine import Hidden, simulate_readings
+
+_GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
+_TRIES = 5
+_CLOSE = 0.05  # relative, of a strength to the one asked for
+_SMALL = 1e-2  # scale of errors and load at which the machine is linear
+_BLUNDER = 40.0  # [-] sigmas of an outlier
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Synthetic:
+    """A synthetic campaign and what is hidden in it.
+
+    Attributes:
+        robot: declared.
+        plan: what was commanded.
+        reference_point: (3,) [m] platform axes.
+        registration: ``"known"``, or ``"unknown"`` with a hidden measuring frame.
+        sigma: (6,) [rad, m] of the noise.
+        readings: (rows, 6) [rad, m] measured deviations, NaN where missing.
+        exact: (rows, 6) [rad, m] the same without noise and blunders.
+        added: (rows, 6) [rad, m] what the hidden effects add, the frame apart.
+        effects: hidden, with their parameters.
+        strength: by name, rms of what each effect alone adds, in sigmas.
+        outliers: rows that were spoilt.
+        hidden_base: (6,) screw of the measuring frame, None if known.
+    """
+
+    robot: Robot
+    plan: Plan
+    reference_point: NDArray
+    registration: str
+    sigma: NDArray
+    readings: NDArray
+    exact: NDArray
+    added: NDArray
+    effects: tuple[Hidden, ...]
+    strength: Mapping[str, float]
+    outliers: tuple[int, ...] = ()
+    hidden_base: NDArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What spoils the readings.
+
+    Attributes:
+        rotation: [rad] 1 sigma.
+        position: [m] 1 sigma.
+        outliers: number of rows with a blunder in one reading.
+        missing: share of cells that were not measured.
+        hidden_frame: [rad, m] size of an unknown measuring frame, 0 if known.
+    """
+
+    rotation: float = 1e-5
+    position: float = 5e-6
+    outliers: int = 0
+    missing: float = 0.0
+    hidden_frame: float = 0.0
+
+    @property
+    def sigma(self) -> NDArray:
+        """(6,) [rad, m]."""
+        return np.repeat([self.rotation, self.position], 3)
+
+
+def generate_campaign(
+    robot: Robot,
+    wanted: Mapping[str, float] | Sequence[tuple[Hidden, float]],
+    design: Design | None = None,
+    noise: Noise | None = None,
+    reference_point: ArrayLike = (0.0, 0.0, 0.0),
+    seed: int = 0,
+    program: str = "multibody",
+    update: Progress | None = None,
+) -> Synthetic:
+    """Measure a simulated machine.
+
+    Args:
+        robot: declared, its geometric errors known.
+        wanted: effects by name, whose parameters are drawn, or effects with
+            parameters; with the multiple of the noise that each alone is to reach.
+        design: what is measured.
+        noise: what spoils it.
+        reference_point: (3,) [m] measured point, platform axes.
+        seed: of all draws.
+        program: ``"multibody"`` or, much faster, ``"springs"``.
+        update: called with a stage, the rows done and their total.
+
+    Returns:
+        The campaign.
+
+    Raises:
+        BadInput: an unknown effect, or a design that the robot cannot do.
+        NotApplicable: the robot has nothing that an effect could act on.
+        SimulationFailed: a row has no equilibrium.
+    """
+    design, noise = design or Design(), noise or Noise()
+    rng = np.random.default_rng(seed)
+    point = np.array(reference_point, dtype=float)
+    plan = plan_campaign(robot, design, rng)
+    duration = plan.rows[-1].covariates["time"]
+    if isinstance(wanted, Mapping):
+        drawn = {n: draw_effect(n, robot, duration, rng) for n in wanted}
+        wanted = [(drawn[name], multiple) for name, multiple in wanted.items()]
+    # what has no strength of its own sets the noise, before the others follow it
+    wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
+    lab = _Lab(robot, point, plan.rows, program, update)
+    declared = lab.read((), "declared")
+    if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
+        declared = _linear(lab)
+    sigma, exact = noise.sigma, declared
+    effects, strength = [], {}
+    for effect, multiple in wanted:
+        effect, exact, sigma = _as_strong_as(lab, effect, multiple, sigma, declared)
+        effects.append(effect)
+        strength[effect.name] = _rms((exact - declared) / sigma)
+    if len(effects) > 1:
+        exact = lab.read(effects, "all effects")
+    added = exact - declared
+    base = noise.hidden_frame * rng.uniform(-1, 1, 6) if noise.hidden_frame else None
+    if base is not None:
+        keys = (f"base.{k}" for k in SCREW)
+        frame = Hidden("registration", dict(zip(keys, base.tolist(), strict=True)))
+        exact = lab.read([*effects, frame], "hidden frame")
+    readings, outliers = _measured(exact, sigma, noise, rng)
+    return Synthetic(
+        robot, plan, point, "known" if base is None else "unknown", sigma,
+        readings, exact, added, tuple(effects), strength, outliers, base,
+    )  # fmt: skip
+
+
+@dataclass(eq=False)
+class _Lab:
+    """A robot, the rows at which it is measured, and what was read already."""
+
+    robot: Robot
+    point: NDArray
+    rows: Sequence[Row]
+    program: str
+    update: Progress | None
+
+    def read(self, effects: Sequence[Hidden], stage: str) -> NDArray:
+        """Readings of all rows without noise."""
+        update = self.update
+        progress = None if update is None else (lambda d, n: update(stage, d, n))
+        return simulate_readings(
+            self.robot, self.point, self.rows, effects, self.program, progress
+        )
+
+
+def _as_strong_as(
+    lab: _Lab, effect: Hidden, multiple: float, sigma: NDArray, declared: NDArray
+) -> tuple[Hidden, NDArray, NDArray]:
+    """The effect at a strength, what is read then, and the noise (see the head)."""
+    factor = 1.0
+    for attempt in range(_TRIES):
+        tried = strengthened(effect, factor) if attempt else effect
+        exact = lab.read([tried], f"{effect.name}, strength {factor:.3g}")
+        reached = _rms((exact - declared) / sigma)
+        if reached == 0.0:
+            raise BadInput(f"{effect.name}: adds nothing to any reading; try another")
+        if effect.name in _GIVEN_STRENGTH:
+            return tried, exact, sigma * (reached / multiple)
+        if abs(reached / multiple - 1.0) < _CLOSE:
+            break
+        factor *= multiple / reached
+    return tried, exact, sigma
+
+
+def _linear(lab: _Lab) -> NDArray:
+    """(rows, 6) readings of the machine linear in its errors and its load."""
+    ends = []
+    for scale in (_SMALL, -_SMALL):
+        small = lab.robot.with_errors(scale * lab.robot.errors)
+        rows = [replace(row, load=scale * row.load) for row in lab.rows]
+        ends.append(replace(lab, robot=small, rows=rows).read((), "linear model"))
+    return (ends[0] - ends[1]) / (2 * _SMALL)
+
+
+def _measured(
+    exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
+) -> tuple[NDArray, tuple[int, ...]]:
+    """Readings with noise, blunders and gaps; and the rows spoilt."""
+    readings = exact + sigma * rng.normal(size=exact.shape)
+    spoilt = rng.choice(len(exact), noise.outliers, replace=False)
+    columns = rng.integers(6, size=noise.outliers)
+    readings[spoilt, columns] += _BLUNDER * sigma[columns]
+    gaps = rng.random(exact.shape) < noise.missing
+    gaps[gaps.all(axis=1)] = False
+    readings[gaps] = np.nan
+    return readings, tuple(sorted(spoilt.tolist()))
+
+
+def _rms(values: NDArray) -> float:
+    """Root mean square of all that was measured."""
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that a campaign cannot be written to, before the work.
+
+    Args:
+        folder: to be new, or empty.
+
+    Raises:
+        BadInput: it holds something already, or where it should be is closed to us.
+    """
+    check_writable(folder.parent / "file")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadInput(f"{folder}: found something there, expected a new folder")
+
+
+def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
+    """Write campaign.toml, measurements.csv and robot.toml, all or none of them.
+
+    Args:
+        campaign: to be written; nothing hidden is.
+        folder: new, or empty.
+
+    Raises:
+        BadInput: the folder holds something already or cannot be written.
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    part = folder.with_name(folder.name + ".part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        part.mkdir()
+        write_robot(campaign.robot, part / "robot.toml")
+        (part / "campaign.toml").write_text(_toml(campaign), encoding="utf-8")
+        (part / "measurements.csv").write_text(_table(campaign), encoding="utf-8")
+        part.replace(folder)
+    except OSError as error:
+        raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
+
+
+def _toml(campaign: Synthetic) -> str:
+    """The text of campaign.toml."""
+    return (
+        'robot = "robot.toml"\n'
+        'measurements = "measurements.csv"\n'
+        f"reference_point = {campaign.reference_point.tolist()}\n"
+        f'registration = "{campaign.registration}"\n\n'
+        "[noise]\n"
+        f"rotation = {campaign.sigma[0]:.6g}\n"
+        f"position = {campaign.sigma[3]:.6g}\n"
+    )
+
+
+def _table(campaign: Synthetic) -> str:
+    """The text of measurements.csv."""
+    plan = campaign.plan
+    loads = np.array([row.load for row in plan.rows])
+    loaded = [k for k in range(6) if loads[:, k].any()]
+    covariates = list(plan.rows[0].covariates)
+    header = [
+        "id",
+        *plan.columns,
+        *(f"load.{WRENCH[k]}" for k in loaded),
+        *(f"meas.{name}" for name in SCREW),
+        *(f"cov.{name}" for name in covariates),
+    ]
+    lines = [",".join(header)]
+    for i, row in enumerate(plan.rows):
+        measured = campaign.readings[i]
+        cells = [f"m{i + 1:03d}"]
+        cells += [f"{v:.10g}" for v in (*plan.commands[i], *row.load[loaded])]
+        cells += ["" if np.isnan(v) else f"{v:.8e}" for v in measured]
+        cells += [f"{row.covariates[name]:.10g}" for name in covariates]
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"

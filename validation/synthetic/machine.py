@@ -1,0 +1,137 @@
+"""What a simulated machine reads at the rows of a design, hidden effects included."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.robot import BASE, Frame, Robot
+from validation.multibody.motion import placement, shifted, turn_of
+from validation.synthetic.effects import (
+    CHANGES,
+    COVARIATES,
+    POSES,
+    READINGS,
+    Machine,
+    Parameters,
+    Row,
+)
+from validation.synthetic.outside import (
+    OUTSIDE_CHANGES,
+    OUTSIDE_COVARIATES,
+    OUTSIDE_READINGS,
+)
+from validation.synthetic.rest import Progress, rest_poses
+
+_ALL_CHANGES = CHANGES | OUTSIDE_CHANGES
+_ALL_READINGS = READINGS | OUTSIDE_READINGS
+_ALL_COVARIATES = COVARIATES | OUTSIDE_COVARIATES
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """An effect that the declared model lacks.
+
+    Attributes:
+        name: a public one, or one that begins with an underscore.
+        parameters: as in the public formats.
+    """
+
+    name: str
+    parameters: Parameters
+
+
+def simulate_readings(
+    robot: Robot,
+    reference_point: NDArray,
+    rows: Sequence[Row],
+    effects: Sequence[Hidden] = (),
+    program: str = "multibody",
+    update: Progress | None = None,
+) -> NDArray:
+    """Deviations of a simulated machine at the rows of a design, without noise.
+
+    Rows whose machine is the same are simulated once.
+
+    Args:
+        robot: declared; every joint is tight unless it has a clearance.
+        reference_point: (3,) [m] where the load acts and the pose is read, platform
+            axes.
+        rows: commanded configurations, loads and covariates.
+        effects: what the machine has and the declared model lacks.
+        program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
+        update: called with the number of machines done and their total.
+
+    Returns:
+        (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T and difference of
+        the reference point's position, base axes.
+
+    Raises:
+        SimulationFailed: a row has no equilibrium.
+    """
+    pointed = with_point(robot, reference_point)
+    changing = [effect for effect in effects if effect.name in _ALL_CHANGES]
+    used = sorted({c for e in changing for c in _ALL_COVARIATES.get(e.name, ())})
+    machines: dict[tuple, Machine] = {}
+    nominal: dict[tuple, NDArray] = {}
+    keys: list[tuple] = []
+    for row in rows:
+        place = tuple(row.coordinates.values())
+        conditions = tuple(row.covariates[name] for name in used)
+        keys.append((place, row.load.tobytes(), *conditions))
+        if keys[-1] not in machines:
+            machines[keys[-1]] = _machine(pointed, row, changing)
+        if place not in nominal:
+            nominal[place] = nominal_pose(pointed, row)
+    poses = rest_poses(list(machines.values()), program, update)
+    known = dict(zip(machines, poses, strict=True))
+    return np.array([
+        _read(known[key], nominal[key[0]], row, effects)
+        for key, row in zip(keys, rows, strict=True)
+    ])
+
+
+def with_point(robot: Robot, reference_point: NDArray) -> Robot:
+    """The robot with its reference point as the platform."""
+    point = Frame("platform~point", robot.platform, translation=reference_point)
+    return replace(robot, platform=point.name, frames=(*robot.frames, point))
+
+
+def nominal_pose(robot: Robot, row: Row) -> NDArray:
+    """(4, 4) platform of the robot as drawn, along the chain that leads to it."""
+    T, frame = np.eye(4), robot.frame(robot.platform)
+    while True:
+        own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
+        if frame.joint == "prismatic":
+            T = shifted(own) @ T
+        elif frame.joint == "revolute":
+            T = placement(own, np.zeros(3)) @ T
+        T = placement(frame.rotation, frame.translation) @ T
+        if frame.parent == BASE:
+            return T
+        frame = robot.frame(frame.parent)
+
+
+def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
+    """The machine of a row, with the effects that change it."""
+    machine = Machine(robot, row.coordinates, row.load)
+    for effect in changing:
+        change = _ALL_CHANGES[effect.name]
+        machine = change(machine, row, effect.parameters)
+    return machine
+
+
+def _read(
+    pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
+) -> NDArray:
+    """(6,) [rad, m] what the measuring device says of a pose."""
+    for effect in effects:
+        if effect.name in POSES:
+            pose = POSES[effect.name](pose, row, effect.parameters)
+    turn = turn_of(pose[:3, :3] @ nominal[:3, :3].T)
+    reading = np.concatenate([turn, pose[:3, 3] - nominal[:3, 3]])
+    for effect in effects:
+        if effect.name in _ALL_READINGS:
+            reading = _ALL_READINGS[effect.name](reading, row, effect.parameters)
+    return reading

@@ -1,0 +1,95 @@
+"""Effects that no library has, to see whether a diagnosis admits it.
+
+Each is something a real machine does and none of the public effects describes.  Their
+names begin with an underscore.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.synthetic.effects import (
+    SCREW,
+    Change,
+    Machine,
+    Moved,
+    Parameters,
+    Row,
+    beam_length,
+    insert_after,
+    lengthened,
+    misread,
+    sprung,
+)
+
+
+def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A drive's compliance is mean (1 + cos 3q): teeth in and out of mesh."""
+    robot = machine.robot
+    for name, softest in given.items():
+        share = 1.0 + math.cos(3 * row.coordinates[name])
+        K = sprung(robot.frame(name), softest / max(share / 2, 1e-6))
+        robot = insert_after(robot, name, "mesh", joint_stiffness=K)
+    return replace(machine, robot=robot)
+
+
+def _humidity(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A beam swells by a strain per per cent of humidity."""
+    return _swollen(machine, given, row.covariates["humidity"] - 40.0)
+
+
+def _quadratic_temperature(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A beam's strain grows with the square of the temperature."""
+    return _swollen(machine, given, row.covariates["temperature"] ** 2)
+
+
+def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
+    robot = machine.robot
+    for name, rate in given.items():
+        robot = lengthened(robot, name, rate * beam_length(robot, name) * cause)
+    return replace(machine, robot=robot)
+
+
+def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """An encoder's error has twice the period of eccentricity: its disc wobbles."""
+    for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
+        angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
+        change = given[f"{name}.amplitude"] * math.sin(angle)
+        machine = misread(machine, name, "wobble", change)
+    return machine
+
+
+def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
+    """The device's stand yields with the square of the load: c (f/100 N)^2."""
+    squared = float(row.load[3:] @ row.load[3:]) / 1e4
+    return reading + squared * np.array([given.get(f"c.{k}", 0.0) for k in SCREW])
+
+
+def _sag(reading: NDArray, row: Row, given: Parameters) -> NDArray:
+    """The measured target sags with the size of the load, whatever its direction."""
+    sag = np.zeros(6)
+    sag[5] = -given["rate"] * np.linalg.norm(row.load[3:])
+    return reading + sag
+
+
+OUTSIDE_CHANGES: dict[str, Change] = {
+    "_pose_stiffness": _pose_stiffness,
+    "_humidity": _humidity,
+    "_quadratic_temperature": _quadratic_temperature,
+    "_second_harmonic": _second_harmonic,
+}
+OUTSIDE_READINGS: dict[str, Moved] = {"_stand": _stand, "_sag": _sag}
+OUTSIDE_COVARIATES: dict[str, tuple[str, ...]] = {
+    "_humidity": ("humidity",),
+    "_quadratic_temperature": ("temperature",),
+}
+OUTSIDE = {
+    "_pose_stiffness": "a drive is softer in some poses than in others",
+    "_humidity": "links swell with the humidity",
+    "_quadratic_temperature": "links grow with the square of the temperature",
+    "_second_harmonic": "an encoder's error repeats twice a turn",
+    "_stand": "the measuring device's stand yields with the square of the load",
+    "_sag": "the measured target sags with the size of the load",
+}

@@ -1,0 +1,312 @@
+"""The same machine with springs at its beams' tips, all rows of a campaign at once.
+
+A second program, for campaigns by the hundred.  Motions are finite and the equilibrium
+is found on the deformed machine, as in the multibody simulation; a beam is its
+compliance at its tip instead of elements, which differs where a beam bends so far that
+it is no spring any more.  Play in closed loops is left to the multibody simulation.
+
+Unknown are the passive joints' motions q and the wrench l of each closure.  Given them,
+every spring gives way under what it carries, the frames follow, and what is left is
+
+    r = what each closure leaves open,        t = moments about passive joints' axes.
+
+Newton's step uses the nominal posture, as springs hardly move: with a_j the axis of
+joint j and s_kj = +1, -1 on the closure's first and second chain,
+
+    [ -S       -(s a) ] [ dl ]     [ r ]
+    [ (s a)^T    0    ] [ dq ] = - [ t ]
+
+S the compliance met by each pair of closures.  Steps are of least norm: idle rotations
+stay, and overconstrained rigid loops share as little as they can.  Screws and wrenches
+are read at the base origin in base axes unless said otherwise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from assembly.links import link_compliance
+from assembly.robot import BeamLink, Frame, Robot
+from stiffness.beam import declared_section
+from validation.multibody.beams import beam_span
+from validation.multibody.simulation import SimulationFailed
+from validation.synthetic.effects import Machine, Rest
+
+_STEPS = 60
+_STILL = 1e-12  # [rad, m] of the last step
+_LOST = 1e3  # [rad, m] of a coordinate: the steps diverge
+_RANK = 1e-10  # singular values below it, relative, are of idle motions
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Machines of one structure taken apart; k machines of n frames.
+
+    Attributes:
+        robot: one of theirs.
+        placed: (k, n, 4, 4) each frame with its error, seen from its parent.
+        compliances: (2, k, n, 6, 6) of links and of joints, at the frame, in its axes.
+        nominal: (k, n, 4, 4) frames of the robot as drawn.
+        passive: rows whose motion is free.
+        pairs: (closures, 2) rows.
+        signs: (closures, n) +1 on the first chain, -1 on the second.
+        shut: (k, closures, 4, 4) second frame seen from the first, nominally.
+    """
+
+    robot: Robot
+    placed: NDArray
+    compliances: NDArray
+    nominal: NDArray
+    passive: list[int]
+    pairs: NDArray
+    signs: NDArray
+    shut: NDArray
+
+
+def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
+    """Equilibria of machines whose links are springs.
+
+    Args:
+        machines: of one structure, without play in their joints.
+
+    Returns:
+        Where everything of each is.
+
+    Raises:
+        SimulationFailed: a joint plays, or there is no equilibrium.
+    """
+    robot = machines[0].robot
+    if any(f.clearance is not None for m in machines for f in m.robot.frames):
+        raise SimulationFailed(robot.name, "play in closed loops is not for springs")
+    q = np.array([
+        [m.coordinates.get(f.name, 0.0) for f in m.robot.frames] for m in machines
+    ])
+    parts = _taken_apart(machines, q)
+    newton, unit = _newton(parts, q)
+    size = 6 * len(parts.pairs)
+    wrenches = np.zeros((len(q), len(parts.pairs), 6))
+    screws = np.zeros((2, *q.shape, 6))
+    ends = _forward(parts, q, screws)
+    for _ in range(_STEPS):
+        carried = _carried(machines, parts, ends, wrenches)
+        read = _at_frames(ends, carried)
+        new = np.einsum("skaij,skaj->skai", parts.compliances, read)
+        still = np.abs(new - screws).max() < _STILL
+        screws = new
+        ends = _forward(parts, q, screws)
+        left = _left_open(parts, ends[1]).reshape(len(q), size)
+        axes = _axes(parts, ends[1])
+        moments = np.einsum("kai,kai->ka", axes, carried[1][:, parts.passive])
+        residual = np.concatenate([left, unit * moments], axis=1)
+        move = np.einsum("kij,kj->ki", newton, residual)
+        wrenches = wrenches + move[:, :size].reshape(wrenches.shape) / unit
+        q[:, parts.passive] += move[:, size:]
+        if not np.abs(q).max() < _LOST:
+            break
+        open_ = max(np.abs(left).max(initial=0), np.abs(move[:, size:]).max(initial=0))
+        if still and open_ < _STILL:
+            return [Rest(*one) for one in zip(ends[1], read[1], screws[1], strict=True)]
+    raise SimulationFailed(robot.name, "springs do not come to rest")
+
+
+def _taken_apart(machines: Sequence[Machine], q: NDArray) -> _Parts:
+    """Compliances, places and chains of machines."""
+    robot = machines[0].robot
+    drawn = _placements(np.array([
+        [[*f.rotation, *f.translation] for f in m.robot.frames] for m in machines
+    ]))  # fmt: skip
+    placed = drawn @ _placements(np.array([m.robot.errors for m in machines]))
+    nominal = _chained(robot, drawn, np.broadcast_to(np.eye(4), drawn.shape), q)
+    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    on_path = robot.on_path.astype(float)
+    signs = [on_path[a] - on_path[b] for a, b in pairs]
+    first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
+    shut = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
+    passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
+    known: dict[int, tuple[NDArray, NDArray]] = {}  # frames are shared among rows
+    for frame in (f for m in machines for f in m.robot.frames):
+        if id(frame) not in known:
+            known[id(frame)] = _compliances(frame)
+    compliances = [[known[id(f)] for f in m.robot.frames] for m in machines]
+    return _Parts(
+        robot, placed, np.moveaxis(np.array(compliances), 2, 0), nominal, passive,
+        np.stack([first, second], axis=1), np.reshape(signs, (-1, q.shape[1])), shut,
+    )  # fmt: skip
+
+
+def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
+    """(6, 6) of a frame's link and of its joint."""
+    joint = np.zeros((6, 6))
+    if frame.joint_stiffness is not None:
+        soft = np.ix_(*[np.isfinite(np.diag(frame.joint_stiffness))] * 2)
+        joint[soft] = np.linalg.inv(frame.joint_stiffness[soft])
+    link = np.zeros((6, 6)) if frame.link is None else link_compliance(frame)
+    return link, joint
+
+
+def _placements(screws: NDArray) -> NDArray:
+    """(..., 4, 4) of rotation vectors and translations (..., 6)."""
+    T = np.zeros((*screws.shape[:-1], 4, 4))
+    turns = Rotation.from_rotvec(screws[..., :3].reshape(-1, 3)).as_matrix()
+    T[..., :3, :3] = turns.reshape(*screws.shape[:-1], 3, 3)
+    T[..., :3, 3] = screws[..., 3:]
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def _chained(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
+    """(k, n, 4, 4) frames; a step leads to each body's end, another through its joint.
+
+    Args:
+        robot: whose tree it is.
+        steps: (k, n, 4, 4) from the parent's joint.
+        ends: (k, n, 4, 4) what comes then, before the joint's own motion.
+        q: (k, n) [rad or m] the joints' own motions.
+
+    Returns:
+        Frames before their own motion, seen from the base.
+    """
+    own = np.zeros((*q.shape, 6))
+    for i, frame in enumerate(robot.frames):
+        if frame.joint != "fixed":
+            own[:, i, frame.own_axis] = q[:, i]
+    motions, T = _placements(own), np.zeros_like(steps)
+    after = np.zeros_like(steps)
+    for i, parent in enumerate(robot.parents):
+        T[:, i] = steps[:, i] @ ends[:, i]
+        if parent >= 0:
+            T[:, i] = after[:, parent] @ T[:, i]
+        after[:, i] = T[:, i] @ motions[:, i]
+    return T
+
+
+def _forward(parts: _Parts, q: NDArray, screws: NDArray) -> NDArray:
+    """(2, k, n, 4, 4) frames at the bodies' ends, and behind the joints' springs."""
+    links, joints = _placements(screws)
+    before = _chained(parts.robot, parts.placed @ links, joints, q)
+    return np.stack([before @ np.linalg.inv(joints), before])
+
+
+def _maps(T: NDArray) -> NDArray:
+    """(..., 6, 6) from screws in frames' axes to the base."""
+    R, p = T[..., :3, :3], T[..., :3, 3]
+    A = np.zeros((*T.shape[:-2], 6, 6))
+    A[..., :3, :3] = A[..., 3:, 3:] = R
+    A[..., 3:, :3] = np.cross(p[..., None, :], np.swapaxes(R, -1, -2)).swapaxes(-1, -2)
+    return A
+
+
+def _axes(parts: _Parts, T: NDArray) -> NDArray:
+    """(k, passive, 6) screws of unit motions."""
+    own = [parts.robot.frames[i].own_axis for i in parts.passive]
+    maps = _maps(T[:, parts.passive])
+    columns = [maps[:, k, :, axis] for k, axis in enumerate(own)]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(T), 0, 6))
+
+
+def _newton(parts: _Parts, q: NDArray) -> tuple[NDArray, float]:
+    """Inverses of the matrix of the head, and the compliance that scales wrenches."""
+    # rows of one configuration and the same springs have the same matrix
+    told_apart = np.hstack([
+        q,
+        parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
+    ])
+    first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)[
+        1:
+    ]
+    nominal, C = parts.nominal[first], parts.compliances.sum(axis=0)[first]
+    machines, passive = len(first), len(parts.passive)
+    size = 6 * len(parts.pairs)
+    maps, s = _maps(nominal), parts.signs
+    met = maps @ C @ np.swapaxes(maps, -1, -2)
+    S = np.einsum("an,bn,knij->kaibj", s, s, met, optimize=True)
+    S = S.reshape(machines, size, size)
+    axes = _axes(parts, nominal)
+    # a closure's wrench passes a joint if the joint is on one of its chains only
+    A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
+    A = A.reshape(machines, size, passive)
+    diagonal = np.diagonal(S, axis1=1, axis2=2)
+    unit = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1e-8
+    M = np.zeros((machines, size + passive, size + passive))
+    M[:, :size, :size] = -S / unit
+    M[:, :size, size:] = -A
+    M[:, size:, :size] = np.swapaxes(A, 1, 2)
+    return -np.linalg.pinv(M, rcond=_RANK)[same.ravel()], unit
+
+
+def _carried(
+    machines: Sequence[Machine], parts: _Parts, ends: NDArray, closing: NDArray
+) -> NDArray:
+    """(2, k, n, 6) wrenches through each body's end and through its joint."""
+    robot, (bodies, before) = parts.robot, ends
+    carried = np.zeros((2, *before.shape[:2], 6))
+    platform = robot.index(robot.platform)
+    loads = np.array([m.load for m in machines])
+    carried[1, :, platform] += _at_base(loads, before[:, platform, :3, 3])
+    for k, (a, b) in enumerate(parts.pairs):
+        carried[1, :, a] += closing[:, k]
+        carried[1, :, b] -= closing[:, k]
+    gravity = np.array([m.gravity for m in machines])
+    if gravity.any():
+        _weigh(machines, gravity, bodies, carried)
+    for i in range(before.shape[1] - 1, -1, -1):  # parents come first
+        carried[0, :, i] += carried[1, :, i]
+        if robot.parents[i] >= 0:
+            carried[1, :, robot.parents[i]] += carried[0, :, i]
+    return carried
+
+
+def _weigh(
+    machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
+) -> None:
+    """Weights of the first machine's bodies; a beam's at its ends, with end moments."""
+    parents = machines[0].robot.parents
+    for i, frame in enumerate(machines[0].robot.frames):
+        R, tip = bodies[:, i, :3, :3], bodies[:, i, :3, 3]
+        centre = tip + R @ frame.centre_of_mass
+        carried[0, :, i] += _at_base(_force(frame.mass * gravity), centre)
+        link = frame.link
+        if not isinstance(link, BeamLink) or link.density is None:
+            continue
+        length, x = beam_span(frame, link)
+        line = R @ (x / np.linalg.norm(x) * length)
+        section = declared_section(link.section, link.poisson)
+        weight = link.density * section.area * length * gravity
+        couple = np.cross(line, weight) / 12
+        half = _force(weight / 2)
+        half[:, :3] = -couple
+        carried[0, :, i] += _at_base(half, tip)
+        half[:, :3] = couple
+        if parents[i] >= 0:
+            carried[1, :, parents[i]] += _at_base(half, tip - line)
+
+
+def _force(vectors: NDArray) -> NDArray:
+    """(k, 6) wrenches of forces (k, 3)."""
+    return np.concatenate([np.zeros_like(vectors), vectors], axis=1)
+
+
+def _at_base(wrenches: NDArray, points: NDArray) -> NDArray:
+    """(k, 6) wrenches at points, read at the base origin."""
+    moments = wrenches[:, :3] + np.cross(points, wrenches[:, 3:])
+    return np.concatenate([moments, wrenches[:, 3:]], axis=1)
+
+
+def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
+    """(..., 6) wrenches read at frames, in their axes."""
+    return np.einsum("...ij,...i->...j", _maps(T), wrenches)
+
+
+def _left_open(parts: _Parts, before: NDArray) -> NDArray:
+    """(k, closures, 6) [rad, m] of second frames from where they should be."""
+    first, second = parts.pairs.T
+    target, T = before[:, first] @ parts.shut, before[:, second]
+    turn = (T[..., :3, :3] @ np.swapaxes(target[..., :3, :3], -1, -2)).reshape(-1, 3, 3)
+    angles = Rotation.from_matrix(turn).as_rotvec() if len(turn) else np.zeros((0, 3))
+    angles = angles.reshape(*T.shape[:2], 3)
+    p = T[..., :3, 3]
+    shift = p - target[..., :3, 3] + np.cross(p, angles)
+    return np.concatenate([angles, shift], axis=-1)
