@@ -280,12 +280,8 @@ def test_what_cannot_be_done_is_said_before_any_work(tmp_path, small, run):  # n
 # simulated campaigns
 
 
-# no load reaches the drive it softens: what shows is load times displaced arm alone
-SECOND_ORDER = {"drive_compliance"}
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(TRUTH.keys() - SECOND_ORDER))
+@pytest.mark.parametrize("name", sorted(TRUTH))
 def test_campaigns_of_the_simulation_are_understood(name):
     """The verdict and the effects as the simulation's side accepts them."""
     truth = TRUTH[name]

@@ -88,6 +88,10 @@ def hypothesis(effect, frame, name, unknown):
 BEAM = BeamLink({"radius": 0.03}, 70e9, 0.33)
 LONGER = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4))
 WARMER = hypothesis("thermal_expansion", "tip", "tip", Unknown("", 1e-5, -5e-4, 5e-4))
+TURNED = hypothesis("encoder_offset", "drive", "drive", Unknown("", 1e-4))
+ECCENTRIC = hypothesis(
+    "encoder_eccentricity", "drive", "drive.cosine", Unknown("cosine", 1e-4)
+)
 SOFTER = hypothesis(
     "drive_compliance", "drive", "drive.compliance", Unknown("compliance", 1e-6, 0, 1)
 )
@@ -149,6 +153,8 @@ def test_a_drive_that_turns_against_its_load_is_rigid():
     campaign = bar([0, 0, M, 0, 0, 0], seen)
     fit = refit(campaign, conditions_of(campaign), [SOFTER], np.array([1e-6]))
     assert fit.values == pytest.approx([0.0], abs=1e-9)
+    assert fit.effects == {"drive_compliance": {}}
+    assert fit.parameters(0) == []
 
 
 # the measurement that would decide
@@ -165,8 +171,11 @@ def test_another_temperature_tells_heat_from_length():
     plain = bar(link=BEAM, **heat)
     campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
     here = conditions_of(campaign)
-    rivals = [refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)]
-    found = next_measurement(campaign, here, rivals)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    # a rival that is the fit itself, or nothing else, cannot be told from it
+    found = next_measurement(campaign, here, longer, [longer, warmer])
     assert found.covariates == {"temperature": T + 10}
     d = alpha * LENGTH * 10 / SIGMA[3]
     assert found.power == pytest.approx(d**2 / (1 + ((T + 10) / T) ** 2 / R), rel=1e-3)
@@ -178,4 +187,24 @@ def test_nothing_decides_between_one_explanation_and_itself():
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
     fit = refit(campaign, here, [LONGER], np.zeros(1))
-    assert next_measurement(campaign, here, [fit, fit]) is None
+    assert next_measurement(campaign, here, fit, [fit]) is None
+
+
+def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
+    """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
+
+    Between, they differ by e (1 - cos q) in the direction of either, of information
+    I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
+    """
+    e = 3e-4
+    seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
+    campaign = bar(rows=2, spread=2 * np.pi, measured=seen)
+    here = conditions_of(campaign)
+    turned = refit(campaign, here, [TURNED], np.zeros(1))
+    eccentric = refit(campaign, here, [ECCENTRIC], np.zeros(1))
+    found = next_measurement(campaign, here, turned, [eccentric])
+    q = found.configuration["q.drive"]
+    assert abs(q - np.pi) < 0.2
+    information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
+    power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
+    assert found.power == pytest.approx(power, rel=1e-3)

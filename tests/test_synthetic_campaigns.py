@@ -233,6 +233,10 @@ def test_what_cannot_be_hidden_is_refused():
     rng = np.random.default_rng(0)
     with pytest.raises(NotApplicable):
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
+    # loads too small to show it; a drive none reaches is the same
+    away = Design(configurations=8, rows=40, load=1e-3)
+    with pytest.raises(NotApplicable, match="hardly show it"):
+        quick({"drive_compliance": 5.0}, design=away)
     with pytest.raises(BadInput, match='found "gravity"'):
         draw_effect("gravity", two_axes(), 1.0, rng)
     with pytest.raises(BadInput, match="configurations"):

@@ -7,7 +7,7 @@ Sources:
 from dataclasses import replace
 
 from assembly.conditions import Conditions, ContactLaw
-from assembly.effects.effect import Effect, Unknown, Values
+from assembly.effects.effect import RIGID, Effect, Unknown, Values
 from assembly.effects.places import drives, own_unit
 from assembly.robot import Robot
 
@@ -30,7 +30,7 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
     for key, give in values.items():
         name, _, kind = key.rpartition(".")
         exponent = values.get(f"{name}.exponent", 1.5)
-        if kind == "give" and give > 0:
+        if kind == "give" and give > RIGID:
             found[f"{name}.coefficient"] = give**-exponent
             found[f"{name}.exponent"] = exponent
     return found

@@ -7,7 +7,7 @@ from assembly.conditions import Conditions
 from assembly.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-18  # [rad/(N m), m/N] a fitted compliance below it is none
+RIGID = 1e-12  # [rad/(N m), m/N] a fitted compliance below it is none
 
 
 @dataclass(frozen=True)

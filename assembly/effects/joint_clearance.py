@@ -9,6 +9,7 @@ from assembly.effects.places import with_frame
 from assembly.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
+_TIGHT = 1e-9  # [m, rad] play below it is none
 
 
 def moving_joints(robot: Robot) -> tuple[str, ...]:
@@ -36,6 +37,11 @@ def _apply(here: Conditions, values: Values) -> Conditions:
     return here
 
 
+def _public(robot: Robot, values: Values) -> dict[str, float]:
+    """The play; a joint found tight has none."""
+    return {key: size for key, size in values.items() if size > _TIGHT}
+
+
 def _unit(robot: Robot, name: str) -> str:
     return "rad" if name.endswith(".tilt") else "m"
 
@@ -52,5 +58,6 @@ JOINT_CLEARANCE = Effect(
         Unknown("axial", 2e-5, 0.0, 1e-2),
         Unknown("tilt", 2e-4, 0.0, 0.2),
     ),
+    public=_public,
     linear=False,
 )  # fmt: skip

@@ -152,14 +152,13 @@ def diagnose(campaign: Campaign) -> Diagnosis:
 class _Selection:
     """Sets of hypotheses with their scores, the best fitted in the full model.
 
-    ``rival`` is the best fit of other effects than the best set's, None if no other
-    set is worth listing.
+    ``rivals`` are fits of other effects than the best set's, likeliest first.
     """
 
     screen: Screen
     sets: list[Scored]
     fit: Fit
-    rival: Fit | None
+    rivals: tuple[Fit, ...]
     unknowns: int
     tangents: Tangents
 
@@ -221,20 +220,21 @@ def _select(campaign: Campaign, here: Conditions) -> _Selection:
     if adds_play(here, chosen.hypotheses):
         chosen = in_full(campaign, here, chosen)
     unknowns = sets[0].rank + 6 * len(nuisance)
-    rival = _rival(screen, sets, fits)
-    return _Selection(screen, sets, chosen, rival, unknowns, tangents)
+    rivals = _rivals(screen, sets, fits)
+    return _Selection(screen, sets, chosen, rivals, unknowns, tangents)
 
 
-def _rival(
+def _rivals(
     screen: Screen, sets: Sequence[Scored], fits: dict[tuple[int, ...], Fit]
-) -> Fit | None:
-    """The best fit of effects that do not contain the best set's, nor it them."""
-    own = {screen.effects[i] for i in sets[0].members}
+) -> tuple[Fit, ...]:
+    """The best fits of sets of effects that do not contain the best's, nor it them."""
+    own = frozenset(screen.effects[i] for i in sets[0].members)
+    found: dict[frozenset[str], Fit] = {}
     for one in sets:
-        other = {screen.effects[i] for i in one.members}
+        other = frozenset(screen.effects[i] for i in one.members)
         if one.members in fits and not (own <= other or other <= own):
-            return fits[one.members]
-    return None
+            found.setdefault(other, fits[one.members])
+    return tuple(found.values())
 
 
 def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
@@ -270,7 +270,7 @@ def _with_fits(
     for one in sets:
         fit = fits.get(one.members)
         scored.append(one if fit is None else screen.rescored(one, fit.rss, one.values))
-    scored.sort(key=lambda s: -s.score)
+    scored.sort(key=screen.order)
     best = next(s for s in scored if s.members in fits)
     return [best, *(s for s in scored if s is not best)]
 
@@ -373,8 +373,8 @@ def _judge(
     if said == "outside_library":
         left = tuple(trends(fitting, here.take(used), residual_after[used]))
     further = None
-    if said == "ambiguous" and found.rival is not None:
-        further = next_measurement(fitting, here.take(used), [found.fit, found.rival])
+    if said == "ambiguous":
+        further = next_measurement(fitting, here.take(used), found.fit, found.rivals)
     held = ~parts.fitted & ~outliers
     if not held.any():
         held = used

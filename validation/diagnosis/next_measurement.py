@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from assembly.conditions import Conditions
 from assembly.effects import apply_effects
+from assembly.posture import POSE, place_many_joints, pose_components
 from assembly.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.refit import Fit
@@ -29,6 +30,7 @@ _TRIED = 240  # situations looked at
 _FURTHER = 1.5  # of the range of loads and covariates used so far
 _STEP = 1e-3
 _AS_GOOD = 0.97
+_DECIDES = 1.0  # [-] least non-centrality worth a measurement
 
 
 @dataclass(frozen=True)
@@ -51,57 +53,66 @@ class NextMeasurement:
 
 
 def next_measurement(
-    campaign: Campaign, here: Conditions, rivals: Sequence[Fit]
+    campaign: Campaign, here: Conditions, fit: Fit, rivals: Sequence[Fit]
 ) -> NextMeasurement | None:
-    """The measurement that would decide between two fits.
+    """The measurement that would decide between a fit and its likeliest rival.
 
-    Looked for over the configurations measured so far (they can be reached), with loads
-    and covariates within half as much again of their ranges.
+    Looked for over the configurations measured so far and others between any two of
+    them that the robot can reach, with loads and covariates within half as much again
+    of their ranges.  A rival that nothing tells from the fit (a longer bar and a turned
+    encoder may be the same) leaves the question to the next.
 
     Args:
         campaign: what was measured.
         here: its conditions, as declared and registered.
-        rivals: two explanations, fitted.
+        fit: the best explanation.
+        rivals: others, likeliest first.
 
     Returns:
-        The measurement, None if none of those tried tells them apart.
+        The measurement, None if none of those tried tells any rival from the fit.
     """
     there = _situations(here)
     sigma = np.nanmedian(campaign.sigma, axis=0)
-    models = [_model(there, fit, sigma) for fit in rivals[:2]]
-    if any(not np.isfinite(m[0]).all() for m in models):
-        return None
-    (a, Ja), (b, Jb) = models
-    powers = np.minimum(
-        _power(a - b, Jb, rivals[1].covariance), _power(b - a, Ja, rivals[0].covariance)
-    )
-    # among situations as good as the best, the one that asks for the least load
-    good = powers >= _AS_GOOD * powers.max()
     size = np.abs(there.load).sum(axis=1)
-    best = int(np.argmin(np.where(good, size, np.inf)))
-    if powers[best] < 1.0:
-        return None
-    names = [" + ".join(sorted(fit.effects)) for fit in rivals[:2]]
+    a, Ja = _model(there, fit, sigma)
+    for rival in rivals:
+        b, Jb = _model(there, rival, sigma)
+        powers = np.minimum(
+            _power(a - b, Jb, rival.covariance), _power(b - a, Ja, fit.covariance)
+        )
+        powers = np.where(np.isfinite(powers), powers, 0.0)
+        # among situations as good as the best, the one that asks for the least load
+        good = powers >= _AS_GOOD * powers.max()
+        best = int(np.argmin(np.where(good, size, np.inf)))
+        if powers[best] >= _DECIDES:
+            return _measurement(campaign, there, best, float(powers[best]), fit, rival)
+    return None
+
+
+def _measurement(
+    campaign: Campaign, there: Conditions, best: int, power: float, fit: Fit, rival: Fit
+) -> NextMeasurement:
+    """One of the situations tried, in words and numbers."""
+    names = [" + ".join(sorted(one.effects)) for one in (fit, rival)]
     covariates = {
         name: float(getattr(there, name)[best])
         for name in ("temperature", "approach")
         if np.isfinite(getattr(there, name)[best])
     }
     why = (
-        f"{names[0]} and {names[1]} then differ by {np.sqrt(powers[best]):.1f} "
+        f"{names[0]} and {names[1]} then differ by {np.sqrt(power):.1f} "
         "standard deviations in one reading"
     )
     return NextMeasurement(
         why, _configuration(campaign, there, best),
-        tuple(there.load[best].tolist()), covariates, float(powers[best]),
+        tuple(there.load[best].tolist()), covariates, power,
     )  # fmt: skip
 
 
 def _situations(here: Conditions) -> Conditions:
-    """Situations to choose from: reached configurations, wider loads and covariates."""
+    """Situations to choose from: within reach, loads and covariates wider."""
     rng = np.random.default_rng(0)
-    rows = rng.integers(0, len(here), _TRIED)
-    there = here.take(rows)
+    there = _between(here.take(rng.integers(0, len(here), _TRIED)), rng)
     largest = np.abs(here.load).max(axis=0)
     corner = rng.choice([-1.0, 0.0, 1.0], (_TRIED, 6))
     temperature = there.temperature
@@ -118,6 +129,26 @@ def _situations(here: Conditions) -> Conditions:
         load=_FURTHER * corner * largest,
         temperature=temperature,
         approach=approach,
+    )
+
+
+def _between(there: Conditions, rng: np.random.Generator) -> Conditions:
+    """Half of the configurations moved towards others, where the robot can follow."""
+    if there.rest is not None:  # where play rests is known for measured ones only
+        return there
+    actuated = np.array([frame.actuated for frame in there.robot.frames])
+    q = np.where(actuated, there.coordinates, np.nan)
+    count = len(there) // 2
+    part = rng.uniform(0.0, 1.0, (count, 1))
+    q[:count] += part * (q[-count:] - q[:count])
+    postures, _ = place_many_joints(there.robot, q[:count])
+    coordinates, transforms = there.coordinates.copy(), there.transforms.copy()
+    for i, posture in enumerate(postures):
+        if posture is not None:
+            coordinates[i], transforms[i] = posture.coordinates, posture.transforms
+    # second orders of the declared errors are in both models, and not known elsewhere
+    return replace(
+        there, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
 
 
@@ -154,8 +185,6 @@ def _configuration(campaign: Campaign, there: Conditions, row: int) -> dict[str,
             if frame.actuated
         }
     pose = there.take([row]).postures.platform[0]
-    from assembly.posture import POSE, pose_components
-
     return {
         f"pose.{name}": float(v)
         for name, v in zip(POSE, pose_components(pose), strict=True)

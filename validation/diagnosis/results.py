@@ -68,9 +68,12 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
     for k, h in enumerate(found.fit.hypotheses):
         if h.effect not in found.best_by_score:
             continue  # a device's frame fitted anyway, or finite motions beside others
+        parameters = found.fit.parameters(k)
+        acting = {n for name, *_ in parameters for n in (name, name.rpartition(".")[0])}
         shown.append({
             "name": h.effect,
-            "where": list(h.where),
+            # frames found rigid or tight have no parameter left
+            "where": [frame for frame in h.where if frame in acting],
             "probability": found.probability.get(h.effect, 0.0),
             "parameters": [
                 {
@@ -80,7 +83,7 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
                     "interval_90": [value - 1.645 * std, value + 1.645 * std],
                     "unit": LIBRARY[h.effect].unit(robot, name),
                 }
-                for name, value, std in found.fit.parameters(k)
+                for name, value, std in parameters
             ],
         })
     return shown

@@ -29,6 +29,7 @@ from validation.diagnosis.signatures import Signature
 _WAYS = 2  # ways of each effect that are tried in pairs, beside its most general
 _BEST = 8  # sets of each size that are enlarged by anything
 _APART = 1e-3  # sine of the angle between a column and those before it
+_DIGITS = 2  # of a score; refits of one model reached by two ways differ below
 _RANK = 1e-9  # relative eigenvalue below which columns are one
 
 
@@ -190,12 +191,19 @@ class Screen:
             self._enlarge(
                 found, {(*s.members, j) for s in best[:_BEST] for j in chosen}
             )
-        return sorted(found.values(), key=self._order)
+        return sorted(found.values(), key=self.order)
 
-    def _order(self, one: Scored) -> tuple[float, int]:
-        """Best score first; of equal ones, the one that acts at fewer frames."""
+    def order(self, one: Scored) -> tuple[float, int]:
+        """Best score first; of equal ones, the one that acts at fewer frames.
+
+        Args:
+            one: a set.
+
+        Returns:
+            What to sort sets by.
+        """
         where = sum(len(self.signatures[i].hypothesis.where) for i in one.members)
-        return -round(one.score, 6), where
+        return -round(one.score, _DIGITS), where
 
     def _enlarge(
         self, found: dict[tuple[int, ...], Scored], sets: set[tuple[int, ...]]

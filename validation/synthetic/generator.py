@@ -22,13 +22,14 @@ from assembly.robot_file import write_robot
 from stiffness.reading import BadInput
 from stiffness.writing import check_writable
 from validation.synthetic.design import Design, Plan, plan_campaign
-from validation.synthetic.draws import draw_effect, strengthened
+from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row
 from validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
 _CLOSE = 0.05  # relative, of a strength to the one asked for
+_MOST = 100.0  # times its plausible size: an effect that needs more hardly acts here
 _SMALL = 1e-2  # scale of errors and load at which the machine is linear
 _BLUNDER = 40.0  # [-] sigmas of an outlier
 
@@ -120,7 +121,8 @@ def generate_campaign(
 
     Raises:
         BadInput: an unknown effect, or a design that the robot cannot do.
-        NotApplicable: the robot has nothing that an effect could act on.
+        NotApplicable: the robot has nothing that an effect could act on, or the
+            readings hardly show it.
         SimulationFailed: a row has no equilibrium.
     """
     design, noise = design or Design(), noise or Noise()
@@ -193,6 +195,11 @@ def _as_strong_as(
         if abs(reached / multiple - 1.0) < _CLOSE:
             break
         factor *= multiple / reached
+        if factor > _MOST:
+            raise NotApplicable(
+                f"{effect.name}: {multiple:g} times the noise takes over {_MOST:g} "
+                "times its plausible size; the robot or its loads hardly show it"
+            )
     return tried, exact, sigma
 
 
