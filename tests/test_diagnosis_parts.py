@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
@@ -20,10 +21,11 @@ from validation.diagnosis.signatures import conditions_of
 LENGTH = 0.8
 
 
-def bar(load=None, measured=None, link=None, rows=8, spread=2.0, **covariates):
+def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
+        **covariates):  # fmt: skip
     """A drive about z and a bar along x, at ``rows`` angles; readings, or zeros."""
     robot = Robot("bar", "tip", (
-        Frame("drive", joint="revolute", actuated=True),
+        Frame("drive", joint="revolute", actuated=True, joint_stiffness=spring),
         Frame("tip", "drive", [LENGTH, 0, 0], link=link),
     ))  # fmt: skip
     placed = [
@@ -155,6 +157,31 @@ def test_a_drive_that_turns_against_its_load_is_rigid():
     assert fit.values == pytest.approx([0.0], abs=1e-9)
     assert fit.effects == {"drive_compliance": {}}
     assert fit.parameters(0) == []
+
+
+def test_an_offset_beside_finite_motions_is_exact():
+    """The drive turns by a where K (a - e) = F L cos(q + a), far from straight."""
+    K, F, e = 2e3, 150.0, 4e-3
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * (a - e) - F * LENGTH * np.cos(b + a), -1, 1)
+        for b in q
+    ])
+    seen = np.zeros((8, 6))
+    seen[:, 2] = turn
+    seen[:, 3] = LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] = LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, spring=spring)
+    here = conditions_of(campaign)
+    finite = Hypothesis("geometric_stiffening", (), ())
+    fit = refit(campaign, here, [TURNED, finite], np.zeros(1))
+    assert fit.values == pytest.approx([e], rel=1e-4)
+    assert np.abs(fit.residual).max() < 0.5  # sigma
+    assert fit.conditions.exact
+    linear = refit(campaign, here, [TURNED], np.zeros(1))
+    assert abs(linear.values[0] - e) > 1e-4
 
 
 # the measurement that would decide

@@ -23,6 +23,9 @@ from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_FINITE = "geometric_stiffening"
+_MOST_DEFECTS = 5
+_SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
 _LOST = 1e3  # [sigma] a reading that the model has no answer for
 
 
@@ -161,6 +164,31 @@ def refit(
     Returns:
         The fit.
     """
+    linear = [h for h in members if h.effect != _FINITE]
+    if not linear or len(linear) == len(members):
+        return _refit(campaign, here, members, start)
+    # finite motions take a hundred times longer: their defect is fitted, not they
+    defect = np.zeros(int(campaign.cells.sum()))
+    for _ in range(_MOST_DEFECTS):
+        fit = _refit(campaign, here, linear, start, defect)
+        there = replace(fit.conditions, exact=True)
+        read = [
+            whiten(campaign, predict(at).deviation) for at in (fit.conditions, there)
+        ]
+        last, defect = defect, np.nan_to_num(read[1] - read[0])
+        start = fit.values
+        if np.abs(defect - last).max() < _SAME_DEFECT:
+            break
+    left = whiten(campaign, campaign.measured) - read[1]
+    left = np.where(np.isfinite(left), left, _LOST)
+    return replace(fit, hypotheses=tuple(members), residual=left, conditions=there)
+
+
+def _refit(
+    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
+    defect: NDArray | float = 0.0,
+) -> Fit:  # fmt: skip
+    """The fit of a model to which a constant ``defect`` (N,) is added."""
     slots = [slot for h in members for slot in h.slots]
     lower = np.array([slot.unknown.lower for slot in slots])
     upper = np.array([slot.unknown.upper for slot in slots])
@@ -168,7 +196,7 @@ def refit(
     size = np.array([
         max(slot.unknown.scale, abs(x)) for slot, x in zip(slots, x0, strict=True)
     ])
-    measured = whiten(campaign, campaign.measured)
+    measured = whiten(campaign, campaign.measured) - defect
 
     def there(x: NDArray) -> Conditions:
         effects: dict[str, Values] = dict(_public(members, x, here.robot))
