@@ -390,6 +390,9 @@ def sweep(
     yield_strength: Annotated[
         float | None, typer.Option(help="[Pa] of the links: their stress and safety.")
     ] = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes on this machine.", min=1)
     ] = None,
@@ -415,6 +418,9 @@ def sweep(
         robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
         seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
         linearisation=linearisation, near=near, yield_strength=yield_strength,
+        load=parse_load(load) or (0.0,) * 6,
+        gravity=parse_gravity(gravity) or (0.0,) * 3,
+        under=parse_covariates(under),
     )  # fmt: skip
     if workers is not None and scheduler is not None:
         raise BadInput("sweep: found --workers and --scheduler, expected one of them")

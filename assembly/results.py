@@ -71,7 +71,7 @@ def solution_of(
         answer = solve_assembly(posture, load, gravity=gravity)
         return results | _answer(answer, gravity)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
-        status = _STATUS[_kind(error)]
+        status = failure_status(error)
         return results | empty | {"status": status, "reason": str(error)}
 
 
@@ -148,7 +148,7 @@ def exact_of(
     try:
         answer = solve_exact(posture, load, gravity=gravity)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
-        return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
+        return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {
         "closure_residual": answer.closure_residual(),
         "reference_length": answer.linear.linearisation.size,
@@ -174,9 +174,16 @@ _STATUS = {
 }
 
 
-def _kind(error: Exception) -> type:
-    """Which of the known failures an error is."""
-    return next(kind for kind in _STATUS if isinstance(error, kind))
+def failure_status(error: Exception) -> str:
+    """The status of a posture without an answer.
+
+    Args:
+        error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
+
+    Returns:
+        In a few words.
+    """
+    return next(said for kind, said in _STATUS.items() if isinstance(error, kind))
 
 
 def exact_text(results: dict[str, Any]) -> str:
@@ -252,7 +259,7 @@ def pose_error_of(
             for name in readings if direction is not None
         }  # fmt: skip
     except (CannotAssemble, SolverFailed) as error:
-        return results | {"status": _STATUS[_kind(error)], "reason": str(error)}
+        return results | {"status": failure_status(error), "reason": str(error)}
     table = {
         one.reading: {
             "rotation": _bracket(one.rotation_error, one.rotation_screw),

@@ -66,11 +66,11 @@ class Singularities:
     def condition(self) -> NDArray:
         """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
 
-        For robots with as many drives as freedoms.
+        For robots with as many drives as freedoms; NaN without drives.
         """
         least, most = self.serial, self.parallel
         rest = np.sqrt((1 - least**2).clip(0.0) * (1 - most**2).clip(0.0))
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             return rest / (least * most)
 
     def names(self, robot: Robot, near: float) -> list[str]:

@@ -107,26 +107,24 @@ def crosscheck(
     from validation.playcheck import PlayCheck, playcheck
 
     scales, wrench = parse_scales(scale), parse_load(load)
-    g = parse_gravity(gravity)
+    g, covariates = parse_gravity(gravity), parse_covariates(under)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
     def compare(posture: Posture) -> Crosscheck | PlayCheck:
+        acting = act(posture, wrench, g, covariates)
+        at, pushes = acting.posture, acting.load.tolist()
+        weight = None if acting.gravity is None else acting.gravity.tolist()
         if clearances:
-            return playcheck(posture, scales, wrench, links, g, time_limit)
-        return compare_tight(posture, scales, wrench, links, g, time_limit)
+            return playcheck(at, scales, pushes, links, weight, time_limit)
+        return compare_tight(at, scales, pushes, links, weight, time_limit)
 
     if grid is not None:
         _crosscheck_grid(robot, grid, compare, json)
         return
-    acting = act(
-        declared_posture(robot, pose, joint), wrench, g, parse_covariates(under)
-    )
-    posture = acting.posture
-    wrench = acting.load.tolist()
-    g = None if acting.gravity is None else acting.gravity.tolist()
+    posture = declared_posture(robot, pose, joint)
     answer, failure = attempt(posture.robot.name, lambda: compare(posture))
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
@@ -151,8 +149,6 @@ def _crosscheck_grid(
     from validation.poses import check_poses, poses_table, poses_text
 
     machine, axes = load_robot(robot), parse_grid(grid)
-    if machine.effects:
-        raise BadInput(f"--grid: {robot} has effects, which act at one pose at a time")
     with progress_bars() as update:
         rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
     write_json(poses_table(rows), json)

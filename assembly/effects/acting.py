@@ -10,6 +10,7 @@ from assembly.conditions import Conditions, as_declared
 from assembly.effects import LIBRARY, apply_effects
 from assembly.posture import Posture
 from assembly.predict import assemble_row, read
+from assembly.robot import Robot
 from stiffness.reading import BadInput, nearest
 
 COVARIATES = ("temperature", "time", "approach")
@@ -62,23 +63,8 @@ def act(
             motions, which belong to ``exact``.
     """
     given = dict(covariates or {})
-    for name in given:
-        if name not in COVARIATES:
-            hint = nearest(name, COVARIATES)
-            raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
     effects = posture.robot.effects
-    if "geometric_stiffening" in effects and not finite:
-        raise BadInput(
-            f'{posture.robot.name}: effect "geometric_stiffening" asks for finite '
-            "motions; expected the command forcefit assembly exact"
-        )
-    for name in effects:
-        for needed in LIBRARY[name].needs:
-            if needed not in given:
-                raise BadInput(
-                    f'{posture.robot.name}: effect "{name}" depends on {needed}; '
-                    f"expected --under {needed}=NUMBER"
-                )
+    check_covariates(posture.robot, given, finite=finite)
     plain = replace(posture, robot=replace(posture.robot, effects={}))
     declared = as_declared(
         plain,
@@ -93,3 +79,35 @@ def act(
     if not effects:
         where = posture
     return Acting(where, here.load_at_origin()[0], g, here)
+
+
+def check_covariates(
+    robot: Robot, given: Mapping[str, float], *, finite: bool = False
+) -> None:
+    """Refuse effects that cannot be put to work with what is given.
+
+    Args:
+        robot: with the effects of its file.
+        given: covariates by name.
+        finite: whether the exact model is asked.
+
+    Raises:
+        BadInput: an unknown covariate, one that an effect needs and is not given, or
+            an effect that asks for finite motions.
+    """
+    for name in given:
+        if name not in COVARIATES:
+            hint = nearest(name, COVARIATES)
+            raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
+    if "geometric_stiffening" in robot.effects and not finite:
+        raise BadInput(
+            f'{robot.name}: effect "geometric_stiffening" asks for finite '
+            "motions; expected the command forcefit assembly exact"
+        )
+    for name in robot.effects:
+        for needed in LIBRARY[name].needs:
+            if needed not in given:
+                raise BadInput(
+                    f'{robot.name}: effect "{name}" depends on {needed}; '
+                    f"expected --under {needed}=NUMBER"
+                )

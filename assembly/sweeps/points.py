@@ -5,24 +5,31 @@ Points are solved in blocks.  A point that has no answer says why in its ``statu
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.closure import closure_signs
+from assembly.conditions import Conditions
 from assembly.energy import CannotAssemble
-from assembly.exact import solve_exact
+from assembly.exact import ExactAssembly
 from assembly.link_stress import peak_stresses
 from assembly.nominal import size_of
 from assembly.posture import Posture, place_many, place_many_joints
+from assembly.predict import assemble_row, read
 from assembly.robot import Robot
 from assembly.singularity import KINDS, find_singularities
 from assembly.solvers.batch import Energies, minimise_energies, zone_margins
 from assembly.solvers.batch_error import bound_pose_errors
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
+from assembly.sweeps.situations import (
+    assemble_situations,
+    is_loaded,
+    situations,
+)
 from assembly.sweeps.targets import goals_of, of_joints
 from stiffness.reading import BadInput
 from stiffness.screws import screw_map
@@ -176,16 +183,24 @@ def _solve_reached(
     errors: NDArray | None, found: Found, rows: NDArray,
 ) -> None:  # fmt: skip
     """Points whose posture exists; most of what fails is a status already."""
-    T = np.array([posture.transforms for posture in postures])
-    off = np.array([posture.mismatch for posture in postures])
     out = found.records
+    T = np.array([posture.transforms for posture in postures])
     _note_singularities(question, robot, T, found, rows)
+    here = situations(question, robot, postures, errors)
+    T, off = here.transforms, here.mismatch
+    if robot.effects:
+        robot, errors = here.robot, here.errors
+        perfect = robot.with_errors(np.zeros_like(robot.errors))
     failed: dict[int, str] = {}
     for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
         zone = zone_margins(robot, T, compliant, off, errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
-    energies = minimise_energies(robot, T, errors, off)
+    wrenches = None
+    if is_loaded(here):
+        energies, wrenches = assemble_situations(here)
+    else:
+        energies = minimise_energies(robot, T, errors, off)
     good = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
@@ -203,12 +218,15 @@ def _solve_reached(
         ("duality_gap", energies.gap),
     ):  # fmt: skip
         out[key][at] = values[good]
-    if question.wrenches:
+    if question.reads_otherwise and good:
+        out["reading"][at] = read(here.take(good), energies.platform_screw[good])
+    if wrenches is None and (question.wrenches or question.strength is not None):
+        wrenches = _wrenches(robot, T, energies)
+    if question.wrenches and wrenches is not None:
         chosen = [robot.index(name) for name in question.wrenches]
-        out["wrench"][at] = _wrenches(robot, T, energies, chosen)[good]
-    if question.strength is not None:
-        every = list(range(len(robot.frames)))
-        stress = peak_stresses(robot, _wrenches(robot, T, energies, every)[good])
+        out["wrench"][at] = wrenches[good][:, chosen]
+    if question.strength is not None and wrenches is not None:
+        stress = peak_stresses(robot, wrenches[good])
         out["stress"][at] = stress
         with np.errstate(divide="ignore"):
             out["safety"][at] = question.strength / stress.max(axis=1)
@@ -218,9 +236,7 @@ def _solve_reached(
         _bound(question, robot, T, errors, off, energies, found, rows)
     if question.linearisation:
         for i in good:
-            here = robot if errors is None else robot.with_errors(errors[i])
-            one = Posture(here, postures[i].coordinates, T[i], float(off[i]))
-            _compare_finite(one, found, int(rows[i]))
+            _compare_finite(here, i, found, int(rows[i]))
 
 
 def _note_singularities(
@@ -242,16 +258,13 @@ def _note_singularities(
             )
 
 
-def _wrenches(
-    robot: Robot, T: NDArray, energies: Energies, chosen: list[int]
-) -> NDArray:
-    """(k, frames, 6) [N m, N] wrench through the frames chosen, in their axes."""
+def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:
+    """(k, n, 6) [N m, N] wrench through every frame without loads, in its axes."""
     size = size_of(robot)
     closures = energies.multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
-    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot)[:, chosen], closures)
+    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot), closures)
     origin = T[:, None, robot.index(robot.platform), :3, 3]
-    frames = T[:, chosen]
-    paths = screw_map(frames[..., :3, 3] - origin, frames[..., :3, :3])
+    paths = screw_map(T[..., :3, 3] - origin, T[..., :3, :3])
     return np.einsum("kfji,kfj->kfi", paths, at_platform)
 
 
@@ -289,11 +302,13 @@ def _bound_play(
                 found.texts["reason"].setdefault(row, reason)
 
 
-def _compare_finite(posture: Posture, found: Found, row: int) -> None:
+def _compare_finite(here: Conditions, i: int, found: Found, row: int) -> None:
     """What the linear closures cost at a point."""
     out = found.records
     try:
-        gap = solve_exact(posture).linearisation_error
+        exact = assemble_row(replace(here, exact=True), i)
+        assert isinstance(exact, ExactAssembly)
+        gap = exact.linearisation_error
     except (SolverFailed, CannotAssemble) as error:
         # the linear answer stands: only what it is worth is not known
         found.texts["reason"][row] = f"linearisation error unknown: {error}"

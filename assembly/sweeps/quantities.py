@@ -1,7 +1,7 @@
 """What a sweep may ask at its points, and the table of numbers that it gets."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from assembly.statistics.distributions import ErrorSources
 
 STATUSES = (
-    "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot"
+    "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot",
+    "no equilibrium",
 )  # fmt: skip
 TEXTS = ("reason", "near_singularity")
 
@@ -38,6 +39,9 @@ class Question:
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
         strength: [Pa] yield strength of the links; stress and safety are then found.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        under: covariates that the robot's effects depend on.
     """
 
     robot: Robot
@@ -52,6 +56,14 @@ class Question:
     linearisation: bool = False
     near: float = 0.02
     strength: float | None = None
+    load: tuple[float, ...] = (0.0,) * 6
+    gravity: tuple[float, ...] = (0.0,) * 3
+    under: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def reads_otherwise(self) -> bool:
+        """Whether a measuring device reads something else than the platform's screw."""
+        return any(name in self.robot.effects for name in ("registration", "drift"))
 
 
 @dataclass(frozen=True)
@@ -101,6 +113,8 @@ def variables(question: Question) -> dict[str, Variable]:
         ),
         "condition": Variable({}, "1", "condition of the map from drives to platform"),
     }  # fmt: skip
+    if question.reads_otherwise:
+        table["reading"] = Variable(screw, "rad, m", "what a measuring device reads")
     for suffix, said in _bound_suffixes(question):
         for part, unit in (("rotation", "rad"), ("translation", "m")):
             table[f"{part}_error{suffix}"] = Variable(

@@ -1,19 +1,22 @@
 """A sweep asked for in words, checked before any work; what it found, summed up."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects.acting import check_covariates
 from assembly.link_stress import stressed_names
 from assembly.pose_error import READINGS
+from assembly.posture import home_posture
 from assembly.robot import Robot
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.quantities import Question
+from assembly.sweeps.situations import is_loaded, situations
 from assembly.sweeps.sweep import Sweep
 from assembly.sweeps.targets import (
     Targets,
@@ -23,6 +26,7 @@ from assembly.sweeps.targets import (
     read_targets,
 )
 from stiffness.reading import BadInput, nearest
+from stiffness.screws import WRENCH
 
 if TYPE_CHECKING:
     import xarray
@@ -43,6 +47,9 @@ def ask_sweep(
     linearisation: bool = False,
     near: float = 0.02,
     yield_strength: float | None = None,
+    load: Sequence[float] = (0.0,) * 6,
+    gravity: Sequence[float] = (0.0,) * 3,
+    under: Mapping[str, float] | None = None,
 ) -> Sweep:
     """The sweep that options of ``forcefit assembly sweep`` ask for.
 
@@ -60,6 +67,9 @@ def ask_sweep(
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
         yield_strength: [Pa] of the links, to find their stress and safety.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        under: covariates that effects of the robot's file depend on.
 
     Returns:
         The sweep, everything in it checked.
@@ -69,12 +79,13 @@ def ask_sweep(
     """
     said = {k: v for k, v in locals().items() if k != "robot"}
     machine = load_robot(robot)
-    if machine.effects:
-        names = ", ".join(machine.effects)
-        raise BadInput(
-            f"{robot}: found effects ({names}), which sweeps do not know; expected a "
-            "robot without [[effect]], or assembly solve at single postures"
-        )
+    under = dict(under or {})
+    check_covariates(machine, under)
+    said |= {
+        "load": _assigned((name.lower() for name in WRENCH), load),
+        "gravity": _assigned("xyz", gravity),
+        "under": ",".join(f"{k}={v:g}" for k, v in under.items()) or None,
+    }
     if (grid is None) == (poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
     if reading not in (*READINGS, "none"):
@@ -108,11 +119,23 @@ def ask_sweep(
     question = Question(
         machine, design, tuple(varied), targets.names, sources, seed,
         None if reading == "none" else reading, play_alone, tuple(wrench),
-        linearisation, near, yield_strength,
+        linearisation, near, yield_strength, tuple(load), tuple(gravity), under,
     )  # fmt: skip
+    _check_readings(question)
     return Sweep(
         question, targets, tuple(varied.values()), draws or 0, _command(robot, said)
     )
+
+
+def _check_readings(question: Question) -> None:
+    """Refuse to bound the pose error of a loaded robot: (27) has no load."""
+    home = situations(question, question.robot, [home_posture(question.robot)], None)
+    if is_loaded(home) and (question.reading or question.play_alone):
+        raise BadInput(
+            "--reading: the robot is loaded (--load, --gravity or an effect), and the "
+            "bounds of the pose error are those of an unloaded one; expected "
+            "--reading none, and no --play-alone"
+        )
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | None) -> Targets:
@@ -160,6 +183,12 @@ def _command(robot: str, options: Mapping[str, Any]) -> str:
         elif value not in (None, False) and value != default.get(key):
             words += [name, str(value)]
     return shlex.join(words)
+
+
+def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
+    """As on the command line, zeros left out; None if nothing is left."""
+    given = zip(names, values, strict=True)
+    return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
 def summary_of(data: "xarray.Dataset") -> dict[str, Any]:

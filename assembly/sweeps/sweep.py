@@ -143,6 +143,7 @@ class Sweep:
             "asked": " ".join(map(str, record_type(asked).names or ())),
             "wrenches": " ".join(asked.wrenches),
             "strength": str(asked.strength),
+            "situation": str((asked.load, asked.gravity, dict(asked.under))),
             "block": str(self.block_size),
         }
 
