@@ -96,7 +96,8 @@ def test_a_load_that_nothing_resists_is_a_status():
     """No drive holds: the robot moves as it is pushed."""
     robot = load_robot("five_bar")
     frames = tuple(
-        replace(f, actuated=False) if f.actuated else f for f in robot.frames
+        replace(f, actuated=False, joint_stiffness=None) if f.actuated else f
+        for f in robot.frames
     )
     falls = replace(robot, frames=frames)
     data = swept(falls, "tx=0:0.02:0.02,ty=0.13", load=(0, 0, 0, 100, 0, 0))
