@@ -102,7 +102,7 @@ def test_a_load_that_nothing_resists_is_a_status():
     falls = replace(robot, frames=frames)
     data = swept(falls, "tx=0:0.02:0.02,ty=0.13", load=(0, 0, 0, 100, 0, 0))
     assert set(data.status.values.astype(str).ravel()) == {"no equilibrium"}
-    assert "nothing resists" in str(data.reason.values.ravel()[0])
+    assert "no joint or spring resists" in str(data.reason.values.ravel()[0])
 
 
 def test_bounds_of_a_loaded_robot_and_missing_covariates_are_refused(tmp_path):
