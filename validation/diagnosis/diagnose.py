@@ -11,46 +11,25 @@ Order of things, each opened once:
 6. errors before and after on the rows kept aside.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.closure import virtual_joints
 from assembly.conditions import Conditions
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.effect import Values
-from assembly.predict import predict, settle, with_second_order
+from assembly.effects import apply_effects
+from assembly.predict import predict, with_second_order
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
-from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
-from validation.diagnosis.refit import (
-    Fit,
-    adds_play,
-    in_full,
-    refit,
-    resting,
-)
-from validation.diagnosis.registration import device_frame, register
+from validation.diagnosis.refit import Fit
+from validation.diagnosis.registration import register
 from validation.diagnosis.scoring import Scored, Screen, inclusion, named
-from validation.diagnosis.signatures import (
-    Signature,
-    Tangents,
-    conditions_of,
-    loaded_components,
-    whiten,
-)
+from validation.diagnosis.selection import Selection, select_with_play
+from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.verdict import by_names, verdict
-
-_ROUNDS = 4  # of refitting and scoring again
-_VISIBLE = 4.0  # squared whitened change of the readings
-_FEW = 3  # of the best sets are refitted
-_KINDS = 4  # sets of different effects that are refitted
-_NEAR = 6.0  # in score: sets this near the best are refitted too
 
 
 @dataclass(frozen=True)
@@ -139,7 +118,7 @@ def diagnose(campaign: Campaign) -> Diagnosis:
     outliers = np.zeros(len(campaign), dtype=bool)
     while True:
         used = parts.fitted & ~outliers
-        found = _select_with_play(campaign.take(used), here.take(used))
+        found = select_with_play(campaign.take(used), here.take(used))
         far = np.zeros_like(outliers)
         far[used] = outlying(campaign.take(used), found.fit.residual)
         if not far.any():
@@ -148,213 +127,9 @@ def diagnose(campaign: Campaign) -> Diagnosis:
     return _judge(campaign, here, parts, outliers, found)
 
 
-@dataclass(frozen=True, eq=False)
-class _Selection:
-    """Sets of hypotheses with their scores, the best fitted in the full model.
-
-    ``rivals`` are fits of other effects than the best set's, likeliest first.
-    """
-
-    screen: Screen
-    sets: list[Scored]
-    fit: Fit
-    rivals: tuple[Fit, ...]
-    unknowns: int
-    tangents: Tangents
-
-
-def _select_with_play(campaign: Campaign, here: Conditions) -> _Selection:
-    """Select, declared play held where it rests: as declared, then as found."""
-    # where play rests in closed chains is found row by row, too slowly for every trial
-    play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
-    if not play:
-        return _select(campaign, here)
-    found = _select(campaign, settle(here))
-    there = settle(apply_effects(here, found.fit.effects))
-    assert there.rest is not None
-    rest = there.rest[:, -len(here.robot.frames) :]
-    return _select(campaign, replace(here, rest=rest))
-
-
-def _select(campaign: Campaign, here: Conditions) -> _Selection:
-    """Score all small sets; refit the best; score again about it until it stays."""
-    tangents = Tangents(campaign, here)
-    nuisance = [device_frame(here)] if campaign.registration == "unknown" else []
-    candidates = hypotheses(here, loaded_components(campaign))
-    if nuisance:
-        candidates = [h for h in candidates if not _moves_base(h)]
-    signatures = [tangents.at_start(h) for h in candidates]
-    signatures = [s for s in signatures if _finite(s) and _shows(s)]
-    project = _projector([tangents.at_start(h) for h in nuisance])
-    best: tuple[Hypothesis, ...] = ()
-    rest: NDArray | None = None  # where play would rest in closed chains; slow to find
-    known: dict[object, Fit] = {}
-    for turn in range(_ROUNDS):
-        screen = Screen(
-            project(tangents.residual[:, None])[:, 0],
-            [_projected(s, project) for s in signatures],
-        )
-        sets = screen.search()
-        # near rivals and their parts too: a tangent may flatter a set that is larger
-        fits: dict[tuple[int, ...], Fit] = {}
-        for one in _worth_refitting(screen, sets):
-            members = [screen.signatures[i].hypothesis for i in one.members]
-            start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
-            every = [*nuisance, *members]
-            if adds_play(here, every):
-                rest = resting(here, every, start) if rest is None else rest
-                held = replace(here, rest=rest)
-                fits[one.members] = refit(campaign, held, every, start)
-                continue
-            if _names(every) not in known:
-                known[_names(every)] = refit(campaign, here, every, start)
-            fits[one.members] = known[_names(every)]
-        sets = _with_fits(screen, sets, fits)
-        chosen = fits[sets[0].members]
-        if turn and _names(chosen.hypotheses) == _names(best):
-            break
-        best = chosen.hypotheses
-        if adds_play(here, best):
-            rest = resting(here, best, chosen.values)
-        signatures = _about(tangents, signatures, chosen, len(nuisance))
-    if adds_play(here, chosen.hypotheses):
-        chosen = in_full(campaign, here, chosen)
-    unknowns = sets[0].rank + 6 * len(nuisance)
-    rivals = _rivals(screen, sets, fits)
-    return _Selection(screen, sets, chosen, rivals, unknowns, tangents)
-
-
-def _rivals(
-    screen: Screen, sets: Sequence[Scored], fits: dict[tuple[int, ...], Fit]
-) -> tuple[Fit, ...]:
-    """The best fits of sets of effects that do not contain the best's, nor it them."""
-    own = frozenset(screen.effects[i] for i in sets[0].members)
-    found: dict[frozenset[str], Fit] = {}
-    for one in sets:
-        other = frozenset(screen.effects[i] for i in one.members)
-        if one.members in fits and not (own <= other or other <= own):
-            found.setdefault(other, fits[one.members])
-    return tuple(found.values())
-
-
-def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
-    """The best sets, all their parts, and the best sets of other effects."""
-    parts = {s.members for s in sets[:_FEW] if s.score > sets[0].score - _NEAR}
-    best = sets[0].members
-    parts |= {tuple(i for i in best if i != left) for left in best}
-    kinds: dict[frozenset[str], Scored] = {}
-    for s in sets:
-        kinds.setdefault(frozenset(screen.effects[i] for i in s.members), s)
-    others = list(kinds.values())[:_KINDS]
-    parts |= {s.members for s in others if s.score > sets[0].score - _NEAR}
-    return [s for s in sets if s.members in parts]
-
-
-def _names(members: Sequence[Hypothesis]) -> tuple[object, ...]:
-    """What a set fits, wherever it begins."""
-    return tuple((h.effect, tuple(slot.names for slot in h.slots)) for h in members)
-
-
-def _start(one: Scored, members: Sequence[Hypothesis]) -> NDArray:
-    """Where to begin a refit: the screening's values, shapes where they were held."""
-    held = np.concatenate([np.zeros(0), *(h.start for h in members)])
-    shape = [slot.shape for h in members for slot in h.slots]
-    return np.where(np.array(shape, dtype=bool), held, one.values)
-
-
-def _with_fits(
-    screen: Screen, sets: list[Scored], fits: dict[tuple[int, ...], Fit]
-) -> list[Scored]:
-    """Sets with the scores of their refits; the best refit comes first."""
-    scored = []
-    for one in sets:
-        fit = fits.get(one.members)
-        scored.append(one if fit is None else screen.rescored(one, fit.rss, one.values))
-    scored.sort(key=screen.order)
-    best = next(s for s in scored if s.members in fits)
-    return [best, *(s for s in scored if s is not best)]
-
-
-def _about(
-    tangents: Tangents, signatures: list[Signature], fit: Fit, skipped: int
-) -> list[Signature]:
-    """Signatures with those of a fitted set retaken where the fit ended."""
-    retaken: dict[Hypothesis, Signature] = {}
-    at = sum(len(h.slots) for h in fit.hypotheses[:skipped])
-    for h in fit.hypotheses[skipped:]:
-        x = fit.values[at : at + len(h.slots)]
-        at += len(h.slots)
-        if LIBRARY[h.effect].linear or not h.slots:
-            continue
-        others: dict[str, Values] = {
-            name: values for name, values in fit.effects.items() if name != h.effect
-        }
-        moved = replace(
-            h,
-            slots=tuple(
-                replace(s, start=float(v)) if s.shape else s
-                for s, v in zip(h.slots, x, strict=True)
-            ),
-        )
-        again = tangents.about(moved, x, others)
-        if _finite(again):
-            retaken[h] = _frozen_shapes(again, x)
-    return [retaken.get(s.hypothesis, s) for s in signatures]
-
-
-def _frozen_shapes(signature: Signature, x: NDArray) -> Signature:
-    """A tangent whose shapes stay at their fitted values."""
-    shape = np.array([s.shape for s in signature.hypothesis.slots])
-    columns = np.where(shape, 0.0, signature.columns)
-    offset = signature.offset + signature.columns @ np.where(shape, x, 0.0)
-    return Signature(signature.hypothesis, offset, columns)
-
-
-def _finite(signature: Signature) -> bool:
-    """Whether the model had answers for a hypothesis."""
-    return bool(
-        np.isfinite(signature.columns).all() and np.isfinite(signature.offset).all()
-    )
-
-
-def _shows(signature: Signature) -> bool:
-    """Whether a hypothesis without unknowns changes the readings enough to be told."""
-    squares = float(signature.offset @ signature.offset)
-    return bool(signature.hypothesis.slots) or squares > _VISIBLE
-
-
-def _moves_base(h: Hypothesis) -> bool:
-    """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
-    return h.effect == "registration" and any(
-        name.startswith("base.") for slot in h.slots for name in slot.names
-    )
-
-
-class _projector:
-    """Takes nuisances out of columns."""
-
-    def __init__(self, nuisances: list[Signature]) -> None:
-        self._q = None
-        if nuisances:
-            A = np.hstack([s.columns for s in nuisances])
-            norm = np.linalg.norm(A, axis=0)
-            u, size, _ = np.linalg.svd(A / np.where(norm > 0, norm, 1.0), False)
-            self._q = u[:, size > 1e-10 * size[0]]
-
-    def __call__(self, columns: NDArray) -> NDArray:
-        if self._q is None:
-            return columns
-        return columns - self._q @ (self._q.T @ columns)
-
-
-def _projected(s: Signature, project: _projector) -> Signature:
-    """A signature without what nuisances can show."""
-    return Signature(s.hypothesis, project(s.offset[:, None])[:, 0], project(s.columns))
-
-
 def _judge(
     campaign: Campaign, here: Conditions, parts: Split, outliers: NDArray,
-    found: _Selection,
+    found: Selection,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
     used = parts.fitted & ~outliers
