@@ -23,7 +23,7 @@ from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
-_FINITE = "geometric_stiffening"
+FINITE = "geometric_stiffening"
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
 _LOST = 1e3  # [sigma] a reading that the model has no answer for
@@ -164,7 +164,7 @@ def refit(
     Returns:
         The fit.
     """
-    linear = [h for h in members if h.effect != _FINITE]
+    linear = [h for h in members if h.effect != FINITE]
     if not linear or len(linear) == len(members):
         return _refit(campaign, here, members, start)
     # finite motions take a hundred times longer: their defect is fitted, not they

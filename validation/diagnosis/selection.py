@@ -18,7 +18,7 @@ from assembly.effects.effect import Values
 from assembly.predict import settle
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
-from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
+from validation.diagnosis.refit import FINITE, Fit, adds_play, in_full, refit, resting
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.scoring import Scored, Screen
 from validation.diagnosis.signatures import Signature, Tangents, loaded_components
@@ -185,7 +185,9 @@ def _about(
         if LIBRARY[h.effect].linear or not h.slots:
             continue
         others: dict[str, Values] = {
-            name: values for name, values in fit.effects.items() if name != h.effect
+            name: values
+            for name, values in fit.effects.items()
+            if name not in {h.effect, FINITE}  # to first order finite motions add up
         }
         moved = replace(
             h,
