@@ -8,6 +8,7 @@ import typer
 
 import assembly.cli
 import assembly.statistics.cli  # noqa: F401  adds its commands
+import assembly.sweeps.cli  # noqa: F401  likewise
 import stiffness.cli
 import validation.cli
 from stiffness.reading import BadInput
