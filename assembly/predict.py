@@ -109,13 +109,34 @@ def with_second_order(here: Conditions) -> Conditions:
         if which[row] in seen or len(seen) == _CORRECTED:
             continue
         seen.add(int(which[row]))
-        try:
-            exact = assemble_row(replace(still, exact=True), row).platform_screw
-            linear = assemble_row(still, row).platform_screw
-        except (CannotAssemble, FreeMotion, SolverFailed):
-            continue
-        found[which == which[row]] = exact - linear
+        found[which == which[row]] = _finite_part(still, row)
     return replace(here, second_order=found)
+
+
+def with_finite_motions(here: Conditions) -> Conditions:
+    """Conditions whose linear answers carry all that finite motions add to them.
+
+    As :func:`with_second_order`, but row by row and under the loads there: what is
+    declared is then exact, and effects are to first order beside it.
+
+    Args:
+        here: R situations of a robot, as declared.
+
+    Returns:
+        The same, ``second_order`` given, and no longer ``exact`` if they were.
+    """
+    found = np.array([_finite_part(here, row) for row in range(len(here))])
+    return replace(here, exact=False, second_order=found.reshape(len(here), 6))
+
+
+def _finite_part(here: Conditions, row: int) -> NDArray:
+    """(6,) exact minus linear platform screw; none where one of them has no answer."""
+    try:
+        exact = assemble_row(replace(here, exact=True), row).platform_screw
+        linear = assemble_row(replace(here, exact=False), row).platform_screw
+    except (CannotAssemble, FreeMotion, SolverFailed):
+        return np.zeros(6)
+    return exact - linear
 
 
 def settle(here: Conditions) -> Conditions:

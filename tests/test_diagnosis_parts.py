@@ -12,6 +12,7 @@ from assembly.robot import BeamLink, Frame, Robot
 from stiffness.reading import BadInput
 from tests.planar_arm_for_tests import SIGMA
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
@@ -235,3 +236,27 @@ def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
     information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
     power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
     assert found.power == pytest.approx(power, rel=1e-3)
+
+
+# finite motions on request
+
+
+def test_what_finite_motions_explain_needs_no_effect_once_they_are_declared():
+    """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
+    K, F, rows = 2e3, 150.0, 20
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * a - F * LENGTH * np.cos(b + a), -1, 1) for b in q
+    ])
+    seen = np.random.default_rng(5).normal(size=(rows, 6)) * SIGMA
+    seen[:, 2] += turn
+    seen[:, 3] += LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] += LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, rows=rows, spring=spring)
+    linear, finite = diagnose(campaign), diagnose(campaign, finite=True)
+    assert (linear.verdict, linear.claimed) == ("explained", ("geometric_stiffening",))
+    assert finite.verdict == "none_needed"
+    assert finite.before.normalised == pytest.approx(1.0, abs=0.4)
+    assert linear.before.normalised > 10

@@ -20,6 +20,10 @@ def diagnose(
     calibrate: Annotated[
         int, typer.Option(help="Simulate this many campaigns on the same design.")
     ] = 0,
+    exact: Annotated[
+        bool,
+        typer.Option("--exact", help="Motions of the declared model are finite."),
+    ] = False,
     save: Annotated[
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
@@ -36,7 +40,7 @@ def diagnose(
     for path in (report, save, Path(json) if json not in {None, "-"} else None):
         if path is not None:
             check_writable(path)
-    found = trace(read_campaign(campaign))
+    found = trace(read_campaign(campaign), finite=exact)
     tally = None
     if calibrate:
         from validation.diagnosis.verdict import calibrate as simulate

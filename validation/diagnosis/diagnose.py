@@ -11,14 +11,14 @@ Order of things, each opened once:
 6. errors before and after on the rows kept aside.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.conditions import Conditions
 from assembly.effects import apply_effects
-from assembly.predict import predict, with_second_order
+from assembly.predict import predict, with_finite_motions, with_second_order
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
@@ -26,7 +26,7 @@ from validation.diagnosis.next_measurement import NextMeasurement, next_measurem
 from validation.diagnosis.refit import Fit
 from validation.diagnosis.registration import register
 from validation.diagnosis.scoring import Scored, Screen, inclusion, named
-from validation.diagnosis.selection import Selection, select_with_play
+from validation.diagnosis.selection import Selection, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.verdict import by_names, verdict
@@ -99,11 +99,13 @@ class Diagnosis:
     next: NextMeasurement | None
 
 
-def diagnose(campaign: Campaign) -> Diagnosis:
+def diagnose(campaign: Campaign, *, finite: bool = False) -> Diagnosis:
     """Trace a campaign's residual to the effect that the declared model lacks.
 
     Args:
         campaign: measured deviations.
+        finite: whether motions of the declared model are finite; they are too if the
+            robot's file has the effect ``geometric_stiffening``.
 
     Returns:
         The diagnosis.
@@ -112,24 +114,26 @@ def diagnose(campaign: Campaign) -> Diagnosis:
         BadInput: the measuring frame is not known and cannot be found.
     """
     parts = split(campaign)
-    here = with_second_order(conditions_of(campaign))
+    here = conditions_of(campaign)
+    finite = finite or here.exact
+    here = with_finite_motions(here) if finite else with_second_order(here)
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
     outliers = np.zeros(len(campaign), dtype=bool)
     while True:
         used = parts.fitted & ~outliers
-        found = select_with_play(campaign.take(used), here.take(used))
+        found = select(campaign.take(used), here.take(used), finite=finite)
         far = np.zeros_like(outliers)
         far[used] = outlying(campaign.take(used), found.fit.residual)
         if not far.any():
             break
         outliers |= far
-    return _judge(campaign, here, parts, outliers, found)
+    return _judge(campaign, here, parts, outliers, found, finite)
 
 
 def _judge(
     campaign: Campaign, here: Conditions, parts: Split, outliers: NDArray,
-    found: Selection,
+    found: Selection, finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
     used = parts.fitted & ~outliers
@@ -149,7 +153,11 @@ def _judge(
         left = tuple(trends(fitting, here.take(used), residual_after[used]))
     further = None
     if said == "ambiguous":
-        further = next_measurement(fitting, here.take(used), found.fit, found.rivals)
+        best_fit = found.fit
+        if finite:  # of all rivals alike, so that it tells nothing apart
+            linear = replace(best_fit.conditions, exact=False)
+            best_fit = replace(best_fit, conditions=linear)
+        further = next_measurement(fitting, here.take(used), best_fit, found.rivals)
     held = ~parts.fitted & ~outliers
     if not held.any():
         held = used

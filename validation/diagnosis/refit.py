@@ -19,11 +19,11 @@ from assembly.predict import predict, settle
 from assembly.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.scoring import FINITE
 from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
-FINITE = "geometric_stiffening"
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
 _LOST = 1e3  # [sigma] a reading that the model has no answer for

@@ -29,6 +29,7 @@ from validation.diagnosis.signatures import Signature
 _WAYS = 2  # ways of each effect that are tried in pairs, beside its most general
 _BEST = 8  # sets of each size that are enlarged by anything
 _APART = 1e-3  # sine of the angle between a column and those before it
+FINITE = "geometric_stiffening"
 _DIGITS = 2  # of a score; refits of one model reached by two ways differ below
 _RANK = 1e-9  # relative eigenvalue below which columns are one
 
@@ -277,8 +278,8 @@ def inclusion(screen: Screen, sets: Sequence[Scored]) -> dict[str, float]:
 def named(screen: Screen, one: Scored) -> tuple[str, ...]:
     """Names of a set's effects, in alphabetical order.
 
-    Finite motions beside another effect only refine the model in which that one is
-    fitted (near singularities they show at any load); alone they are the effect.
+    Finite motions beside an effect that explains more than they do only refine the
+    model in which it is fitted (near singularities they show at any load).
 
     Args:
         screen: whose set.
@@ -288,5 +289,8 @@ def named(screen: Screen, one: Scored) -> tuple[str, ...]:
         The names.
     """
     names = sorted(screen.effects[i] for i in one.members)
-    others = [name for name in names if name != "geometric_stiffening"]
-    return tuple(others or names)
+    others = [i for i in one.members if screen.effects[i] != FINITE]
+    finite = [i for i in one.members if screen.effects[i] == FINITE]
+    if others and finite and screen.fit(others).rss <= screen.fit(finite).rss:
+        names.remove(FINITE)
+    return tuple(names)

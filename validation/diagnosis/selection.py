@@ -18,9 +18,9 @@ from assembly.effects.effect import Values
 from assembly.predict import settle
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
-from validation.diagnosis.refit import FINITE, Fit, adds_play, in_full, refit, resting
+from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
 from validation.diagnosis.registration import device_frame
-from validation.diagnosis.scoring import Scored, Screen
+from validation.diagnosis.scoring import FINITE, Scored, Screen
 from validation.diagnosis.signatures import Signature, Tangents, loaded_components
 
 _ROUNDS = 4  # of refitting and scoring again
@@ -51,7 +51,7 @@ class Selection:
     tangents: Tangents
 
 
-def select_with_play(campaign: Campaign, here: Conditions) -> Selection:
+def select(campaign: Campaign, here: Conditions, *, finite: bool = False) -> Selection:
     """Score all small sets, refit the best, and again about it until it stays.
 
     Declared play in closed chains is held where it rests: as declared, then as found.
@@ -59,10 +59,21 @@ def select_with_play(campaign: Campaign, here: Conditions) -> Selection:
     Args:
         campaign: rows to be fitted.
         here: their conditions as declared, with the registration if that was fitted.
+        finite: whether the best set is fitted once more with finite motions.
 
     Returns:
         The selection.
     """
+    found = _select_settled(campaign, here)
+    if not finite:
+        return found
+    members = (*found.fit.hypotheses, Hypothesis(FINITE, (), ()))
+    exact = refit(campaign, here, members, found.fit.values)
+    return replace(found, fit=exact)
+
+
+def _select_settled(campaign: Campaign, here: Conditions) -> Selection:
+    """The selection with motions to first order beside what ``here`` carries."""
     # where play rests in closed chains is found row by row, too slowly for every trial
     play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
     if not play:
@@ -218,9 +229,9 @@ def _finite(signature: Signature) -> bool:
 
 
 def _shows(signature: Signature) -> bool:
-    """Whether a hypothesis without unknowns changes the readings enough to be told."""
+    """Whether a hypothesis changes the readings at all; enough, without unknowns."""
     squares = float(signature.offset @ signature.offset)
-    return bool(signature.hypothesis.slots) or squares > _VISIBLE
+    return bool(signature.columns.any()) or squares > _VISIBLE
 
 
 def _moves_base(h: Hypothesis) -> bool:
