@@ -258,6 +258,8 @@ def zone(
     write_json({"robot": robot, "zone": found}, json)
     if json != "-":
         print(zone_text(found))
+    if found["status"] != "ok":
+        raise typer.Exit(1)
 
 
 @app.command()

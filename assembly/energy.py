@@ -35,8 +35,16 @@ from assembly.closure import (
 )
 from assembly.load import Forces, forces_on, weights
 from assembly.posture import Posture
-from assembly.solvers.conic import LeastEnergy, cone_sizes, minimise_energy
+from assembly.solvers.conic import (
+    GAP,
+    GAP_WITHOUT_PLAY,
+    LeastEnergy,
+    cone_sizes,
+    minimise_energy,
+)
 from assembly.solvers.reduction import FreeMotion, Reduction, reduce_problem
+
+LEFT_OPEN, EXCESS = 1e-9, 1e-9  # accepted: [rad, lengths] of a closure, [-] of play
 
 
 class CannotAssemble(Exception):
@@ -87,10 +95,15 @@ class Assembly:
     @property
     def potential(self) -> float:
         """[J] energy minus the work of the loads."""
-        bodies = self.posture.robot.errors + self.link_screws
+        on_errors = self.forces.body @ self.posture.robot.errors.ravel()
+        return self.energy - self._work - float(on_errors)
+
+    @property
+    def _work(self) -> float:
+        """[J] of the loads on all that is not given, the errors."""
         joints = self.clearance_screws + self.joint_screws
-        work = self.forces.body @ bodies.ravel() + self.forces.joint @ joints.ravel()
-        return self.energy - float(work)
+        on_bodies = self.forces.body @ self.link_screws.ravel()
+        return float(on_bodies + self.forces.joint @ joints.ravel())
 
     @cached_property
     def clearance_screws(self) -> NDArray:
@@ -195,7 +208,34 @@ class Assembly:
 
     def duality_gap(self) -> float:
         """[J] certified: the energy is at most this above the least possible."""
-        return max(0.0, self.potential - self.bound)
+        # in this order a gap that is not a number stays one
+        return max(self.potential - self.bound, 0.0)
+
+    @cached_property
+    def unproved(self) -> str:
+        """What the certificate leaves unproved, empty if nothing.
+
+        Proved is an answer that closes to 1e-9 (rad, or m per reference length), with
+        play within 1e-9 of its bounds, whose energy is at most 1e-8 of it, and of the
+        loads' work, plus 1e-12 of that without play above the least possible.
+        """
+        left, excess, gap = (
+            self.closure_residual(), self.clearance_excess(), self.duality_gap()
+        )  # fmt: skip
+        allowed = GAP * (self.energy + abs(self._work))
+        allowed += GAP_WITHOUT_PLAY * self.energy_without_play
+        said = []
+        # written so that a value that is not a number is not proved
+        if not gap <= allowed:
+            said.append(
+                f"the energy is proved least to {gap:.1e} J only, "
+                f"expected {allowed:.1e} J"
+            )
+        if not left <= LEFT_OPEN:
+            said.append(f"a closure stays open by {left:.1e} (rad, or m per length)")
+        if not excess <= EXCESS:
+            said.append(f"a clearance is exceeded by {excess:.1e} of its size")
+        return "; ".join(said)
 
     def relative_gap(self) -> float:
         """[-] duality gap relative to energy, or to 1e-4 of that without play."""
@@ -223,7 +263,8 @@ def solve_assembly(
             then have weight.
 
     Returns:
-        The assembled manipulator with its certificate.
+        The assembled manipulator with its certificate; ``unproved`` says where that
+        falls short after all roads.
 
     Raises:
         CannotAssemble: a closure is open that no play and no spring can close.
@@ -285,7 +326,7 @@ def solve_with(
     u = least.clearances
     y = small.springs(u)
     q = small.motions(u, y)
-    multipliers = small.multipliers(u, least.rigid_multipliers)
+    multipliers = small.multipliers(least.springs, least.rigid_multipliers)
     return Assembly(
         lin, joints, load, forces, y, u, q, multipliers, small.energy_without_play,
         small.ranks,

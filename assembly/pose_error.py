@@ -144,6 +144,8 @@ class PoseError:
         rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
         translation_screw: (6,) [rad, m] attains that of the translation.
         cuts: support functions computed.
+        unproved: what of the answer of (22), or of what was asked of the bounds, is
+            not proved; empty if nothing.
     """
 
     reading: str
@@ -152,6 +154,7 @@ class PoseError:
     rotation_screw: NDArray
     translation_screw: NDArray
     cuts: int
+    unproved: str = ""
 
 
 def bound_pose_error(
@@ -173,8 +176,8 @@ def bound_pose_error(
         offset: (3,) [m] from the platform's origin to the point asked about.
 
     Returns:
-        Bounds; wider than asked only if 400 supports did not suffice, infinite if the
-        platform can move without bound.
+        Bounds; wider than asked only if 400 supports did not suffice, which
+        ``unproved`` then says; infinite if the platform can move without bound.
 
     Raises:
         ValueError: the reading is unknown, or ``budget`` is asked under a load.
@@ -187,7 +190,26 @@ def bound_pose_error(
         reading,
         rotation[0], translation[0], rotation[1], translation[1],
         rotation[2] + translation[2],
+        "; ".join(filter(None, (
+            answer.unproved,
+            _too_wide("rotation", rotation[0], tolerance_rotation, "rad"),
+            _too_wide("translation", translation[0], tolerance_translation, "m"),
+        ))),
     )  # fmt: skip
+
+
+def _too_wide(
+    part: str, bounds: tuple[float, float], tolerance: float, unit: str
+) -> str:
+    """That bounds are farther apart than asked, if they are."""
+    low, high = bounds
+    # no bound at all is an answer: the platform can move without bound
+    if high - low <= tolerance or low == high:
+        return ""
+    return (
+        f"the bounds of the {part} are {high - low:.1e} {unit} apart, "
+        f"expected {tolerance:.1e}"
+    )
 
 
 def reachable_screws(

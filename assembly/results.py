@@ -19,22 +19,25 @@ from assembly.zone import zone_margin
 def zone_of(posture: Posture) -> dict[str, Any]:
     """Margins of (21) in both readings of compliant joints, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
+    open_ = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
+        "status": "not proved" if open_ else "ok",
         "assemblable": rigid.assemblable,
         "assemblable_free": free.assemblable,
         "margin": rigid.margin,
         "margin_free": free.margin,
         "margin_bound": rigid.bound,
         "margin_free_bound": free.bound,
-    }
+    } | ({"reason": open_} if open_ else {})
 
 
 def zone_text(zone: dict[str, Any]) -> str:
-    """Margins for people: one line."""
-    return (
+    """Margins for people: one line, and what of them is not proved."""
+    line = (
         f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
         f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
     )
+    return f"{line}\nnot proved: {zone['reason']}" if "reason" in zone else line
 
 
 def solution_of(
@@ -50,8 +53,9 @@ def solution_of(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The keys of the public format; ``status`` is ``"ok"``, or says what could not
-        be answered, and the answer is then null.
+        The keys of the public format; ``status`` is ``"ok"``; or ``"not proved"``, with
+        the answer and, as ``reason``, what its certificate leaves open; or says what
+        could not be answered, and the answer is then null.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -69,10 +73,16 @@ def solution_of(
     try:
         results["zone"] = zone_of(posture)
         answer = solve_assembly(posture, load, gravity=gravity)
-        return results | _answer(answer, gravity)
+        open_ = filter(None, (results["zone"].get("reason"), answer.unproved))
+        return results | _answer(answer, gravity) | _status("; ".join(open_))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
         return results | empty | {"status": status, "reason": str(error)}
+
+
+def _status(unproved: str) -> dict[str, str]:
+    """That an answer is proved, or what of it is not."""
+    return {"status": "not proved", "reason": unproved} if unproved else {}
 
 
 def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
@@ -272,7 +282,8 @@ def pose_error_of(
     if direction is not None:
         results["direction"] = np.asarray(direction, dtype=float)
     certificate = {"relative_gap": answer.relative_gap()}
-    return results | {
+    open_ = "; ".join(f"{one.reading}: {one.unproved}" for one in found if one.unproved)
+    return results | _status(open_) | {
         "energy": answer.energy, "error": table, "certificate": certificate
     }  # fmt: skip
 
@@ -299,8 +310,8 @@ def pose_error_text(results: dict[str, Any]) -> str:
     """Bounds for people: a line for each reading."""
     lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    for reading, found in results["error"].items():
+        lines.append(f"{results['status']}: {results['reason']}")
+    for reading, found in (results["error"] or {}).items():
         rotation, translation = found["rotation"], found["translation"]
         lines.append(
             f"{reading:7s} rotation {1e3 * rotation['lower']:.6g} to "
@@ -327,7 +338,9 @@ def solution_text(results: dict[str, Any]) -> str:
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+        lines.append(f"{results['status']}: {results['reason']}")
+    if results["energy"] is None:
+        return "\n".join(lines)
     screw, certificate = results["platform_screw"], results["certificate"]
     lines += [
         f"energy: {results['energy']:.6g} J",

@@ -20,6 +20,7 @@ from assembly.posture import Posture
 from assembly.solvers.conic import cone_sizes, least_factor
 from assembly.solvers.reduction import Reduction, reduce_problem
 
+_GAP, _GAP_ABSOLUTE = 1e-8, 1e-12  # of the margin, accepted above its bound
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
 
@@ -39,6 +40,17 @@ class Zone:
     def assemblable(self) -> bool:
         """Whether it goes together rigidly."""
         return self.margin is not None and self.margin <= ASSEMBLABLE
+
+    @property
+    def unproved(self) -> str:
+        """What the certificate leaves unproved, empty if nothing."""
+        if self.margin is None or self.bound is None:
+            return ""
+        allowed = _GAP * self.margin + _GAP_ABSOLUTE
+        # written so that a bound that is not a number is not proved
+        if self.margin - self.bound <= allowed:
+            return ""
+        return f"the margin {self.margin:.9g} is proved down to {self.bound:.9g} only"
 
 
 def zone_margin(posture: Posture, compliant: str = "rigid") -> Zone:

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assembly.energy import CannotAssemble, solve_assembly
-from assembly.posture import home_posture, place_robot
+from assembly.posture import home_posture, place_many, place_robot
 from assembly.reference import reference_energy
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.solvers.batch import minimise_energies
 from assembly.solvers.reduction import FreeMotion
 from tests.robots_for_tests import (
     NUMBERS,
@@ -54,6 +55,95 @@ def test_play_is_used_up_before_anything_bends(gap, left):
     if left:
         found = answer.clearance_screws[robot.index("joint")]
         assert np.allclose(found, 1e-4 * direction, atol=1e-12)
+
+
+@pytest.mark.parametrize("kappa", [0.05, 0.1])
+def test_the_energy_is_proved_near_the_edge_of_the_zone(kappa):
+    """Where hardly any energy is left; a part of the 25 mm grid."""
+    for posture in half_workspace(every=37):
+        assert_proved(solve_assembly(with_errors_times(kappa, posture)))
+
+
+@pytest.mark.slow
+def test_the_energy_is_proved_at_every_point_of_the_half_workspace():
+    postures = half_workspace(every=1)
+    assert len(postures) == 1113
+    for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
+        for posture in postures:
+            assert_proved(solve_assembly(with_errors_times(kappa, posture)))
+
+
+def half_workspace(every):
+    """Every so many postures of the 25 mm grid below the base."""
+    x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
+    poses = np.full((x.size, 6), np.nan)
+    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    placed = place_many(robot, poses[::every])[0]
+    return [posture for posture in placed if posture is not None]
+
+
+def with_errors_times(factor, posture):
+    """The posture of the robot with other errors."""
+    robot = posture.robot
+    return replace(posture, robot=robot.with_errors(factor * robot.errors))
+
+
+def assert_proved(answer):
+    """The promise of the batch, 1e-8 E + 1e-12 E(no play), not asking the answer."""
+    assert answer.unproved == ""
+    gap = answer.potential - answer.bound
+    assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_play
+
+
+def spoilt(solve):
+    """A road whose clearances are 1e-4 off."""
+
+    def road(G, h, d, H, k, group):
+        u, rigid, status = solve(G, h, d, H, k, group)
+        return 0.9999 * u, rigid, status
+
+    return road
+
+
+def test_what_no_road_proves_is_not_called_an_answer(monkeypatch):
+    """The edge of the zone with Newton's method taken away and the others spoilt."""
+    from assembly.results import solution_of, solution_text
+    from assembly.solvers import batch, conic, dual_newton
+
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    good = solve_assembly(posture)
+    assert_proved(good)
+    energies = minimise_energies(robot, posture.transforms[None])
+    monkeypatch.setattr(conic, "_ROADS", tuple(map(spoilt, conic._ROADS)))
+    monkeypatch.setattr(dual_newton, "dual_newton", lambda *_: -1)
+    answer = solve_assembly(posture)
+    # 1e-4 of some clearances more energy than the least: far above 1e-8
+    assert answer.energy > good.energy * (1 + 1e-8)
+    assert "the energy is proved least to" in answer.unproved
+    found = solution_of(posture)
+    assert found["status"] == "not proved"
+    assert found["reason"] == answer.unproved
+    assert found["energy"] == answer.energy
+    assert f"not proved: {answer.unproved}" in solution_text(found)
+    assert "certificate" in solution_text(found)
+    batch._solve_slowly(posture, "elastic", energies, 0)
+    assert (energies.status[0], energies.reason[0]) == (
+        "solver failed", answer.unproved
+    )  # fmt: skip
+
+
+def test_values_that_are_no_numbers_prove_nothing():
+    answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
+    for spoilt_answer in (
+        replace(answer, multipliers=answer.multipliers * np.nan),
+        replace(answer, elastic=answer.elastic * np.nan),
+        replace(answer, clearances=answer.clearances * np.nan),
+    ):
+        assert spoilt_answer.unproved
+    assert "stays open" in replace(answer, elastic=1.1 * answer.elastic).unproved
+    assert "exceeded by" in replace(answer, clearances=2 * answer.clearances).unproved
 
 
 def test_wrench_is_stiffness_times_deformation_everywhere():

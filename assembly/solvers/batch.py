@@ -6,7 +6,7 @@ road does not cover, or whose certificate falls short, is solved again by
 :mod:`assembly.energy`, and counted.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.energy import (
-    Assembly,
     CannotAssemble,
     solve_assembly,
     without_own_springs,
@@ -24,7 +23,7 @@ from assembly.energy import (
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
-from assembly.solvers.conic import SolverFailed
+from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
 from assembly.zone import zone_margin
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ ROADS = (
     "bounded joint",
 )  # fmt: skip
 _COMPILED = 2
-_GAP, _GAP_WITHOUT_PLAY = 1e-8, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +53,8 @@ class Energies:
             bound of a passive joint's own motion mattered.
         multipliers: (k, 6 closures) of the scaled closure rows.
         road: (k,) index into :data:`ROADS`.
-        status: (k,) ``"ok"``, ``"cannot assemble"`` or ``"solver failed"``.
+        status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
+            there is no answer or its certificate falls short.
         reason: (k,) what was said where the status is not ok.
         joints: what may move.
     """
@@ -81,7 +80,7 @@ class Energies:
     @cached_property
     def certified(self) -> NDArray:
         """(k,) bool: gap <= 1e-8 of the energy + 1e-12 of that without play."""
-        allowed = _GAP * self.energy + _GAP_WITHOUT_PLAY * self.energy_without_play
+        allowed = GAP * self.energy + GAP_WITHOUT_PLAY * self.energy_without_play
         return (self.gap <= allowed) & (self.status == "ok")
 
     def fallbacks(self) -> dict[str, int]:
@@ -188,19 +187,9 @@ def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -
     a.clearance_excess[i] = one.clearance_excess()
     if one.clearances.shape == a.clearances[i].shape:
         a.clearances[i] = one.clearances
-    a.bound[i], factor = _best_bound(one)
-    a.multipliers[i] = factor * one.multipliers
-
-
-def _best_bound(one: Assembly) -> tuple[float, float]:
-    """Best bound that multiples of an answer's wrenches prove, and the multiple."""
-    # f gain - f^2 cost / 2 in the factor f; 0 inside a zone, where they are rounding
-    double = replace(one, multipliers=2 * one.multipliers).bound
-    gain = 2 * one.bound - double / 2
-    cost = 2 * (gain - one.bound)
-    factor = max(0.0, gain) / cost if cost > 0.0 else 0.0
-    scaled = replace(one, multipliers=factor * one.multipliers).bound
-    return max((one.bound, 1.0), (scaled, factor))
+    a.bound[i], a.multipliers[i] = one.bound, one.multipliers
+    if one.unproved:
+        a.status[i], a.reason[i] = "solver failed", one.unproved
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +202,8 @@ class Margins:
         bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
             road answered.
         slower: (k,) bool, solved by :func:`assembly.zone.zone_margin`.
-        reason: (k,) what was said where the solver failed, else empty.
+        reason: (k,) what was said where the solver failed, or what of the margin is
+            not proved; else empty.
     """
 
     margin: NDArray
@@ -269,6 +259,7 @@ def zone_margins(
         except SolverFailed as error:
             reason[i] = str(error)
             continue
+        reason[i] = zone.unproved
         margin[i] = np.inf if zone.margin is None else zone.margin
         bound[i] = np.inf if zone.bound is None else zone.bound
     return Margins(margin, bound, road > 0, reason)

@@ -36,7 +36,8 @@ class PoseErrors:
         translation_screw: (k, 6) [rad, m] attains that of the translation.
         supports: (k,) support functions computed.
         slower: (k,) bool, solved by :func:`assembly.pose_error.bound_pose_error`.
-        status: (k,) ``"ok"``, ``"cannot assemble"`` or ``"solver failed"``.
+        status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
+            there is no answer or its certificate falls short.
         reason: (k,) what was said where the status is not ok.
     """
 
@@ -151,6 +152,8 @@ def _bound_slowly(
         found.status[i], found.reason[i] = "solver failed", str(error)
         return
     _store(one, found, i)
+    if one.unproved:
+        found.status[i], found.reason[i] = "solver failed", one.unproved
 
 
 def _store(one: PoseError, found: PoseErrors, i: int) -> None:

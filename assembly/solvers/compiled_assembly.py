@@ -26,12 +26,12 @@ from assembly.solvers.compiled_reduction import (
     small_problem,
     spring_rows,
 )
+from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
 
 NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
-GAP, GAP_WITHOUT_PLAY = 1e-8, 1e-12  # accepted: of the energy, of that without play
 _RANK = 1e-10  # as in assembly.solvers.reduction, and so is the noise floor
 _NOISE = 1e-12
 _LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
@@ -259,10 +259,13 @@ def small_answer(
     u: NDArray, y: NDArray,
 ) -> int:  # fmt: skip
     """Newton alone where all play is used up, else after an interior point."""
-    if dual_newton(Gt, h, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y) >= 0:
+    r, d = len(h), np.zeros(len(u))
+    if dual_newton(
+        Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
+    ) >= 0:  # fmt: skip
         return NEWTON
     G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
-    d, H = np.zeros(len(u)), np.zeros((0, len(u)))
+    H = np.zeros((0, len(u)))
     near = _NEAR_WITHOUT_PLAY * 0.5 * np.sum(h * h)
     # at a zone's edge the interior point breaks down early; Newton then takes longer
     for stop, most, steps in (
@@ -270,7 +273,9 @@ def small_answer(
     ):  # fmt: skip
         u[:] = interior_point(G, h, d, H, none, starts, most, stop)[0]
         _into_cones(starts, u)
-        if dual_newton(Gt, h, starts, relative, absolute, steps, _SHARP, u, y) >= 0:
+        if dual_newton(
+            Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
+        ) >= 0:  # fmt: skip
             break
     return INTERIOR
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from assembly.solvers.compiled_assembly import small_answer
 from assembly.solvers.compiled_zone import farthest, turn_first
+from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 
 SOLVED, UNCERTIFIED = range(2)
-_GAP, _GAP_WITHOUT_PLAY = 1e-8, 1e-12  # as in assembly.solvers.compiled_assembly
 _STOP = 1e-2
 _PROJECTIONS, _INWARDS = 40, 0.98
 _MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
@@ -67,8 +67,8 @@ def least_energies(
                 right[i] = h[point, i] / size
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
-            absolute = _STOP * _GAP_WITHOUT_PLAY * without / (size * size)
-            small_answer(G, right, starts, _STOP * _GAP, absolute, own, answer)
+            absolute = _STOP * GAP_WITHOUT_PLAY * without / (size * size)
+            small_answer(G, right, starts, _STOP * GAP, absolute, own, answer)
             for i in range(r):
                 answer[i] *= size
         total = 0.0
@@ -100,7 +100,7 @@ def least_energies(
         bound[point] = 0.5 * factor * factor * cost
         for i in range(r):
             y[point, i] = factor * answer[i]
-        allowed = _GAP * energy[point] + _GAP_WITHOUT_PLAY * without
+        allowed = GAP * energy[point] + GAP_WITHOUT_PLAY * without
         # written so that a value that is not a number fails
         fine = energy[point] - bound[point] <= allowed
         road[point] = SOLVED if fine else UNCERTIFIED

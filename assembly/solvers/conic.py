@@ -3,15 +3,15 @@
 Two shapes of problem appear: the least energy of a reduced problem (22), and the
 least factor on the clearances of problem (21).  Both are scaled here to size 1.  The
 first is tried by the compiled method of :mod:`assembly.solvers.interior`, then by
-Clarabel; the certified gap, which needs no trust in either, decides which answer is
-kept.
+Clarabel, and each answer is led on by :mod:`assembly.solvers.dual_newton`; the
+certified gap, which needs no trust in any of them, decides which answer is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
     quadratic objectives.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,7 +23,12 @@ _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-_ACCEPTED = 1e-9  # relative certified gap
+# gap that counts as proved: of the energy, and of what it would be without play
+GAP, GAP_WITHOUT_PLAY = 1e-8, 1e-12
+_PART = 0.1  # of it that is asked here: the problem before elimination adds to it
+_STOP = 1e-2  # Newton's method stops at this fraction of it
+_STEPS, _SHARP = 150, 1e6  # its steps, and its first sigma
+_OPEN = 1e-11  # most that a row no spring can take up may stay open
 
 
 class SolverFailed(RuntimeError):
@@ -45,6 +50,7 @@ class LeastEnergy:
 
     Attributes:
         clearances: (nu,) in units of their cones.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs, G u + h but for the gap.
         rigid_multipliers: (p,) [J] of the rows no spring can take up.
         value: [J] of the objective.
         bound: [J] certified lower bound of the objective.
@@ -52,6 +58,7 @@ class LeastEnergy:
     """
 
     clearances: NDArray
+    springs: NDArray
     rigid_multipliers: NDArray
     value: float
     bound: float
@@ -82,9 +89,12 @@ def minimise_energy(
     Raises:
         SolverFailed: Clarabel gave no usable answer.
     """
+    if not (h.any() or d.any() or k.any()):  # nothing to close, nothing to gain
+        nothing = np.zeros(len(h)), np.zeros(len(k))
+        return LeastEnergy(np.zeros(len(d)), *nothing, 0.0, 0.0)
     if G.shape[1] == 0:
         energy = float(h @ h) / 2
-        return LeastEnergy(np.zeros(0), np.zeros(len(k)), energy, energy)
+        return LeastEnergy(np.zeros(0), h, np.zeros(len(k)), energy, energy)
     size = max(np.linalg.norm(h), np.linalg.norm(G, axis=0).max(), 1e-150)
     size = max(size, float(np.sqrt(np.abs(d).max())))
     rows = np.linalg.norm(H, axis=1)
@@ -94,24 +104,31 @@ def minimise_energy(
         u, rigid, status = solve(*scaled)
         if status == "PrimalInfeasible":
             return LeastEnergy(
-                np.zeros_like(d), np.zeros_like(k), np.inf, np.inf, False
-            )
+                np.zeros_like(d), np.zeros_like(h), np.zeros_like(k), np.inf, np.inf,
+                False,
+            )  # fmt: skip
         if u is None or rigid is None:
             continue
-        answer = _certify(*scaled, into_cones(u, group), rigid)
-        if best is None or answer.gap < best.gap:
-            best = answer
-        if best.gap <= _ACCEPTED * abs(best.value) + 1e-12 * float(
-            scaled[1] @ scaled[1]
-        ):
+        for answer in _certified(*scaled, into_cones(u, group), rigid):
+            if best is None or answer.gap < best.gap:
+                best = answer
+            if _proved(best, scaled[1]):
+                break
+        if best is not None and _proved(best, scaled[1]):
             break
     if best is None:
         raise SolverFailed("least energy", status)
     joule = size**2
     return LeastEnergy(
-        best.clearances, best.rigid_multipliers / rows * joule,
+        best.clearances, best.springs * size, best.rigid_multipliers / rows * joule,
         best.value * joule, best.bound * joule,
     )  # fmt: skip
+
+
+def _proved(answer: LeastEnergy, h: NDArray) -> bool:
+    """Whether the certificate of a scaled problem's answer is close enough."""
+    allowed = GAP * abs(answer.value) + GAP_WITHOUT_PLAY * float(h @ h) / 2
+    return answer.gap <= _PART * allowed
 
 
 def _compiled(
@@ -120,14 +137,18 @@ def _compiled(
     """The interior-point method of this package; its answer must still satisfy H."""
     from assembly.solvers.interior import interior_point
 
-    starts = np.searchsorted(group, np.arange(group[-1] + 2))
     u, n, _ = interior_point(
-        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k, starts, 1e-12
+        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k, _starts(group), 1e-12
     )
     finite = np.isfinite(u).all() and np.isfinite(n).all()
-    if not finite or np.abs(H @ u - k).max(initial=0.0) > 1e-11:
+    if not finite or np.abs(H @ u - k).max(initial=0.0) > _OPEN:
         return None, None, "no feasible point found"
     return u, -n, "Solved"
+
+
+def _starts(group: NDArray) -> NDArray:
+    """(cones + 1,) first column of each cone, and nu."""
+    return np.searchsorted(group, np.arange(group[-1] + 2))
 
 
 def _by_clarabel(
@@ -160,15 +181,47 @@ _ROADS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = 
 )
 
 
-def _certify(
+def _certified(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
     u: NDArray, rigid: NDArray,
+) -> Iterator[LeastEnergy]:  # fmt: skip
+    """An answer with the bound its own springs prove; the same led on by Newton."""
+    from assembly.solvers.dual_newton import dual_newton
+
+    problem = (G, h, d, H, k, group)
+    yield _certify(*problem, u, G @ u + h, rigid)
+    if group.max() >= 0 and np.bincount(group).max() > 2:
+        return  # Newton's method knows discs and intervals only
+    Gt = np.ascontiguousarray(np.vstack([G, H]).T)
+    right, size = np.concatenate([h, -k]), float(h @ h) / 2
+    u, y = u.copy(), np.concatenate([h, -rigid])
+    dual_newton(
+        Gt, right, d, len(h), _starts(group), _STOP * GAP,
+        _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _SHARP, u, y,
+    )  # fmt: skip
+    u = into_cones(u, group)
+    if np.isfinite(u).all() and np.isfinite(y).all():
+        if np.abs(H @ u - k).max(initial=0.0) <= _OPEN:
+            yield _certify(*problem, u, y[: len(h)], -y[len(h) :])
+
+
+def _certify(
+    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
+    u: NDArray, springs: NDArray, rigid: NDArray,
 ) -> LeastEnergy:  # fmt: skip
-    """An answer with its value and the bound its own multipliers prove."""
+    """An answer with its value and the bound that its multipliers prove."""
     spring = G @ u + h
     value = float(spring @ spring) / 2 - float(d @ u)
-    bound = energy_bound(G, h, d, H, k, group, spring, rigid)
-    return LeastEnergy(u, rigid, value, bound)
+    problem = (G, h, d, H, k, group)
+    bound = energy_bound(*problem, springs, rigid)
+    if not d.any():
+        # any multiple of the multipliers is as good a proof: f gain - f^2 cost / 2
+        cost = float(springs @ springs)
+        factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
+        better = energy_bound(*problem, factor * springs, factor * rigid)
+        if better > bound:
+            bound, springs, rigid = better, factor * springs, factor * rigid
+    return LeastEnergy(u, springs, rigid, value, bound)
 
 
 def energy_bound(
@@ -281,8 +334,22 @@ def _clarabel(
     answer = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
     status = str(answer.status)
     x, z = np.array(answer.x), np.array(answer.z)
+    if status == "PrimalInfeasible" and not _no_point(A, b, z, equal + positive, group):
+        status = "PrimalInfeasible, which its multipliers do not prove"
     # what is not fully solved may still be good: its certificate will tell
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, None, status
     return x, z, status
+
+
+def _no_point(
+    A: csc_matrix, b: NDArray, z: NDArray, first: int, group: NDArray
+) -> bool:
+    """Whether z proves that no x below 1e8 solves A x + s = b: A^T z = 0, b.z < 0."""
+    if not b @ z < 0.0 or np.abs(A.T @ z).sum() > -1e-8 * (b @ z):
+        return False
+    at = first + np.searchsorted(group, np.arange(group.max() + 1))
+    at += np.arange(len(at))
+    inside = z[at] - cone_sizes(np.delete(z[first:], at - first), group)
+    return bool(inside.min() >= 1e-8 * (b @ z))  # b @ z is negative

@@ -96,9 +96,9 @@ class Reduction:
         right = -self.linearisation.misfit - A @ moved
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=_RANK)[0]
 
-    def multipliers(self, u: NDArray, rigid_multipliers: NDArray) -> NDArray:
+    def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
         """(6 closures,) scaled closure wrenches, the least where not unique."""
-        own = self.spread @ (self.G @ u + self.h)
+        own = self.spread @ springs
         inner = self.elastic_inverse.T @ own + self.rigid @ rigid_multipliers
         return self.preload + self.basis @ inner
 
