@@ -198,8 +198,15 @@ def forks(order, layers, finer=1.5):
     mesh = eighth_of_forks(layers, finer)
     mesh.Curve(order)
     motions = unit_screws((0, 0, L / 2))
-    evens = [(True, False, True), (False, True, True), (False, False, False),
-             (False, True, False), (True, False, False), (True, True, True)]  # fmt: skip
+    same, turned = True, False
+    evens = [
+        (same, turned, same),
+        (turned, same, same),
+        (turned, turned, turned),
+        (turned, same, turned),
+        (same, turned, turned),
+        (same, same, same),
+    ]
     middle = np.zeros(6)
     for i, even in enumerate(evens):
         work, unknowns = mode_stiffness(mesh, order, even, [motions[i]])

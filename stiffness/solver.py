@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
+# PARDISO's iparm: the defaults for symmetric matrices, and 37: rows whose patterns agree
+# to 90 % are ordered as one, as the three of a node do; half the analysis, less memory
+_SETTINGS = {1: 1, 2: 2, 8: 2, 10: 8, 18: -1, 37: -90}
+
 
 class SolverFailed(RuntimeError):
     """A sparse factorisation gave up."""
@@ -84,6 +88,8 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
+    for number, value in _SETTINGS.items():
+        solver.set_iparm(number, value)
     # pypardiso asks for csr_matrix, not csr_array, and sorted 32 bit indices
     matrix = csr_matrix(upper)
     matrix.sort_indices()
