@@ -56,14 +56,16 @@ def dead_loads(
     load: ArrayLike | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
     """Loads as dead loads.
 
     Args:
         posture: where the robot stands, of n frames.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] on the platform at a point, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
+        point: (3,) [m] where the load acts, platform axes: the force goes with it.
 
     Returns:
         The loads; all zero where nothing is given.
@@ -71,6 +73,10 @@ def dead_loads(
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     own, carried = np.zeros((2, count, 3, 4))
+    if np.any(point):
+        platform = posture.robot.index(posture.robot.platform)
+        own[platform] = np.outer(wrench[3:], [*np.asarray(point), 1.0])
+        wrench[3:] = 0.0
     if bodies is not None:
         given = np.asarray(bodies, dtype=float)
         own[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2

@@ -107,7 +107,7 @@ class ExactAssembly:
     @property
     def load(self) -> NDArray:
         """(6,) [N m, N] on the platform at its origin, base axes."""
-        return self.loads.load
+        return self.linear.load
 
     @property
     def loads(self) -> DeadLoads:
@@ -225,18 +225,20 @@ def solve_exact(
     start: Assembly | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear answer.
 
     Args:
         posture: where the robot stands; its errors, clearances, links and joint
             springs are the robot's.
-        load: (6,) [N m, N] on the platform at its origin, base axes.  The force is
+        load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is
             dead; the moment's work is its product with the rotation vector.
         start: the linear answer for this posture and these loads, if it is there.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.dead_load` for links.
+        point: (3,) [m] of the platform, in its axes; the force goes with it.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -247,10 +249,12 @@ def solve_exact(
         NotConverged: no equilibrium was found; a :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads.
     """
-    loads = dead_loads(posture, load, bodies, gravity)
+    loads = dead_loads(posture, load, bodies, gravity, point)
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
     if start is None:
-        start = solve_assembly(posture, loads.load, bodies, gravity)
-    elif start.posture is not posture or not start.has_loads(load, bodies, gravity):
+        start = solve_assembly(posture, wrench, bodies, gravity)
+    elif start.posture is not posture or not start.has_loads(wrench, bodies, gravity):
         raise ValueError(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"

@@ -204,21 +204,19 @@ def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
     load = here.load_at_origin()[row]
     gravity = here.gravity[row] if here.gravity[row].any() else None
     give = np.zeros(len(here.laws))
+    answer: Assembly | ExactAssembly
     for _ in range(_STEPS):
-        answer = _solve(_softened(posture, here.laws, give), load, gravity, here.exact)
+        there = _softened(posture, here.laws, give)
+        if here.exact:
+            answer = solve_exact(
+                there, here.load[row], gravity=gravity, point=here.point
+            )
+        else:
+            answer = solve_assembly(there, load, gravity=gravity)
         before, give = give, _secants(answer, here.laws)
         if np.all(np.abs(give - before) <= _SETTLED * give):
             return answer
     raise SolverFailed("contact", f"deflections that do not settle in {_STEPS} steps")
-
-
-def _solve(
-    posture: Posture, load: NDArray, gravity: NDArray | None, exact: bool
-) -> Assembly | ExactAssembly:
-    """The linear or the exact answer."""
-    if not exact:
-        return solve_assembly(posture, load, gravity=gravity)
-    return solve_exact(posture, load, gravity=gravity)
 
 
 def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> Posture:

@@ -11,6 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.conditions import as_declared
+from assembly.posture import Posture, place_many_joints
+from assembly.predict import predict
 from assembly.robot import BeamLink, Frame, Robot
 from assembly.robot_file import read_robot
 from assembly.robots import load_robot
@@ -108,6 +111,31 @@ def test_both_programs_agree(name):
     springs = simulate_readings(robot, point, rows, effects, "springs")
     assert np.abs(beams).max() > 5e-5
     np.testing.assert_allclose(springs, beams, rtol=0, atol=5e-8)
+
+
+@pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
+def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
+    """Two programs, one model: finite motions, a load that goes with its point."""
+    rng = np.random.default_rng(6)
+    robot = without_clearance(load_robot(name))
+    robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
+    design = Design(configurations=3, rows=3, reach=0.1, load=80.0)
+    rows = plan_campaign(robot, design, rng).rows
+    point = np.array([0.03, 0.05, 0.02])
+    springs = simulate_readings(robot, point, rows, (), "springs")
+    commands = [
+        [row.coordinates[f.name] if f.actuated else np.nan for f in robot.frames]
+        for row in rows
+    ]
+    placed, _ = place_many_joints(robot, commands)
+    postures = Posture(
+        robot, np.array([p.coordinates for p in placed]),
+        np.array([p.transforms for p in placed]), 0.0,
+    )  # fmt: skip
+    here = as_declared(postures, np.array([row.load for row in rows]), point=point)
+    exact = predict(replace(here, exact=True)).deviation
+    assert np.abs(exact - predict(here).deviation).max() > 1e-5
+    np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
 def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):

@@ -92,7 +92,10 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        read = _at_frames(ends, carried)
+        # a spring answers what it carries half-way: read at an end, it would not be
+        # the derivative of an energy
+        halfway = ends @ np.linalg.inv(_deflected(screws / 2))
+        read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
         still = np.abs(new - screws).max() < _STILL
         screws = new
@@ -108,7 +111,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
             break
         open_ = max(np.abs(left).max(initial=0), np.abs(move[:, size:]).max(initial=0))
         if still and open_ < _STILL:
-            return [Rest(*one) for one in zip(ends[1], read[1], screws[1], strict=True)]
+            met = _at_frames(ends[1], carried[1])
+            return [Rest(*one) for one in zip(ends[1], met, screws[1], strict=True)]
     raise SimulationFailed(robot.name, "springs do not come to rest")
 
 
@@ -157,6 +161,16 @@ def _placements(screws: NDArray) -> NDArray:
     return T
 
 
+def _deflected(screws: NDArray) -> NDArray:
+    """(..., 4, 4) of springs' screws (..., 6), translations in axes turned half-way."""
+    half = screws.copy()
+    half[..., :3] /= 2
+    T = _placements(screws)
+    turned = _placements(half)[..., :3, :3]
+    T[..., :3, 3] = np.einsum("...ij,...j->...i", turned, screws[..., 3:])
+    return T
+
+
 def _chained(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
     """(k, n, 4, 4) frames; a step leads to each body's end, another through its joint.
 
@@ -185,7 +199,7 @@ def _chained(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray
 
 def _forward(parts: _Parts, q: NDArray, screws: NDArray) -> NDArray:
     """(2, k, n, 4, 4) frames at the bodies' ends, and behind the joints' springs."""
-    links, joints = _placements(screws)
+    links, joints = _deflected(screws)
     before = _chained(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
 
