@@ -80,6 +80,7 @@ class Screen:
         ways = Counter(self.effects)
         self._ways = [math.log(ways[e]) for e in self.effects]
         self._m = len(ways)
+        self._fitted: dict[tuple[int, ...], Scored] = {}
 
     def with_residual(self, residual: NDArray) -> "Screen":
         """The same signatures for another residual.
@@ -93,6 +94,7 @@ class Screen:
         other = copy(self)
         other._columns = self._columns.copy()
         other._columns[:, -1] = residual
+        other._fitted = {}
         other._gram = self._gram.copy()
         other._gram[-1] = other._gram[:, -1] = other._columns.T @ residual
         return other
@@ -125,6 +127,11 @@ class Screen:
             The set with its score.
         """
         members = tuple(sorted(members))
+        if members not in self._fitted:
+            self._fitted[members] = self._fit(members)
+        return self._fitted[members]
+
+    def _fit(self, members: tuple[int, ...]) -> Scored:
         columns: list[int] = []
         # what is left to fit: the residual minus the offsets of all members
         left = [len(self._gram) - 1]
