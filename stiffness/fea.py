@@ -279,7 +279,7 @@ def first_mesh(
         The solid.
 
     Raises:
-        MeshFailed: two tries gave nothing usable.
+        MeshFailed: three tries gave nothing usable.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -295,11 +295,15 @@ def first_mesh(
             cache=cache,
         )
 
-    try:
-        return mesh(1.0)
-    except MeshFailed:
-        _LOG.info("the first mesh was too coarse; trying a finer one")
-    return mesh(0.3)
+    start = time.monotonic()
+    for share in (1.0, 0.3):
+        try:
+            return mesh(share)
+        except MeshFailed as error:
+            if time.monotonic() - start > budget.seconds:
+                raise
+            _LOG.info("a finer mesh is tried: %s", error)
+    return mesh(0.1)
 
 
 def _solve_level(

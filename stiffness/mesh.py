@@ -204,8 +204,8 @@ def fit_to_patches(
         were, except on interfaces.
 
     Raises:
-        MeshFailed: the mesh is not the part: its volume is off by more than 2 %, or an
-            interface has no face.
+        MeshFailed: the mesh is not the part: its volume is off by more than 2 %, it has
+            other holes, or an interface has no face.
     """
     points, cells = _one_body(points, cells)
     faces = boundary_faces(cells)
@@ -217,6 +217,13 @@ def fit_to_patches(
         raise MeshFailed(
             f"{surface.name}: the mesh has {volume:.6g} m^3, the surface encloses "
             f"{surface.volume:.6g}"
+        )
+    # a breach of a thin wall is little volume and much stiffness
+    found, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
+    if found != expected:
+        raise MeshFailed(
+            f"{surface.name}: the mesh has other holes than the surface: Euler "
+            f"characteristic {found}, expected {expected}"
         )
     for number, name in enumerate(("base", "tip")):
         if not (patch == number).any():
@@ -250,6 +257,20 @@ def boundary_faces(cells: NDArray) -> NDArray:
     alone = np.ones(len(faces), dtype=bool)
     alone[order[1:][same]] = alone[order[:-1][same]] = False
     return faces[alone]
+
+
+def euler_characteristic(triangles: NDArray) -> int:
+    """Corners less edges plus triangles: 2 a closed shell, less 2 each way through it.
+
+    Args:
+        triangles: (m, 3) corners.
+
+    Returns:
+        The characteristic, the sum over all shells.
+    """
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    corners = len(np.unique(triangles))
+    return corners - len(np.unique(edges, axis=0)) + len(triangles)
 
 
 def _nearest_patch(
