@@ -15,6 +15,7 @@ from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, linearise, virtual_joints
 from assembly.posture import Posture
 from assembly.solvers.batch import minimise_energies
+from assembly.solvers.loaded_draws import Loads, forces_of, loads_of, solve_loaded
 from assembly.solvers.reduction import complement, reduce_problem
 
 _LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open, as in the batch
@@ -65,10 +66,12 @@ class OnePosture:
         free: (nq, r) how they pull free motions: nothing but rounding.
         unanswered: (m - .., 6n) what of the errors no spring takes up.
         screws: (6, nu + 6n) platform screw.
+        platform: (6, 6n) screws of all frames to the platform's.
         motions: (nq, nu + 6n) free motions.
         left: (m, nu + 6n) what stays open in the closures: rounding.
         ranges: (nq,) [rad or m] bounds of the free motions, which were left out.
         wrench: (n, 6, m) [N m, N] wrenches of unit closure multipliers.
+        loads: what pushes on the robot, None if nothing.
     """
 
     posture: Posture
@@ -84,10 +87,12 @@ class OnePosture:
     free: NDArray
     unanswered: NDArray
     screws: NDArray
+    platform: NDArray
     motions: NDArray
     left: NDArray
     ranges: NDArray
     wrench: NDArray
+    loads: Loads | None = None
 
     def solve(self, errors: ArrayLike) -> Draws:
         """Least energies of k draws.
@@ -109,6 +114,8 @@ class OnePosture:
             raise ValueError(
                 f"errors have shape {errors.shape}, expected (k, {n}, 6), all finite"
             )
+        if self.loads is not None:
+            return solve_loaded(self, self.loads, errors)
         some = np.flatnonzero(errors.reshape(-1, 6 * n).any(axis=0))  # most have none
         e = np.ascontiguousarray(errors.reshape(-1, 6 * n)[:, some])
         r, nu = self.G.shape
@@ -142,7 +149,10 @@ class OnePosture:
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
         """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
-        return np.tensordot(multipliers, self.wrench, axes=(1, 2))
+        wrenches = np.tensordot(multipliers, self.wrench, axes=(1, 2))
+        if self.loads is not None:
+            wrenches += self.loads.forces.body.reshape(-1, 6)
+        return wrenches
 
     def _solve_slowly(self, errors: NDArray, answer: Draws) -> None:
         """The draws that the fast road did not solve."""
@@ -163,18 +173,28 @@ class OnePosture:
         answer.multipliers[rows] = multipliers
 
 
-def prepare_energies(posture: Posture) -> OnePosture:
+def prepare_energies(
+    posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
+) -> OnePosture:
     """Eliminate free motions and springs at a posture, for any errors.
 
     Args:
         posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
 
     Returns:
         What :meth:`OnePosture.solve` needs.
+
+    Raises:
+        FreeMotion: a load drives a motion that nothing resists.
     """
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot)
-    small = reduce_problem(lin, joints)
+    push = np.zeros(6) if load is None else np.asarray(load, dtype=float)
+    g = np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float)
+    forces = forces_of(posture, push, g)
+    small = reduce_problem(lin, joints, forces)
     A = lin.rows
     A_q, A_u, A_y = (A @ part for part in (joints.free, joints.cones, joints.elastic))
     grip = small.basis @ small.elastic_inverse.T  # (m, ny)
@@ -199,7 +219,8 @@ def prepare_energies(posture: Posture) -> OnePosture:
         posture, joints, starts.astype(np.int64),
         small.G, small.H, A, misfit, closing, A_y.T @ closing,
         np.ascontiguousarray(A_u.T @ closing), A_q.T @ closing,
-        over.T @ A, lin.platform @ moved, motions, A @ moved,
+        over.T @ A, lin.platform @ moved, lin.platform, motions, A @ moved,
         bounds[np.flatnonzero(joints.free.any(axis=1))],
         wrench.reshape(len(robot.frames), 6, -1) / size,
+        loads_of(small, misfit, push, g) if forces else None,
     )  # fmt: skip

@@ -10,11 +10,15 @@ from typing import Annotated
 import typer
 
 from assembly.cli import (
+    GravityOption,
     JointOption,
     JsonOption,
+    LoadOption,
     PoseOption,
     RobotArgument,
     app,
+    parse_gravity,
+    parse_load,
     posture_of,
     progress_bars,
     save_figure,
@@ -29,6 +33,8 @@ def statistics(
     errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
     pose: PoseOption = None,
     joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
     draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
     play: Annotated[
@@ -88,7 +94,11 @@ def statistics(
         check_writable(path)
     posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
-    experiment = Experiment(posture, sources, seed, play, margins)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    experiment = Experiment(
+        posture, sources, seed, play, margins,
+        load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
+    )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
     try:
         with progress_bars() as update:
@@ -111,6 +121,7 @@ def statistics(
         save_figure(histogram_figure(data), figure)
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed, "play": play,
+        "load": wrench, "gravity": g,
         **summarise(data, limits, yield_strength, confidence),
     }  # fmt: skip
     write_json(summary, json)

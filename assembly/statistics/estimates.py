@@ -105,7 +105,7 @@ def most_probable(
     x = np.asarray(values, dtype=float)
     spread = float(np.quantile(x, 0.75) - np.quantile(x, 0.25)) / 1.349
     scale = min(float(x.std()), spread) or float(x.std())
-    if scale == 0.0:
+    if scale <= 1e-12 * np.abs(x).max():  # all the same, but for rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
     # a long tail must not widen the bins: the density is not highest so far out
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale

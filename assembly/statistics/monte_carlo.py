@@ -22,6 +22,7 @@ from assembly.link_stress import peak_stresses, stressed_links
 from assembly.posture import POSE, Posture
 from assembly.solvers.one_posture import OnePosture, prepare_energies
 from assembly.solvers.posture_margins import PostureMargins, prepare_margins
+from assembly.solvers.reduction import FreeMotion
 from assembly.statistics.distributions import ErrorSources, draw_generator
 from assembly.statistics.play import PLAY, settle_play
 from assembly.sweeps.dataset import save_dataset
@@ -68,6 +69,8 @@ class Experiment:
             :mod:`assembly.statistics.play`.
         margins: whether the zone margins are asked for.
         stress: whether the links' stress is.
+        load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
+        gravity: (3,) [m/s^2] base axes; none if absent.
     """
 
     posture: Posture
@@ -76,6 +79,8 @@ class Experiment:
     play: str = "least"
     margins: bool = True
     stress: bool = True
+    load: tuple[float, ...] | None = None
+    gravity: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.play not in PLAY:
@@ -83,8 +88,15 @@ class Experiment:
 
     @cached_property
     def energies(self) -> OnePosture:
-        """The posture made ready for (22)."""
-        return prepare_energies(self.posture)
+        """The posture made ready for (22).
+
+        Raises:
+            BadInput: the load drives a motion that nothing resists.
+        """
+        try:
+            return prepare_energies(self.posture, self.load, self.gravity)
+        except FreeMotion as error:
+            raise BadInput(f"{self.posture.robot.name}: {error}") from None
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
@@ -259,6 +271,8 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "play": experiment.play,
         "margins": int(experiment.margins),
         "stress": int(experiment.stress),
+        "load": " ".join(map(repr, experiment.load or ())),
+        "gravity": " ".join(map(repr, experiment.gravity or ())),
         "program": f"forcefit {version('forcefit')}",
     }
 
