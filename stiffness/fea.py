@@ -296,14 +296,14 @@ def first_mesh(
         )
 
     start = time.monotonic()
-    for share in (1.0, 0.3):
+    for share in (1.0, 0.5):
         try:
             return mesh(share)
         except MeshFailed as error:
             if time.monotonic() - start > budget.seconds:
                 raise
             _LOG.info("a finer mesh is tried: %s", error)
-    return mesh(0.1)
+    return mesh(0.2)
 
 
 def _solve_level(
