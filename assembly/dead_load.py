@@ -28,7 +28,7 @@ from assembly.finite import LINK, Placement, carried_nominally
 from assembly.posture import Posture
 from assembly.robot import BeamLink, beam_axis
 from stiffness.beam import declared_section
-from stiffness.screws import skew
+from stiffness.screws import rotation_matrix, skew, transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +100,11 @@ def _add_weights(posture: Posture, g: NDArray, own: NDArray, carried: NDArray) -
         own[i] += np.outer(W, [*(-length * axis / 12), 0.5])
         parent = robot.parents[i]
         if parent >= 0:  # else the base carries it
-            # the beam's start and tangent, seen from what the parent carries
-            T = np.linalg.inv(nominal[parent]) @ posture.transforms[i]
+            # the beam's start and tangent, seen from what the parent carries: a
+            # straight beam up to the erring tip, whose stiffness is K_E there
+            error = frame.geometric_error
+            off = transform(error[3:], rotation_matrix(error[:3]))
+            T = np.linalg.inv(nominal[parent]) @ posture.transforms[i] @ off
             along = T[:3, :3] @ (length * axis)
             start = T[:3, 3] - along
             carried[parent] += np.outer(W, [*(start / 2 + along / 12), 0.5])

@@ -165,6 +165,43 @@ def test_a_cantilever_sags_under_its_weight(links, elements):
     assert answer.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
 
 
+def test_a_heavy_beam_converges_with_the_fourth_order():
+    """Between nodes weight acts as on a cubic; as moments that do not turn: order 2.
+
+    A steel wire of 1 m and 8 mm under 3 g turns by 0.05 rad.
+    """
+    wire = BeamLink({"radius": 0.004}, 200e9, 0.3, density=7800.0)
+    posture = home_posture(
+        Robot("wire", "tip", (Frame("tip", translation=[1.0, 0, 0], link=wire),))
+    )
+    screws = [
+        simulate_assembly(posture, gravity=[0, -30, 0], elements=n).platform_screw
+        for n in (4, 8, 16, 64)
+    ]
+    assert abs(screws[-1][2]) > 0.04
+    for part in (slice(0, 3), slice(3, 6)):
+        left = [np.linalg.norm((s - screws[-1])[part]) for s in screws[:3]]
+        assert np.log2(left[0] / left[1]) == pytest.approx(4, abs=0.1)
+        assert np.log2(left[1] / left[2]) == pytest.approx(4, abs=0.1)
+
+
+def test_a_couple_of_dead_forces_does_the_work_of_its_sine():
+    """A spring of 2 N m/rad about z and a couple of 1: 2 angle = cos(angle)."""
+    frames = (
+        Frame(
+            "tip", translation=[0.3, 0, 0], rotation=[0.4, -0.3, 0.7], joint="revolute",
+            joint_stiffness=np.diag([np.inf, np.inf, 2.0, np.inf, np.inf, np.inf]),
+        ),
+        Frame("hand", "tip", rotation=[0.1, 0.2, 0.3]),
+    )  # fmt: skip
+    posture = home_posture(Robot("spring", "hand", frames))
+    z = placement([0.4, -0.3, 0.7], np.zeros(3))[:3, 2]
+    answer = simulate_assembly(posture, couple=1.0 * z)
+    turn = answer.joint_screws[0][2]
+    assert turn > 0.4
+    assert 2 * turn == pytest.approx(np.cos(turn), rel=1e-9)
+
+
 def test_an_infinite_stiffness_locks_its_axis():
     """A drive that yields only about z, by M / k; the other axes do not move."""
     K = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])

@@ -67,7 +67,11 @@ class Pair:
             "links": _named(robot, "link", simulated.link_wrenches - linear.wrenches),
             "joints": _named(robot, "joint_stiffness", joints * sprung(robot)),
         }
-        check = {"closure_gap": simulated.gap, "seconds": simulated.seconds}
+        check = {
+            "closure_gap": simulated.gap,
+            "free_motions_held": simulated.held,
+            "seconds": simulated.seconds,
+        }
         exact = self.exact and {
             "platform_screw": self.exact.platform_screw,
             "energy": self.exact.energy,
@@ -118,13 +122,17 @@ def exact_answer(
         gravity: (3,) [m/s^2] base axes, the one of the linear answer.
 
     Returns:
-        The exact answer or None.
+        The exact answer or None.  The load's moment is a couple of dead forces on the
+        platform, as in the simulation.
     """
-    joints = linear.joints
+    joints, robot = linear.joints, linear.posture.robot
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):
         return None  # nothing can move
+    couple = np.zeros((len(robot.frames), 6))
+    couple[robot.index(robot.platform), :3] = linear.load[:3]
+    force = np.concatenate([np.zeros(3), linear.load[3:]])
     try:
-        return solve_exact(linear.posture, linear.load, linear, gravity=gravity)
+        return solve_exact(linear.posture, force, linear, couple, gravity)
     except (SolverFailed, FreeMotion):
         return None
 

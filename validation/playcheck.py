@@ -241,6 +241,7 @@ def playcheck(
         CannotAssemble: the virtual-joint model has none.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    force = wrench * [0, 0, 0, 1, 1, 1]  # its moment acts as a couple of dead forces
     models = link_models(posture.robot, links)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     between = 0.0
@@ -250,8 +251,8 @@ def playcheck(
     def solve(s: float) -> Pair:
         linear = solve_assembly(scaled(posture, s), s * wrench, gravity=s * g)
         simulated = simulate_assembly(
-            posture, s, load=s * wrench, gravity=s * g, elements=ELEMENTS,
-            clearances=True, time_limit=time_limit, **vars(models),
+            posture, s, load=s * force, gravity=s * g, couple=s * wrench[:3],
+            elements=ELEMENTS, clearances=True, time_limit=time_limit, **vars(models),
         )  # fmt: skip
         exact = exact_answer(linear, s * g)
         return Pair(s, linear, simulated, exact, s**2 * between)

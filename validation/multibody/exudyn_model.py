@@ -9,6 +9,7 @@ of it in :mod:`validation.multibody.exudyn_reading`.
 
 import math
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,21 @@ from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
+HELD = 1e-2  # [N m/rad, N/m] on free motions while closures are pulled shut
 _CENTRING = 1e3  # [N/m] of bounded play; 1e-3 of it in N m/rad, 1e-6 about own axes
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Springs that are in no robot.
+
+    Attributes:
+        closing: [N m/rad, N/m] of the connectors that shut closures.
+        idle: [N m/rad, N/m] that is left on motions that nothing resists.
+    """
+
+    closing: float
+    idle: float
 
 
 class Model:
@@ -28,27 +43,29 @@ class Model:
 
     Attributes:
         robot: its name, for messages.
-        closing: [N m/rad, N/m] of the connectors that shut closures.
+        stiffness: of what is in no robot.
         ground: the base.
         width: [-] of the contacts' smoothing, in sizes of their cones.
         deadline: [s] of ``time.monotonic``, after which the solver stops.
         broken: what was raised inside a function that Exudyn calls; it would tell
             only that there was an error.
+        idle: Exudyn's numbers of the springs of free motions, and their axes.
         watched: places whose way from open to shut is kept.
         seen: where they were: (places, 4, 4) at each step.
     """
 
     def __init__(
-        self, exudyn: Any, items: Any, fem: Any, robot: str, closing: float
+        self, exudyn: Any, items: Any, fem: Any, robot: str, stiffness: Stiffness
     ) -> None:
         self.exu, self.item, self.fem = exudyn, items, fem
-        self.robot, self.closing = robot, closing
+        self.robot, self.stiffness = robot, stiffness
         self.container = self.exu.SystemContainer()
         self.mbs = self.container.AddSystem()
         ground = self.mbs.AddObject(self.item.ObjectGround())
         self.ground = Place(int(ground), np.eye(4), np.eye(4))
         self.width, self.deadline = WIDE, math.inf
         self.broken: BaseException | None = None
+        self.idle: list[tuple[int, int]] = []
         self.watched: list[Place] = []
         self.seen: list[NDArray] = []
 
@@ -85,6 +102,19 @@ class Model:
             self.mbs.AddObject(joint)
         spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
         return Elastic(place, far, (spring,))
+
+    def add_idle(self, place: Place, axis: int) -> Elastic:
+        """A new body at the place that moves freely along one axis, but for a trace."""
+        K = np.diag(np.where(np.arange(6) == axis, HELD, np.inf))
+        spring = self.add_spring(place, K)
+        self.idle.append((spring.parts[0], axis))
+        return spring
+
+    def hold_idle(self, stiffness: float) -> None:
+        """Change how passive joints are held."""
+        for part, axis in self.idle:
+            K = np.diag(np.where(np.arange(6) == axis, stiffness, 0.0))
+            self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
     def add_contact(self, place: Place, play: Play) -> Contact:
         """A new body at the place that may play; a weak spring centres it."""
@@ -136,15 +166,23 @@ class Model:
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
-        connector = self._connect(markers, np.eye(6) * self.closing)
+        connector = self._connect(markers, np.eye(6) * self.stiffness.closing)
         return Closure(first, second, marker, connector, shut)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
         """A wrench at a place, base axes, whose direction stays."""
-        marker = self.add_marker(place)
-        torque, force = self.item.LoadTorqueVector, self.item.LoadForceVector
-        for kind, vector in ((torque, wrench[:3]), (force, wrench[3:])):
-            self.mbs.AddLoad(kind(markerNumber=marker, loadVector=vector.tolist()))
+        torque = self.item.LoadTorqueVector(
+            markerNumber=self.add_marker(place), loadVector=wrench[:3].tolist()
+        )
+        self.mbs.AddLoad(torque)
+        self.add_force(place, wrench[3:])
+
+    def add_force(self, place: Place, force: NDArray) -> None:
+        """A force (3,) [N] at a place, base axes, whose direction stays."""
+        load = self.item.LoadForceVector(
+            markerNumber=self.add_marker(place), loadVector=force.tolist()
+        )
+        self.mbs.AddLoad(load)
 
     def check_time(self) -> None:
         """Raise ``TimeoutError`` after the deadline."""

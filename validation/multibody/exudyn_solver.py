@@ -1,7 +1,8 @@
 """From the open robot to its equilibrium: Exudyn's static solver, stage by stage.
 
-Closures are pulled shut while loads grow; contacts harden, if there are any; what is
-left open is then taken off the closures' targets until nothing is.
+Closures are pulled shut while loads grow; contacts harden, if there are any, and
+motions that nothing resists are released; what is left open is then taken off the
+closures' targets until nothing is.
 
 A solution ends in time: Exudyn counts seconds of the processor and stops between two
 steps, and the functions it calls watch the clock.  What they raise, Ctrl-C among it,
@@ -16,19 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validation.multibody.contact import NARROW, WIDE
-from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_model import HELD, Model
 from validation.multibody.exudyn_parts import Closure, OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import left_open, pose
 from validation.multibody.motion import exponential, inverse, logarithm
 
 _SHUT = 1e-12  # [rad, m] largest component a closure may keep open
 _LOAD_STEPS = 4
+_RELEASING_STEPS = 4  # of motions that nothing resists
 _NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
 _CLOSING_STEPS = 30
 _NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
 _STAGES = (
     "closures are pulled shut and loads grow",
-    "contacts harden",
+    "contacts harden and free motions are released",
     "the last gaps are closed",
 )
 
@@ -52,8 +54,8 @@ def solve(
     model.mbs.SetPreStepUserFunction(_pull(model, closures, shift))
     model.mbs.Assemble()
     equilibrate(model, 0.0, max(_LOAD_STEPS, steps))
-    if narrow:
-        equilibrate(model, 1.0, _NARROWING_STEPS)
+    if narrow or model.idle:
+        equilibrate(model, 1.0, _NARROWING_STEPS if narrow else _RELEASING_STEPS)
     for _ in range(_CLOSING_STEPS):
         if largest_gap(model, closures) <= _SHUT:
             _look(model)
@@ -81,6 +83,8 @@ def _pull(
             model.check_time()
             _look(model)
             model.width = WIDE * (NARROW / WIDE) ** min(max(t - 1.0, 0.0), 1.0)
+            left = model.stiffness.idle / HELD
+            model.hold_idle(HELD * left ** min(max(t - 1.0, 0.0), 1.0))
             way = min(max(t - 2.0, 0.0), 1.0)
             shifts = (1.0 - way) * shift[0] + way * shift[1]
             for closure, screw, more in zip(closures, opened, shifts, strict=True):

@@ -22,8 +22,6 @@ from validation.multibody.exudyn_parts import Closure, Contact, Elastic, MeshBod
 from validation.multibody.exudyn_solids import add_mesh
 from validation.multibody.motion import inverse, matrix, placement, shifted
 
-_IDLE = 1e-6  # [N m/rad, N/m] holds passive joints that nothing else holds
-
 
 class Placed(Protocol):
     """What is asked of a posture."""
@@ -51,6 +49,7 @@ class Case:
         bushes: whether pins play in two bushes each.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
+        couple: (3,) [N m] on the platform besides, base axes, by dead forces.
     """
 
     posture: Placed
@@ -62,6 +61,7 @@ class Case:
     bushes: bool
     load: NDArray
     gravity: NDArray
+    couple: NDArray
 
 
 def link_springs(
@@ -168,9 +168,7 @@ def build(model: Model, case: Case) -> Tree:
             joints[frame.name] = model.add_spring(place, K)
             place = joints[frame.name].far
         elif frame.passive and not frame.compliant and frame.name not in contacts:
-            axes = np.arange(6) == frame.own_axis
-            K = np.diag(np.where(axes, _IDLE, np.inf))
-            idle[frame.name] = model.add_spring(place, K)
+            idle[frame.name] = model.add_idle(place, frame.own_axis)
             place = idle[frame.name].far
         before[frame.name] = place
         after[frame.name] = place.moved(_own_motion(frame, q))
@@ -183,6 +181,8 @@ def build(model: Model, case: Case) -> Tree:
     tree = Tree(bodies, before, links, joints, idle, contacts, closures, platform)
     if case.load.any():
         model.add_load(before[robot.platform], case.load)
+    if case.couple.any():
+        _twist(model, before[robot.platform], platform, case.couple)
     if case.gravity.any():
         _weigh(model, robot, tree, case.gravity)
     return tree
@@ -218,16 +218,26 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
     return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
 
 
+def _twist(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
+    """A couple: along each axis an arm of 1 m, at its end a force m x axis / 2."""
+    for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
+        force = np.cross(couple, axis) / 2
+        model.add_force(place.moved(shifted(arm)), force)
+        model.add_force(place, -force)
+
+
 def _weigh(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
     """Loads of everything that has a mass.
 
     A beam's weight acts at its nodes, with the moments at its ends of a clamped beam
     under uniform load: the tip of a cantilever is then exact for any number of nodes.
+    The moments are pairs of forces on arms that turn with the ends, as the weight of
+    the cubic between the nodes is: weight keeps its direction and has a potential.
     """
     for frame in robot.frames:
         if frame.mass:
             centre = tree.bodies[frame.name].moved(shifted(frame.centre_of_mass))
-            model.add_load(centre, np.concatenate([np.zeros(3), frame.mass * gravity]))
+            model.add_force(centre, frame.mass * gravity)
         link = frame.link
         if not isinstance(link, BeamLink) or link.density is None:
             continue
@@ -237,11 +247,10 @@ def _weigh(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
         nodes = part.nodes or (part.near.moved(shifted(-line)), part.far)
         step = tree.bodies[frame.name].built[:3, :3] @ line / (len(nodes) - 1)
         section = declared_section(link.section, link.poisson)
-        weight = link.density * section.area * length * gravity
-        weight = weight / (len(nodes) - 1)
-        moment = np.cross(step, weight) / 12
-        for k, node in enumerate(nodes):
-            first, last = k == 0, k == len(nodes) - 1
-            force = weight * (0.5 if first or last else 1.0)
-            couple = moment * (float(first) - float(last))
-            model.add_load(node, np.concatenate([couple, force]))
+        weight = link.density * section.area * length * gravity / (len(nodes) - 1)
+        for node in nodes[1:-1]:
+            model.add_force(node, weight)
+        for node, sign in ((nodes[0], 1.0), (nodes[-1], -1.0)):
+            arm = shifted(node.built[:3, :3].T @ step)
+            model.add_force(node, weight * (1 / 2 - sign / 12))
+            model.add_force(node.moved(arm), weight * sign / 12)

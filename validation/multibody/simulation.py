@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import Robot
 from stiffness.reading import BadInput
-from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_model import HELD, Model, Stiffness
 from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
 from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed
 from validation.multibody.exudyn_reading import (
@@ -46,10 +46,10 @@ from validation.multibody.open_robot import Case, Placed, Tree, build, link_spri
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
-# [N m/rad, N/m] of the connectors that shut closures, tried in turn; beside contacts
-# they must hardly be softer than these
-_CLOSING = (1e10,)
-_CLOSING_CONTACTS = (1e12, 1e11)
+# tried in turn; beside contacts closures must hardly be softer than these, and a rod
+# between two balls may roll by radians under its own weight unless it is held
+_TIGHT = (Stiffness(1e10, 1e-6), Stiffness(1e10, HELD))
+_PLAYING = (Stiffness(1e12, 1e-6), Stiffness(1e11, 1e-6), Stiffness(1e11, HELD))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,8 @@ class MultibodyAssembly:
         gap: [rad, m] largest component left open in a closure.
         idle_energy: [J] in the springs that hold free motions; a check, nearly zero.
         contact_energy: [J] by which contacts yield.
+        held: whether motions that nothing resists are held by 0.01 N m/rad or N/m,
+            since no equilibrium was found without.
         seconds: [s] taken.
     """
 
@@ -89,6 +91,7 @@ class MultibodyAssembly:
     gap: float
     idle_energy: float
     contact_energy: float
+    held: bool
     seconds: float
 
     @property
@@ -109,6 +112,8 @@ def simulate_assembly(
     meshes: Mapping[str, MeshBody] | None = None,
     bushes: bool = False,
     time_limit: float = TIME_LIMIT,
+    couple: ArrayLike | None = None,
+    hold: bool = False,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
 
@@ -130,6 +135,10 @@ def simulate_assembly(
             see :func:`validation.multibody.contact.joint_play`, instead of a disc and a
             cone.
         time_limit: [s] after which the simulation fails.
+        couple: (3,) [N m] on the platform besides, base axes, by forces whose direction
+            stays on arms that turn with it: it has a potential, a moment has none.
+        hold: hold motions that nothing resists from the first; otherwise only where no
+            equilibrium is found without.
 
     Returns:
         The assembled robot.
@@ -147,12 +156,13 @@ def simulate_assembly(
     springs = link_springs(posture.robot, links, given, solids)
     case = Case(
         posture, scale, springs, solids, elements, clearances, bushes,
-        _vector(load, 6), _vector(gravity, 3),
+        _vector(load, 6), _vector(gravity, 3), _vector(couple, 3),
     )  # fmt: skip
-    *first, last = _CLOSING_CONTACTS if clearances else _CLOSING
-    for closing in first:
+    *first, last = _PLAYING if clearances else _TIGHT
+    first = [] if hold else first
+    for added in first:
         try:
-            return _simulate(case, closing, started, time_limit)
+            return _simulate(case, added, started, time_limit)
         except OutOfTime:
             raise
         except SimulationFailed:
@@ -166,11 +176,11 @@ def _vector(given: ArrayLike | None, size: int) -> NDArray:
 
 
 def _simulate(
-    case: Case, closing: float, started: float, limit: float
+    case: Case, stiffness: Stiffness, started: float, limit: float
 ) -> MultibodyAssembly:
     """Build, solve, read, and give the memory back."""
     robot = case.posture.robot
-    model = Model(*_import_exudyn(), robot.name, closing)
+    model = Model(*_import_exudyn(), robot.name, stiffness)
     model.deadline = started + limit
     try:
         tree = build(model, case)
@@ -203,9 +213,10 @@ def closing_sequence(
     robot = posture.robot
     springs = link_springs(robot, "beam", {}, {})
     case = Case(
-        posture, scale, springs, {}, 4, False, False, _vector(load, 6), np.zeros(3)
-    )
-    model = Model(*_import_exudyn(), robot.name, _CLOSING[-1])
+        posture, scale, springs, {}, 4, False, False, _vector(load, 6), np.zeros(3),
+        np.zeros(3),
+    )  # fmt: skip
+    model = Model(*_import_exudyn(), robot.name, _TIGHT[-1])
     model.deadline = time.monotonic() + TIME_LIMIT
     try:
         tree = build(model, case)
@@ -265,6 +276,7 @@ def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAs
         gap=largest_gap(model, tree.closures),
         idle_energy=sum(energy(model, part) for part in tree.idle.values()),
         contact_energy=sum(contact_energy(model, c) for c in tree.contacts.values()),
+        held=bool(model.idle) and model.stiffness.idle == HELD,
         seconds=time.monotonic() - started,
     )
 
