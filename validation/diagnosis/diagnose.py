@@ -21,15 +21,16 @@ from assembly.effects import apply_effects
 from assembly.predict import predict, with_finite_motions, with_second_order
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
+from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
-from validation.diagnosis.refit import Fit
+from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
-from validation.diagnosis.scoring import Scored, Screen, inclusion, named
+from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, named
 from validation.diagnosis.selection import Selection, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import Trend, trends
-from validation.diagnosis.verdict import by_names, verdict
+from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 
 
 @dataclass(frozen=True)
@@ -137,16 +138,23 @@ def _judge(
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
     used = parts.fitted & ~outliers
-    fitting = campaign.take(used)
+    fitting, measured = campaign.take(used), campaign.measured
     lack = lack_of_fit(fitting, found.fit.residual, found.unknowns)
     declared = lack_of_fit(fitting, found.tangents.residual, 0)
     sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
     best = named(found.screen, found.sets[0])
+    linear = here if finite else replace(here, second_order=0.0)
+    before = measured - predict(linear).deviation
+    if not finite and not found.sets[0].members:
+        gain = np.sum(whiten(fitting, before[used]) ** 2) - found.fit.rss
+        sets, probability = linear_or_finite(sets, probability, float(gain))
+        if sets[0][0] == (FINITE,):
+            motions = [Hypothesis(FINITE, (), ())]
+            fit = refit(fitting, here.take(used), motions, np.zeros(0))
+            found, best = replace(found, fit=fit), (FINITE,)
     said, claimed = verdict(sets, probability, lack.significant)
     after = apply_effects(here, found.fit.effects)
-    measured = campaign.measured
-    residual_before = measured - predict(here).deviation
     residual_after = measured - predict(after).deviation
     left: tuple[Trend, ...] = ()
     if said == "outside_library":
@@ -155,23 +163,23 @@ def _judge(
     if said == "ambiguous":
         best_fit = found.fit
         if finite:  # of all rivals alike, so that it tells nothing apart
-            linear = replace(best_fit.conditions, exact=False)
-            best_fit = replace(best_fit, conditions=linear)
+            there = replace(best_fit.conditions, exact=False)
+            best_fit = replace(best_fit, conditions=there)
         further = next_measurement(fitting, here.take(used), best_fit, found.rivals)
     held = ~parts.fitted & ~outliers
     if not held.any():
         held = used
     far = np.zeros_like(held)
-    shown = residual_after if said in {"explained", "ambiguous"} else residual_before
+    shown = residual_after if said in {"explained", "ambiguous"} else before
     judged = campaign.take(held)
     far[held] = outlying(judged, whiten(judged, residual_after[held]))
     outliers = outliers | far
     held &= ~far
     return Diagnosis(
         campaign, said, found.fit, claimed, probability, sets, best, lack,
-        declared, _errors(campaign, residual_before, held),
+        declared, _errors(campaign, before, held),
         _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
-        parts, outliers, here, residual_before, residual_after, found.screen,
+        parts, outliers, here, before, residual_after, found.screen,
         found.sets[0], left, further,
     )  # fmt: skip
 

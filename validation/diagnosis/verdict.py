@@ -1,5 +1,6 @@
 """From probabilities to a verdict, and how often it is right on a campaign's design."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +9,14 @@ import numpy as np
 from scipy.stats import chi2
 
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
-from validation.diagnosis.scoring import Scored, Screen, inclusion, named, posterior
+from validation.diagnosis.scoring import (
+    FINITE,
+    Scored,
+    Screen,
+    inclusion,
+    named,
+    posterior,
+)
 
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one stands against it
@@ -33,6 +41,39 @@ def by_names(screen: Screen, sets: Sequence[Scored]) -> Sets:
         weights[names] = weights.get(names, 0.0) + float(weight)
     listed = sorted(weights.items(), key=lambda item: -item[1])
     return tuple((names, p) for names, p in listed if p >= _LISTED)
+
+
+def linear_or_finite(
+    sets: Sets, probability: dict[str, float], gain: float
+) -> tuple[Sets, dict[str, float]]:
+    """No effect beside the declared model: is that linear, or are motions finite?
+
+    Scored models carry what the declared errors do to second order, so that no other
+    effect is blamed for it.  Where they need nothing else, what that second order
+    explains speaks for ``geometric_stiffening``.
+
+    Args:
+        sets: of effects, with their probabilities, likeliest first.
+        probability: of every effect.
+        gain: [-] squared whitened residual of the linear model, minus that with the
+            second order.
+
+    Returns:
+        The same with the weight of no effect at all shared between both.
+    """
+    odds = math.exp(min(gain / 2, 500.0)) / max(len(probability), 1)
+    part = odds / (1 + odds)
+    weights = dict(sets)
+    nothing = weights.pop((), 0.0)
+    moved = {(): nothing * (1 - part), (FINITE,): nothing * part}
+    for names, weight in moved.items():
+        weights[names] = weights.get(names, 0.0) + weight
+    listed = sorted(weights.items(), key=lambda item: -item[1])
+    known = probability.get(FINITE, 0.0) + nothing * part
+    return (
+        tuple((names, p) for names, p in listed if p >= _LISTED),
+        probability | {FINITE: known},
+    )
 
 
 def verdict(
