@@ -38,6 +38,7 @@ from validation.validity import (
 )
 
 FORKS = Path(__file__).parents[1] / "meshes" / "distal_forks.stl"
+REFERENCES = Path(__file__).with_name("stiffness_references.json")
 BORES = ("bore=0,0,0/0,1,0/0.011", "bore=0,0,0.452/0,1,0/0.011")
 KEPT = Path(__file__).parent / "validity_bars.json"
 PAPER = 0.02  # [rad] the paper's errors
@@ -204,6 +205,33 @@ def forks() -> Iterable[dict]:
         yield row(head, built, link_cost, solids)
 
 
+def rods() -> Iterable[dict]:
+    """(b) for the hexapod: 400 mm of each leg a steel tube with solid heads.
+
+    ``meshes/delta_forearm.stl``; K_E of its exact geometry by
+    ``stiffness_references.py``, there of 60 GPa and along z.
+    """
+    kept = json.loads(REFERENCES.read_text())["delta_forearm"]["stiffness"]
+    z_to_x = np.kron(np.eye(2), [[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    solid = z_to_x @ np.array(kept) @ z_to_x.T * (200 / 60)
+    cases = postures("hexapod")
+    names = [f.name for f in cases[0].robot.frames if f.link is not None]
+    solids = dict.fromkeys(names, solid)
+    for shape, section in (
+        ("bar, r = 7 mm", {"radius": 0.007}),
+        ("tube, 14 x 2 mm", {"radius": 0.007, "inner_radius": 0.005}),
+    ):
+        beam = BeamLink(section, 200e9, 0.3, length=0.4, axis=(1.0, 0.0, 0.0))
+        built = [
+            replace(c, robot=c.robot.with_links(dict.fromkeys(names, beam)))
+            for c in cases
+        ]
+        none = free_of_errors(built)
+        for case, load, several in (("errors", None, built), ("1 kN", DOWN, none)):
+            head = ("hexapod", "rods", f"{shape}, {case}", 0.4 / 0.007)
+            yield row(head, several, link_cost, solids, load)
+
+
 def over_poses(name: str) -> dict:
     """Costs over the workspace at the paper's errors, as built: medians of 3 draws."""
     if name == "irsbot2":
@@ -259,7 +287,7 @@ def main() -> None:
             rows += found
         print_margins(name)
     print("\nreal shape\n")
-    found = list(forks())
+    found = [*forks(), *rods()]
     print_table(found)
     rows += found
     maps = {name: over_poses(name) for name in POSES}
