@@ -162,9 +162,12 @@ def stumpff(turn: NDArray) -> list[NDArray]:
     large = squared > 1.0
     small = np.where(large, 0.0, squared)
     functions = []
+    most, terms = float(small.max(initial=0.0)), 2
+    while terms < _SERIES and most**terms / math.factorial(2 * terms) > 1e-18:
+        terms += 1
     for k in range(6):
         value = np.zeros_like(small)
-        for j in reversed(range(_SERIES)):
+        for j in reversed(range(terms)):
             value = 1 / math.factorial(2 * j + k) - value * small
         functions.append(value)
     if large.any():

@@ -29,10 +29,12 @@ def skew(vector: ArrayLike) -> NDArray:
     Returns:
         (..., 3, 3) antisymmetric.
     """
-    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    v = np.asarray(vector, dtype=float)
+    S = np.zeros((*v.shape[:-1], 3, 3))
+    S[..., 2, 1] = v[..., 0]
+    S[..., 0, 2] = v[..., 1]
+    S[..., 1, 0] = v[..., 2]
+    return S - np.swapaxes(S, -1, -2)
 
 
 def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:

@@ -151,8 +151,9 @@ def in_full(campaign: Campaign, here: Conditions, fit: Fit) -> Fit:
 
 
 def refit(
-    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray
-) -> Fit:
+    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
+    defect: NDArray | float = 0.0,
+) -> Fit:  # fmt: skip
     """Fit a set of hypotheses in the full model.
 
     Args:
@@ -160,6 +161,7 @@ def refit(
         here: its conditions without the effects; with ``rest``, play is held there.
         members: hypotheses of different effects.
         start: where to begin, one unknown after the other.
+        defect: (N,) whitened, what finite motions add about there, where it is known.
 
     Returns:
         The fit.
@@ -168,7 +170,6 @@ def refit(
     if not linear or len(linear) == len(members):
         return _refit(campaign, here, members, start)
     # finite motions take a hundred times longer: their defect is fitted, not they
-    defect = np.zeros(int(campaign.cells.sum()))
     for _ in range(_MOST_DEFECTS):
         fit = _refit(campaign, here, linear, start, defect)
         there = replace(fit.conditions, exact=True)

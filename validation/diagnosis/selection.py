@@ -95,6 +95,7 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
     signatures = [tangents.at_start(h) for h in candidates]
     signatures = [s for s in signatures if _finite(s) and _shows(s)]
     project = _Projector([tangents.at_start(h) for h in nuisance])
+    finite = next((s.offset for s in signatures if s.hypothesis.effect == FINITE), 0.0)
     best: tuple[Hypothesis, ...] = ()
     rest: NDArray | None = None  # where play would rest in closed chains; slow to find
     known: dict[object, Fit] = {}
@@ -116,7 +117,7 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
                 fits[one.members] = refit(campaign, held, every, start)
                 continue
             if _names(every) not in known:
-                known[_names(every)] = refit(campaign, here, every, start)
+                known[_names(every)] = refit(campaign, here, every, start, finite)
             fits[one.members] = known[_names(every)]
         sets = _with_fits(screen, sets, fits)
         chosen = fits[sets[0].members]
