@@ -13,6 +13,7 @@ from stiffness import library as library_module
 from stiffness.beam import beam_compliance, round_section
 from stiffness.cli import app
 from stiffness.condense import condense
+from stiffness.curve import curve_compliance
 from stiffness.elements import lame, quadratic
 from stiffness.estimate import error_matrices
 from stiffness.export import stiffness_for, translations_first
@@ -21,6 +22,7 @@ from stiffness.library import (
     Entry,
     Spec,
     build_library,
+    entry_key,
     look_up,
     read_compliance,
     read_entry,
@@ -28,7 +30,7 @@ from stiffness.library import (
     read_spec,
 )
 from stiffness.link import inverted, scaled
-from stiffness.parametric import SHAPES, shape_surface
+from stiffness.parametric import SHAPES, shape_beam, shape_surface
 from stiffness.reading import BadInput
 from tests.solids_for_tests import bar_solid
 
@@ -328,8 +330,59 @@ def test_between_finite_elements_the_error_is_covered_too(length):
     assert scaled(error, found).max() < own + 0.01
 
 
+SHIPPED = EXAMPLE.parent / "stiffness_library"
+# diagonal RX, RZ, TX, TZ of links between the entries that ship, by Fourier modes in
+# their half section (benchmarks/stiffness_round_references.py), good to 1e-6
+BETWEEN = {
+    ("round", 0.25): (137442.8, 26455.52, 6526643.0, 355428100.0),
+    ("round", 0.37): (94455.39, 17875.35, 2061490.0, 239366500.0),
+    ("tube", 0.25): (60592.8, 12645.57, 2796218.0, 98155280.0),
+    ("tube", 0.37): (43336.49, 8544.305, 933078.5, 66207970.0),
+    ("cone", 0.25): (86712.04, 28632.81, 9460910.0, 399129400.0),
+    ("cone", 0.37): (59765.09, 19370.76, 3017814.0, 269134000.0),
+}
+
+
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_build_file_of_each_shape_ships(shape):
-    spec = read_spec(EXAMPLE.parent / "stiffness_library" / f"{shape}.toml")
+def test_a_build_file_of_each_shape_ships_with_its_entries(shape):
+    """The keys are those a build would make: it finds all of them there."""
+    spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
-    assert len(spec.points()) == 3
+    entries = read_library(SHIPPED / shape)
+    assert {e.key for e in entries} == {entry_key(spec, p) for p in spec.points()}
+    for entry in entries:
+        assert entry.about["mesh"]["reached"]
+        assert entry.about["relative_error_estimate"] <= spec.accuracy
+        assert len(entry.about["geometry"]) == 64
+
+
+@pytest.mark.parametrize(("shape", "length"), BETWEEN)
+def test_between_shipped_entries_an_independent_stiffness_is_covered(shape, length):
+    K, error = look_up(read_library(SHIPPED / shape), {"length": length})
+    i = [0, 2, 3, 5]
+    exact = np.array(BETWEEN[shape, length])
+    gap = np.abs(np.diag(K)[i] - exact)
+    assert (gap <= np.diag(error)[i]).all()
+    assert (gap < 0.01 * exact).all()
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_shipped_square_links_are_their_beams_with_stiffer_ends(shape):
+    """Held ends add up to 0.3 b / L in bending, nothing is softer than Timoshenko's
+    but a box in torsion, whose corners Bredt's formula leaves out."""
+    K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
+    lengths = read_spec(SHIPPED / f"{shape}.toml").grid
+    lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}
+    beam = inverted(curve_compliance(shape_beam(shape, lengths, 0.33), 7e10, 0.33))
+    ratio = np.diag(K) / np.diag(beam)
+    assert ((ratio[[0, 1, 3, 4, 5]] > 1) & (ratio[[0, 1, 3, 4, 5]] < 1.05)).all()
+    assert 1 < ratio[2] < 1.06
+
+
+@pytest.mark.parametrize("length", [0.19, 0.46])
+def test_the_shipped_library_refuses_outside(length):
+    result = CliRunner().invoke(
+        app, ["library", "look-up", str(SHIPPED / "tube"), "--at", f"length={length}"]
+    )
+    assert isinstance(result.exception, BadInput)
+    assert "outside the grid, 0.2 .. 0.45" in str(result.exception)
