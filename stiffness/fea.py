@@ -217,7 +217,7 @@ def solve_link(
         if (worst <= accuracy and len(history) > 1) or len(history) == budget.levels:
             break
         # the error falls with the count of elements, or faster
-        wanted = float(np.clip(1.15 * worst / accuracy, 1.2, 2.5))
+        wanted = float(np.clip(1.15 * worst / accuracy, 1.2, 3.0))
         finer = _affordable_mesh(level, wanted, budget, start)
         if finer is None:
             break
