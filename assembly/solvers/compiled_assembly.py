@@ -37,7 +37,7 @@ _NOISE = 1e-12
 _LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
 # gap from which Newton's method finishes: of the energy, of that without play
-_NEAR, _NEAR_WITHOUT_PLAY = 1e-7, 1e-8
+_NEAR, _NEAR_WITHOUT_PLAY = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _SHARP = 1e6  # its first sigma after an interior point, see dual_newton
 

@@ -15,7 +15,7 @@ from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 
 SOLVED, UNCERTIFIED = range(2)
 _STOP = 1e-2
-_PROJECTIONS, _INWARDS = 40, 0.98
+_PROJECTIONS, _INWARDS = 30, 0.8
 _MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
 
 
