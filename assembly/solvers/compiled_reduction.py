@@ -107,14 +107,29 @@ def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
     return F
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
     """Orthonormal rows orthogonal to all triangulated ones."""
-    Z = np.zeros((m - rank, m))
-    for i in range(m - rank):
-        Z[i, rank + i] = 1.0
-        turn(F, turns, rank, Z[i])
-    return Z
+    # all of them turned at once: Z's columns as rows
+    count = m - rank
+    Zt, dots = np.zeros((m, count)), np.empty(count)
+    for i in range(count):
+        Zt[rank + i, i] = 1.0
+    for step in range(rank - 1, -1, -1):
+        own = F[step]
+        for i in range(count):
+            dots[i] = 0.0
+        for a in range(step, m):
+            row, weight = Zt[a], own[a]
+            for i in range(count):
+                dots[i] += weight * row[i]
+        for i in range(count):
+            dots[i] *= turns[step]
+        for a in range(step, m):
+            row, weight = Zt[a], own[a]
+            for i in range(count):
+                row[i] -= weight * dots[i]
+    return np.ascontiguousarray(Zt.T)
 
 
 @njit(cache=True, error_model="numpy")

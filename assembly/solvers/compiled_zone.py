@@ -28,7 +28,7 @@ from assembly.solvers.interior import interior_point
 SOLVED, HANDED_BACK = range(2)
 _RANK, _ROWS_RANK, _NOISE = 1e-10, 1e-9, 1e-12  # as in assembly.solvers.reduction
 _LEFT = 1e-13  # part of what may stay open, as in assembly.solvers.reduction
-_STOP, _GAP = 1e-11, 1e-8  # of the margin: where to stop, what to accept
+_STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
 
 
 @njit(cache=True, error_model="numpy")

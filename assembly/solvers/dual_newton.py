@@ -22,6 +22,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from assembly.solvers.interior import LANES, add, dot, layers_of
+
 _HALVINGS = 12
 _SHARPER = 10.0  # growth of sigma each time u_old moves
 _SETTLED = 0.1  # part of the gap that may be the inner problem's
@@ -53,132 +55,150 @@ def dual_newton(
         Steps taken; -1 if it did not settle.
     """
     r, nu = len(h), len(u)
+    order, layers = layers_of(starts)
+    # as in the interior point: rows of G, columns in layers, ending in zeros
+    width = nu + -nu % LANES
+    M, B, columns = np.zeros((r, width)), np.zeros((r, width)), np.zeros((4, width))
+    old, own, push, z = columns[0], columns[1], columns[2], columns[3]
+    for j in range(nu):
+        old[j], push[j] = u[order[j]], -d[order[j]]
+        for i in range(r):
+            M[i, j] = Gt[order[j], i]
     g, S, step, start = np.empty(r), np.empty((r, r)), np.zeros(r), np.empty(r)
-    old = u.copy()
-    mean = 0.0
     for i in range(springs):
-        y[i] = h[i]
-        for c in range(nu):
-            y[i] += Gt[c, i] * u[c]
-    for c in range(nu):
-        z = -d[c]
-        for i in range(springs):
-            z += Gt[c, i] * h[i]
-        mean += abs(z) / nu
+        y[i] = h[i] + dot(M[i], old)
+    for j in range(width):
+        z[j] = push[j]
+    for i in range(springs):
+        add(h[i], M[i], z)
+    mean = 0.0
+    for j in range(nu):
+        mean += abs(z[j]) / nu
     sigma = sharp / max(mean, 1e-12) if sharp > 0.0 else 1e30
     before, halvings, taken = -np.inf, 0, 0
     while True:
         smooth, residual, kink, primal = _slopes(
-            Gt, h, d, springs, starts, old, sigma, u, y, g, S
+            M, h, push, springs, layers, old, sigma, own, y, g, z, B
         )
         closed = True
         for i in range(springs, r):
             closed = closed and abs(g[i]) <= _OPEN
         if closed and residual + kink <= relative * primal + absolute:
-            return taken
+            break
         if not smooth >= before - 1e-14:
             halvings += 1
             if halvings > _HALVINGS or sharp == 0.0:
-                return -1
+                taken = -1
+                break
             for i in range(r):
                 step[i] *= 0.3
                 y[i] = start[i] + step[i]
             continue
         if taken == steps:
-            return -1
+            taken = -1
+            break
         before, halvings, taken = smooth, 0, taken + 1
         if residual <= _SETTLED * (residual + kink):
-            for c in range(nu):
-                old[c] = u[c]
+            for j in range(width):
+                old[j] = own[j]
             sigma *= _SHARPER
             before = -np.inf
-            _slopes(Gt, h, d, springs, starts, old, sigma, u, y, g, S)
+            _slopes(M, h, push, springs, layers, old, sigma, own, y, g, z, B)
+        _curvature(B, springs, S)
         if not _solve(S, g, step):
-            return -1
+            taken = -1
+            break
         for i in range(r):
             start[i] = y[i]
             y[i] += step[i]
+    for j in range(nu):
+        u[order[j]] = own[j]
+    return taken
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def _slopes(
-    Gt: NDArray, h: NDArray, d: NDArray, springs: int, starts: NDArray, old: NDArray,
-    sigma: float, u: NDArray, y: NDArray, g: NDArray, S: NDArray,
+    M: NDArray, h: NDArray, push: NDArray, springs: int, layers: NDArray, old: NDArray,
+    sigma: float, u: NDArray, y: NDArray, g: NDArray, z: NDArray, B: NDArray,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """Smooth dual at y, the two parts of the gap, and the primal value.
+    """What the smooth dual is at y, and how it goes on.
 
-    Args:
-        Gt: as in :func:`dual_newton`.
-        h: see there.
-        d: see there.
-        springs: see there.
-        starts: see there.
-        old: (nu,) the clearances that u is drawn to.
-        sigma: how loosely.
-        u: (nu,) leaves holding the clearances.
-        y: (r,) where.
-        g: (r,) leaves holding the slope.
-        S: (r, r) leaves holding minus the curvature, lower half.
+    ``u`` leaves holding the clearances, ``g`` the slope, ``B`` a root of minus the
+    curvature but for the springs' own; ``old`` are the clearances that u is drawn to,
+    ``sigma`` says how loosely.  Columns are in layers, rows all those of M.
 
     Returns:
         The smooth dual, the gap from the slope and from the kinks, the springs' energy.
     """
-    r = len(h)
+    for j in range(len(z)):
+        z[j] = push[j]
+    for i in range(len(y)):
+        add(y[i], M[i], z)
+    discs = layers[2] - layers[1] if len(layers) > 2 else 0
+    cones = layers[1]
+    # the weights of both columns in each row of B: first a, b, then e
+    weights = np.zeros((3, cones))
+    root = np.sqrt(sigma)
     smooth, kink = 0.0, 0.0
-    for i in range(r):
-        stretch = y[i] if i < springs else 0.0
-        g[i] = h[i] - stretch
-        smooth += y[i] * (h[i] - 0.5 * stretch)
-        for l in range(i):
-            S[i, l] = 0.0
-        S[i, i] = 1.0 if i < springs else 0.0
-    for c in range(len(starts) - 1):
-        a, b = starts[c], starts[c + 1]
-        z1, z2 = -d[a], 0.0
-        for i in range(r):
-            z1 += Gt[a, i] * y[i]
-        w1, w2 = old[a] - sigma * z1, 0.0
-        if b - a == 2:
-            z2 = -d[a + 1]
-            for i in range(r):
-                z2 += Gt[a + 1, i] * y[i]
-            w2 = old[a + 1] - sigma * z2
+    for c in range(discs):
+        z1, z2 = z[c], z[cones + c]
+        o1, o2 = old[c], old[cones + c]
+        w1, w2 = o1 - sigma * z1, o2 - sigma * z2
         size = np.sqrt(w1 * w1 + w2 * w2)
         inside = size <= 1.0
-        if not inside:
-            w1, w2 = w1 / size, w2 / size
-        u[a] = w1
-        moved = (w1 - old[a]) ** 2
-        if b - a == 2:
-            u[a + 1] = w2
-            moved += (w2 - old[a + 1]) ** 2
+        shorter = 1.0 if inside else 1.0 / size
+        w1, w2 = w1 * shorter, w2 * shorter
+        u[c], u[cones + c] = w1, w2
         along = z1 * w1 + z2 * w2
+        moved = (w1 - o1) * (w1 - o1) + (w2 - o2) * (w2 - o2)
         smooth += along + moved / (2.0 * sigma)
         kink += max(0.0, np.sqrt(z1 * z1 + z2 * z2) + along)
-        for i in range(r):
-            g[i] += w1 * Gt[a, i]
-        if b - a == 2:
-            for i in range(r):
-                g[i] += w2 * Gt[a + 1, i]
-        if inside:
-            for j in range(a, b):
-                for i in range(r):
-                    weight = sigma * Gt[j, i]
-                    for l in range(i + 1):
-                        S[i, l] += weight * Gt[j, l]
-        elif b - a == 2:
-            for i in range(r):
-                across = sigma / size * (w1 * Gt[a + 1, i] - w2 * Gt[a, i])
-                for l in range(i + 1):
-                    S[i, l] += across * (w1 * Gt[a + 1, l] - w2 * Gt[a, l])
+        across = root * np.sqrt(shorter)
+        weights[0, c] = root if inside else -across * w2
+        weights[1, c] = 0.0 if inside else across * w1
+        weights[2, c] = root if inside else 0.0
+    for c in range(discs, cones):
+        w = old[c] - sigma * z[c]
+        inside = abs(w) <= 1.0
+        if not inside:
+            w = 1.0 if w > 0.0 else -1.0
+        u[c] = w
+        along = z[c] * w
+        smooth += along + (w - old[c]) * (w - old[c]) / (2.0 * sigma)
+        kink += max(0.0, abs(z[c]) + along)
+        weights[0, c] = root if inside else 0.0
     residual, primal = 0.0, 0.0
-    for i in range(springs):
+    for i in range(len(y)):
+        row, out = M[i], B[i]
+        stretch = y[i] if i < springs else 0.0
+        smooth += y[i] * (h[i] - 0.5 * stretch)
+        g[i] = h[i] - stretch + dot(row, u)
         residual += g[i] * g[i]
-        primal += (g[i] + y[i]) ** 2
-    for i in range(springs, r):
-        residual += g[i] * g[i]
-        kink -= y[i] * g[i]
+        if i < springs:
+            primal += (g[i] + y[i]) * (g[i] + y[i])
+        else:
+            kink -= y[i] * g[i]
+        first, second = row[:cones], row[cones : cones + discs]
+        a, b, e = weights[0], weights[1], weights[2]
+        into = out[:cones]
+        for c in range(cones):
+            into[c] = a[c] * first[c]
+        into = out[cones : cones + discs]
+        for c in range(discs):
+            out[c] += b[c] * second[c]
+            into[c] = e[c] * second[c]
     return smooth, 0.5 * residual, kink, 0.5 * primal
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
+    """Lower half of S = B B^T + diag(1 .. 1, 0 .. 0)."""
+    for i in range(len(S)):
+        row = B[i]
+        for l in range(i + 1):
+            S[i, l] = dot(row, B[l])
+        if i < springs:
+            S[i, i] += 1.0
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
