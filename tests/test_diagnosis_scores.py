@@ -27,7 +27,7 @@ def signature(effect, columns, lower=-np.inf, upper=np.inf, offset=0.0):
 
 
 def test_scores_by_hand():
-    """-RSS/2 - k/2 ln n - ln C(m, |S|) - ln(ways), for n = 4 and m = 2 effects."""
+    """-RSS/2 - k/2 ln n - ln C(m, |S|) - (|S| - 1) ln 10 - ln(ways), n = 4, m = 2."""
     z = np.array([2.0, 0.0, 1.0, 0.0])
     e = np.eye(4)
     screen = Screen(
@@ -40,7 +40,7 @@ def test_scores_by_hand():
     two = screen.fit((2, 0))
     assert two.members == (0, 2)
     assert two.values == pytest.approx([2.0, 1.0, 0.0])
-    assert two.score == pytest.approx(0 - 3 * log(4) / 2 - log(1) - log(2))
+    assert two.score == pytest.approx(0 - 3 * log(4) / 2 - log(10) - log(2))
 
 
 def test_an_offset_is_not_scaled():
@@ -96,6 +96,7 @@ def test_the_search_finds_the_best_of_all_small_sets(rng):
             ])
             left = z - A @ np.linalg.lstsq(A, z)[0]
             penalty = A.shape[1] / 2 * log(60) + log(comb(7, size))
+            penalty += max(size - 1, 0) * log(10)
             scores[members] = -left @ left / 2 - penalty
     best = Screen(z, signatures).search()[0]
     assert best.members == max(scores, key=scores.get)

@@ -14,7 +14,7 @@ from scipy.stats import chi2, f
 from validation.campaign.campaign import Campaign, number_rows
 
 SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
-_LEVELS = 10  # of a covariate's range within which rows are alike
+_LEVELS = 30  # of a covariate's range within which rows are alike
 _OUTLYING = 5.5  # rms of a row, in medians of all rows
 
 
@@ -94,7 +94,7 @@ def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
 
 def _alike(campaign: Campaign) -> NDArray:
     """(R,) number of the situation: command, load, every covariate but time."""
-    # alike: no covariate differs by more than a tenth of its range.  What nobody
+    # alike: no covariate differs by more than a thirtieth of its range.  What nobody
     # modelled must not pass for noise
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():

@@ -3,7 +3,8 @@
 The score of a set S of hypotheses with k unknowns is the extended Bayesian information
 criterion, in logarithms of probability,
 
-    -RSS/2 - (k/2) ln n - ln C(m, |S|) - sum of ln(ways in which each effect may act),
+    -RSS/2 - (k/2) ln n - ln C(m, |S|) - (|S| - 1) ln 10
+        - sum of ln(ways in which each effect may act),
 
 and an effect's probability is the posterior weight of all sets that have it.  Unknowns
 stay within their bounds: a negative compliance explains nothing.
@@ -30,6 +31,7 @@ _WAYS = 2  # ways of each effect that are tried in pairs, beside its most genera
 _BEST = 8  # sets of each size that are enlarged by anything
 _APART = 1e-3  # sine of the angle between a column and those before it
 FINITE = "geometric_stiffening"
+_FURTHER = math.log(10.0)  # of each effect beyond the first: a tenth as likely
 _DIGITS = 2  # of a score; refits of one model reached by two ways differ below
 _RANK = 1e-9  # relative eigenvalue below which columns are one
 
@@ -160,6 +162,7 @@ class Screen:
     def _score(self, members: tuple[int, ...], rss: float, k: int) -> float:
         ways = sum(self._ways[i] for i in members)
         several = math.log(math.comb(self._m, len(members)))
+        several += max(len(members) - 1, 0) * _FURTHER
         return -rss / 2 - k / 2 * math.log(self.count) - several - ways
 
     def rescored(self, one: Scored, rss: float, values: NDArray) -> Scored:

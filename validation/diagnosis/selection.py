@@ -27,6 +27,7 @@ _ROUNDS = 4  # of refitting and scoring again
 _VISIBLE = 4.0  # squared whitened change of the readings
 _FEW = 3  # of the best sets are refitted
 _KINDS = 4  # sets of different effects that are refitted
+_SLOW = 2  # of them, best first, with finite motions, which take long
 _NEAR = 6.0  # in score: sets this near the best are refitted too
 
 
@@ -107,7 +108,9 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
         sets = screen.search()
         # near rivals and their parts too: a tangent may flatter a set that is larger
         fits: dict[tuple[int, ...], Fit] = {}
-        for one in _worth_refitting(screen, sets):
+        waiting = _worth_refitting(screen, sets)
+        while waiting:
+            one = waiting.pop(0)
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
             every = [*nuisance, *members]
@@ -115,11 +118,19 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
                 rest = resting(here, every, start) if rest is None else rest
                 held = replace(here, rest=rest)
                 fits[one.members] = refit(campaign, held, every, start)
-                continue
-            if _names(every) not in known:
-                known[_names(every)] = refit(campaign, here, every, start, finite)
-            fits[one.members] = known[_names(every)]
-        sets = _with_fits(screen, sets, fits)
+            elif _names(every) in known:
+                fits[one.members] = known[_names(every)]
+            else:
+                fits[one.members] = refit(campaign, here, every, start, finite)
+                known[_names(every)] = fits[one.members]
+            if not waiting:  # the best set needs each of its members
+                refitted = _with_fits(screen, sets, fits)
+                waiting = [
+                    p for p in _parts(screen, refitted[0]) if p.members not in fits
+                ]
+                there = {s.members for s in sets}
+                sets += [p for p in waiting if p.members not in there]
+        sets = refitted
         chosen = fits[sets[0].members]
         if turn and _names(chosen.hypotheses) == _names(best):
             break
@@ -150,14 +161,25 @@ def _rivals(
 def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
     """The best sets, all their parts, and the best sets of other effects."""
     parts = {s.members for s in sets[:_FEW] if s.score > sets[0].score - _NEAR}
-    best = sets[0].members
-    parts |= {tuple(i for i in best if i != left) for left in best}
+    parts |= {s.members for s in _parts(screen, sets[0])}
     kinds: dict[frozenset[str], Scored] = {}
     for s in sets:
         kinds.setdefault(frozenset(screen.effects[i] for i in s.members), s)
     others = list(kinds.values())[:_KINDS]
     parts |= {s.members for s in others if s.score > sets[0].score - _NEAR}
-    return [s for s in sets if s.members in parts]
+    found = [s for s in sets if s.members in parts]
+    slow = [s for s in found if len(s.members) > 1 and _has_finite(screen, s)]
+    return [s for s in found if s not in slow[_SLOW:]]
+
+
+def _parts(screen: Screen, one: Scored) -> list[Scored]:
+    """A set without one of its members, for each."""
+    return [screen.fit([i for i in one.members if i != left]) for left in one.members]
+
+
+def _has_finite(screen: Screen, one: Scored) -> bool:
+    """Whether a set has finite motions."""
+    return any(screen.effects[i] == FINITE for i in one.members)
 
 
 def _names(members: Sequence[Hypothesis]) -> tuple[object, ...]:
