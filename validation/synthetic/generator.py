@@ -213,6 +213,20 @@ def _linear(lab: _Lab) -> NDArray:
     return (ends[0] - ends[1]) / (2 * _SMALL)
 
 
+def finite_part(campaign: Synthetic) -> NDArray:
+    """What finite motions add to the readings of the declared machine.
+
+    Args:
+        campaign: any; the machine is that of springs.
+
+    Returns:
+        (rows, 6) [rad, m].
+    """
+    at = campaign.robot, campaign.reference_point, campaign.plan.rows
+    lab = _Lab(*at, "springs", None)
+    return lab.read((), "declared") - _linear(lab)
+
+
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
