@@ -61,6 +61,7 @@ _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
 _DECREMENT = 1e-14  # relative energy left to gain before the last step
 _STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
 _STATIONARY = 1e-7  # relative imbalance of an answer; 1e-12 is usual
+_ROUNDING = 1e-30  # [J] energies of parts without errors are some 1e-48 J of rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +207,7 @@ class ExactAssembly:
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
         # inside an assembly zone both are zero up to rounding
-        scale = max(self.energy, 1e-6 * self.linear.energy_without_play, 1e-300)
+        scale = max(self.energy, 1e-6 * self.linear.energy_without_play, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
