@@ -148,7 +148,8 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         truth["accept_verdicts"] = ["outside_library"]
         if least < VISIBLE:  # a public effect does nearly the same
             truth["accept_verdicts"] = list(VERDICTS)
-            truth["accept_effects"] += [_plain(one) for one in rivals[:4]]
+            hidden = [one for one in rivals if one.left < VISIBLE]
+            truth["accept_effects"] += [_plain(one) for one in hidden]
     truth["kind"] = kind
     truth["alternatives"] = [
         {"names": list(one.names), "parameters": one.parameters, "left_chi2": one.left}
