@@ -178,7 +178,7 @@ def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
     monkeypatch.setattr(
         assembly.exact,
         "dead_loads",
-        lambda at, w, b, g: right(at, w, b, 1.05 * np.asarray(g)),
+        lambda at, w, b, g, p: right(at, w, b, 1.05 * np.asarray(g), p),
     )
     answer = crosscheck(erring("3rrr", 2700.0), links="spring", gravity=[2, -3, -9.81])
     failed = [name for name, check in answer.checks.items() if check.verdict == "fails"]

@@ -77,6 +77,12 @@ def worst_corner(
         The worst corner found.
     """
     signs = corners.copy()
+    if isinstance(ready, OnePosture):
+        # where play takes up all of an error the energy has no slope to follow
+        signs = np.vstack([
+            signs,
+            _worst_without_play(ready, sources, tolerances, signs),
+        ])
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
     for _ in range(_STEPS):
         values, slopes = respond(ready, sources, signs * tolerances)
@@ -89,6 +95,18 @@ def worst_corner(
         if not len(signs):
             break
     return best
+
+
+def _worst_without_play(
+    ready: OnePosture, sources: ErrorSources, tolerances: NDArray, corners: NDArray
+) -> NDArray:
+    """(k, m) signs where the search ends if no clearance gives way: (h s)^2 / 2."""
+    h = ready.misfit[:, 6 * sources.frame + sources.component] * tolerances
+    signs = corners
+    for _ in range(_STEPS):
+        slopes = signs @ (h.T @ h)
+        signs = np.where(slopes == 0.0, signs, np.sign(slopes))
+    return np.unique(signs, axis=0)
 
 
 def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:

@@ -29,7 +29,7 @@ from validation.synthetic.machine import Hidden, simulate_readings
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
 _CLOSE = 0.05  # relative, of a strength to the one asked for
-_MOST = 100.0  # times its plausible size: an effect that needs more hardly acts here
+_MOST = 1000.0  # times its plausible size: an effect that needs more hardly acts here
 _SMALL = 1e-2  # scale of errors and load at which the machine is linear
 _BLUNDER = 40.0  # [-] sigmas of an outlier
 
