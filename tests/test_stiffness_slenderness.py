@@ -108,13 +108,14 @@ def test_a_round_bars_ends():
 @pytest.mark.slow
 def test_without_poissons_ratio_tension_has_no_ends():
     """K_TZ = E V / L^2 with the mesh's own volume, exactly but for the tilt of curved
-    sides, squared; arcs as parabolas leave 1e-5 of the volume at most."""
+    sides, squared.  Arcs as parabolas leave phi^4 / 30 of the volume, phi = pi / n with
+    n of them around: 5e-5 for the 16 of the coarsest mesh."""
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.0, [6, 12], accuracy=0.01)
     for comparison in sweep.comparisons:
         length, volume = comparison.length, comparison.fea.mesh["volume"]
         expected = 6e10 * volume / length**2
         assert comparison.fea.stiffness[5, 5] == pytest.approx(expected, rel=1e-7)
-        assert volume == pytest.approx(np.pi * 0.02**2 * length, rel=1e-5)
+        assert volume == pytest.approx(np.pi * 0.02**2 * length, rel=5e-5)
 
 
 @pytest.mark.parametrize(
