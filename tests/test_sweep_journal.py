@@ -189,7 +189,7 @@ def test_sigkill_at_random_moments_loses_no_point():
 
 
 COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
-           "tx=-0.045:0.045:0.0015,ty=0.10:0.151:0.0015"]  # fmt: skip
+           "tx=-0.045:0.045:0.0005,ty=0.10:0.15:0.0005"]  # fmt: skip
 
 
 def start_command(folder, *words):
