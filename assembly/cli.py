@@ -3,7 +3,7 @@
 import os
 import sys
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -64,12 +64,20 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
     if not texts:
         return None
     names = [name.lower() for name in WRENCH]
-    given = parse_assignments(texts, "--load")
+    given = _components(texts, "--load", names)
+    return [given.get(name, 0.0) for name in names]
+
+
+def _components(
+    texts: list[str], option: str, names: Sequence[str]
+) -> dict[str, float]:
+    """Numbers given by component, of a known few."""
+    given = parse_assignments(texts, option)
     for name in given:
         if name not in names:
             hint = nearest(name, names)
-            raise BadInput(f'--load: unknown component "{name}"{hint}')
-    return [given.get(name, 0.0) for name in names]
+            raise BadInput(f'{option}: unknown component "{name[:60]}"{hint}')
+    return given
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
@@ -114,11 +122,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     if not texts:
         return None
     names = [name.lower() for name in SCREW]
-    given = parse_assignments(texts, "--direction")
-    for name in given:
-        if name not in names:
-            hint = nearest(name, names)
-            raise BadInput(f'--direction: unknown component "{name[:60]}"{hint}')
+    given = _components(texts, "--direction", names)
     length = sum(value**2 for value in given.values()) ** 0.5
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
