@@ -185,7 +185,7 @@ def _secant_node(
     v, z, status = conic._clarabel(
         csc_matrix((nu, nu)), -X.T @ slope, A, b, len(k), group, 1e-8, positive=6
     )
-    if v is None or z is None:
+    if v is None:
         return None
     x = c + X @ v
     # the dual value, whatever the solver's status: an upper bound

@@ -5,6 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
+
+# The same cases in every run: a commit is judged by what it changes, not by luck.
+# Others, on purpose: pytest --hypothesis-profile search --hypothesis-seed N
+settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("search", derandomize=False)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture

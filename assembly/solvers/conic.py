@@ -29,6 +29,8 @@ _PART = 0.1  # of it that is asked here: the problem before elimination adds to 
 _STOP = 1e-2  # Newton's method stops at this fraction of it
 _STEPS, _SHARP = 150, 1e6  # its steps, and its first sigma
 _OPEN = 1e-11  # most that a row no spring can take up may stay open
+_LARGEST_FACTOR = 1e8  # on the clearances: that none below it helps is what is proved
+_UNPROVED = "PrimalInfeasible, which its multipliers do not prove"
 
 
 class SolverFailed(RuntimeError):
@@ -170,9 +172,12 @@ def _by_clarabel(
     P = block_diag([csc_matrix((nu, nu)), diags_array(np.ones(r))], format="csc")
     q = np.concatenate([-d, np.zeros(r)])
     x, z, status = _clarabel(P, q, A, b, r + len(k), group, regularisation)
-    if x is None or z is None:
+    rigid = -z[r : r + len(k)]
+    if status == "PrimalInfeasible":
+        if not _proves_no_point(rigid, H, k, group, np.ones(group[-1] + 1)):
+            status = _UNPROVED
         return None, None, status
-    return x[:nu], -z[r : r + len(k)], status
+    return (None if x is None else x[:nu]), rigid, status
 
 
 _ROADS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = (
@@ -289,11 +294,15 @@ def least_factor(
     P = csc_matrix((nu + 1, nu + 1))
     for regularisation in _REGULARISATIONS:
         x, z, status = _clarabel(P, q, A, b, m, group, regularisation, positive=1)
-        if status in {"Solved", "PrimalInfeasible"}:
+        if status == "PrimalInfeasible":
+            radius = np.where(scaled, _LARGEST_FACTOR, 1.0)[_starts(group)[:-1]]
+            n = -z[:m] / rows
+            if _proves_no_point(n, B, right / size, group, radius):
+                return None, np.zeros(nu), np.zeros(m)
+            status = _UNPROVED
+        if status == "Solved":
             break
-    if status == "PrimalInfeasible":
-        return None, np.zeros(nu), np.zeros(m)
-    if x is None or z is None:
+    if x is None:
         raise SolverFailed("zone margin", status)
     return max(0.0, float(x[-1] * size)), x[:nu] * size, -z[:m] / rows
 
@@ -318,8 +327,8 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
 def _clarabel(
     P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, equal: int, group: NDArray,
     regularisation: float, positive: int = 0,
-) -> tuple[NDArray | None, NDArray | None, str]:  # fmt: skip
-    """Minimise x.P.x/2 + q.x, A x + s = b: primal, dual (None if unusable), status."""
+) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
+    """Minimise x.P.x/2 + q.x, A x + s = b: primal (None if unusable), dual, status."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -334,22 +343,21 @@ def _clarabel(
     answer = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
     status = str(answer.status)
     x, z = np.array(answer.x), np.array(answer.z)
-    if status == "PrimalInfeasible" and not _no_point(A, b, z, equal + positive, group):
-        status = "PrimalInfeasible, which its multipliers do not prove"
     # what is not fully solved may still be good: its certificate will tell
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
-        return None, None, status
+        return None, z, status
     return x, z, status
 
 
-def _no_point(
-    A: csc_matrix, b: NDArray, z: NDArray, first: int, group: NDArray
+def _proves_no_point(
+    n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Whether z proves that no x below 1e8 solves A x + s = b: A^T z = 0, b.z < 0."""
-    if not b @ z < 0.0 or np.abs(A.T @ z).sum() > -1e-8 * (b @ z):
-        return False
-    at = first + np.searchsorted(group, np.arange(group.max() + 1))
-    at += np.arange(len(at))
-    inside = z[at] - cone_sizes(np.delete(z[first:], at - first), group)
-    return bool(inside.min() >= 1e-8 * (b @ z))  # b @ z is negative
+    """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k.
+
+    n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k above it is a proof, once
+    it is above the rounding of its own terms too.
+    """
+    reach = float(cone_sizes(H.T @ n, group) @ radius)
+    rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
+    return bool(float(n @ k) > reach + rounding)
