@@ -353,11 +353,9 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k.
-
-    n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k above it is a proof, once
-    it is above the rounding of its own terms too.
-    """
+    """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k."""
+    # n.H u is at most the sum of radius_k |(H^T n)_k|: n.k above it is a proof, once
+    # it is above the rounding of its own terms too
     reach = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > reach + rounding)
