@@ -82,32 +82,66 @@ def dead_loads(
         own[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
         own[:, :, 3] = given[:, 3:]
     if gravity is not None:
-        _add_weights(posture, np.asarray(gravity, dtype=float), own, carried)
+        g = np.asarray(gravity, dtype=float)
+        _add_weights(posture, posture.robot.errors, g, own, carried)
     return DeadLoads(wrench, own, carried)
 
 
-def _add_weights(posture: Posture, g: NDArray, own: NDArray, carried: NDArray) -> None:
-    """Weight of links with a density and of bodies with a mass."""
+def row_loads(
+    postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
+) -> DeadLoads:
+    """The same in many situations at once.
+
+    Args:
+        postures: R of them, in one.
+        errors: (R, n, 6) [rad, m] screws of the bodies that come without stress.
+        load: (R, 6) [N m, N] on the platform at a point, base axes.
+        gravity: (R, 3) [m/s^2] base axes.
+        point: (3,) [m] where the load acts, platform axes.
+
+    Returns:
+        Loads whose arrays have R rows.
+    """
+    robot = postures.robot
+    own, carried = np.zeros((2, *errors.shape[:2], 3, 4))
+    wrench = load.copy()
+    if point.any():
+        here = np.array([*point, 1.0])
+        own[:, robot.index(robot.platform)] = wrench[:, 3:, None] * here
+        wrench[:, 3:] = 0.0
+    if gravity.any():
+        _add_weights(postures, errors, gravity, own, carried)
+    return DeadLoads(wrench, own, carried)
+
+
+def _add_weights(
+    posture: Posture, errors: NDArray, g: NDArray, own: NDArray, carried: NDArray
+) -> None:
+    """Weight of links with a density and of bodies with a mass; rows in front."""
     robot, nominal = posture.robot, carried_nominally(posture)
     for i, frame in enumerate(robot.frames):
-        own[i] += np.outer(frame.mass * g, [*frame.centre_of_mass, 1.0])
+        place = np.array([*frame.centre_of_mass, 1.0])
+        own[..., i, :, :] += frame.mass * g[..., None] * place
         link = frame.link
         if not isinstance(link, BeamLink) or link.density is None:
             continue
         length, axis = beam_axis(frame)
         section = declared_section(link.section, link.poisson)
-        W = link.density * section.area * length * g
-        own[i] += np.outer(W, [*(-length * axis / 12), 0.5])
+        W = link.density * section.area * length * g[..., None]
+        own[..., i, :, :] += W * np.array([*(-length * axis / 12), 0.5])
         parent = robot.parents[i]
         if parent >= 0:  # else the base carries it
             # the beam's start and tangent, seen from what the parent carries: a
             # straight beam up to the erring tip, whose stiffness is K_E there
-            error = frame.geometric_error
-            off = transform(error[3:], rotation_matrix(error[:3]))
-            T = np.linalg.inv(nominal[parent]) @ posture.transforms[i] @ off
-            along = T[:3, :3] @ (length * axis)
-            start = T[:3, 3] - along
-            carried[parent] += np.outer(W, [*(start / 2 + along / 12), 0.5])
+            error = errors[..., i, :]
+            off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
+            T = np.linalg.inv(nominal[..., parent, :, :])
+            T = T @ posture.transforms[..., i, :, :] @ off
+            along = T[..., :3, :3] @ (length * axis)
+            middle = (T[..., :3, 3] - along) / 2 + along / 12
+            half = np.full((*middle.shape[:-1], 1), 0.5)
+            row = np.concatenate([middle, half], axis=-1)[..., None, :]
+            carried[..., parent, :, :] += W * row
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
@@ -213,25 +247,44 @@ def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Wrenches of dead loads on all that bodies and joints hold, and their M's."""
-    robot = place.model.posture.robot
-    origin = place.model.posture.platform[:3, 3]
+    posture = place.model.posture
+    return resultants(posture, loads, place.bodies, place.carried)
+
+
+def resultants(
+    posture: Posture, loads: DeadLoads, bodies: NDArray, carried: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Dead loads summed over what each frame holds, at the platform's nominal origin.
+
+    Args:
+        posture: nominal; all arrays may have rows in front, as its own.
+        loads: on the robot.
+        bodies: (..., n, 4, 4) ends of the bodies, seen from the base.
+        carried: (..., n, 4, 4) what the joints carry.
+
+    Returns:
+        (..., n, 6) [N m, N] wrenches on what bodies hold and on what joints hold, base
+        axes, and (..., n, 3, 3) [N m] their M's.
+    """
+    robot, origin = posture.robot, posture.platform[..., None, :3, 3]
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
     own, after = (
-        np.concatenate(_read(G, T, origin), axis=1)
-        for G, T in ((loads.bodies, place.bodies), (loads.carried, place.carried))
+        np.concatenate(_read(G, T, origin), axis=-1)
+        for G, T in ((loads.bodies, bodies), (loads.carried, carried))
     )
     joint = below @ (own + after) + after
-    held = (joint + own, joint)
+    body = joint + own
+    square = (*joint.shape[:-1], 3, 3)
     return (
-        held[0][:, :6], held[1][:, :6],
-        held[0][:, 6:].reshape(-1, 3, 3), held[1][:, 6:].reshape(-1, 3, 3),
+        body[..., :6], joint[..., :6],
+        body[..., 6:].reshape(square), joint[..., 6:].reshape(square),
     )  # fmt: skip
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Moments (n, 3) at the origin, forces (n, 3), and M's (n, 9)."""
-    points = T[:, :3].copy()
-    points[:, :, 3] -= origin
-    moments = np.cross(points, G, axisa=1, axisb=1, axisc=1).sum(axis=2)
-    M = points @ np.swapaxes(G, 1, 2)
-    return moments, G[:, :, 3], M.reshape(-1, 9)
+    """Moments (..., n, 3) at the origin, forces (..., n, 3), and M's (..., n, 9)."""
+    points = T[..., :3, :].copy()
+    points[..., 3] -= origin
+    moments = np.cross(points, G, axis=-2).sum(axis=-1)
+    M = points @ np.swapaxes(G, -1, -2)
+    return moments, G[..., 3], M.reshape(*M.shape[:-2], 9)

@@ -430,13 +430,13 @@ class Placement:
 
 
 def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
-    """(n, 4, 4) motions about or along each joint's z by (n,) coordinates."""
-    screws = np.zeros((len(coordinates), 6))
+    """(..., n, 4, 4) motions about or along each joint's z by (..., n) coordinates."""
+    screws = np.zeros((*coordinates.shape, 6))
     axes = [frame.own_axis for frame in robot.frames]
-    screws[np.arange(len(axes)), axes] = coordinates
+    screws[..., np.arange(len(axes)), axes] = coordinates
     return exponential(screws)
 
 
 def carried_nominally(posture: Posture) -> NDArray:
-    """(n, 4, 4) what the joints carry where nothing is wrong."""
+    """(..., n, 4, 4) what the joints carry where nothing is wrong."""
     return posture.transforms @ along_own(posture.robot, posture.coordinates)

@@ -243,14 +243,14 @@ def _factorise(case: _Case) -> Flexibility:
     M[:, : S.shape[1], : S.shape[1]] = S / softness
     M[:, : S.shape[1], S.shape[1] :] = JF
     M[:, S.shape[1] :, : S.shape[1]] = np.swapaxes(JF, 1, 2)
-    inverse, doubt = _pseudo_inverse(M)
+    inverse, doubt = pseudo_inverse(M)
     return Flexibility(
         J, P, C_body, C_joint, joints.free, _limits(postures, joints.free),
         inverse, M, softness, doubt,
     )  # fmt: skip
 
 
-def _pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
+def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
     """(c, m, m) inverses on the range, and (c,) where the range is in doubt."""
     if not M.shape[1]:
         return M, np.zeros(len(M), dtype=bool)

@@ -1,8 +1,8 @@
 """What a measuring device reads: the platform's deviation, row by row of conditions.
 
-Robots without play are solved together (:mod:`assembly.flexibility`); rows with play,
-finite motions, or closures whose rank is in doubt go through :mod:`assembly.energy` and
-:mod:`assembly.exact` one by one.
+Robots without play are solved together (:mod:`assembly.flexibility`, with finite
+motions :mod:`assembly.finite_rows`); rows with play, or whose closures' rank is in
+doubt, go through :mod:`assembly.energy` and :mod:`assembly.exact` one by one.
 
 Sources:
     Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
@@ -19,6 +19,7 @@ from assembly.conditions import Conditions, ContactLaw
 from assembly.effects.places import in_series, own_screw
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
+from assembly.finite_rows import solve_rows
 from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
 from assembly.posture import Posture
@@ -28,7 +29,7 @@ from assembly.solvers.reduction import FreeMotion
 from stiffness.screws import rotation_matrix, rotation_vector
 
 _STEPS = 100
-_CORRECTED = 40  # configurations whose second order is found
+_CORRECTED = 40  # configurations whose second order is found, of those one by one
 _SETTLED = 1e-11  # relative change of a contact's deflection
 _SETTLED_FINITE = 1e-5  # likewise, from the linear model's answer
 
@@ -57,24 +58,13 @@ def predict(here: Conditions) -> Prediction:
     Returns:
         What is read in each.
     """
-    screws = np.full((len(here), 6), np.nan)
-    reason = np.full(len(here), "", dtype=object)
-    left = np.ones(len(here), dtype=bool)
-    open_ = np.zeros(len(here), dtype=bool)
     play = bool(virtual_joints(here.robot).cones.shape[1])
+    open_ = np.zeros(len(here), dtype=bool)
     if play and not here.exact and here.rest is not None:
-        here, play = at_rest(here), False
+        here = at_rest(here)
     elif play and not here.robot.closures and not here.exact:
         here, open_ = taken_up(here)
-        play = False
-    if not here.exact and not play:
-        screws, solved = _without_play(here)
-        left = ~solved
-    for row in np.flatnonzero(left).tolist():
-        try:
-            screws[row] = assemble_row(here, row).platform_screw
-        except (CannotAssemble, FreeMotion, SolverFailed) as error:
-            screws[row], reason[row] = np.nan, str(error)
+    screws, reason = _platform_screws(here)
     if not here.exact:
         screws = screws + here.second_order
     known = np.isfinite(screws).all(axis=1)
@@ -84,13 +74,32 @@ def predict(here: Conditions) -> Prediction:
     return Prediction(deviation, reason, open_)
 
 
+def _platform_screws(
+    here: Conditions, one_by_one: int | None = None
+) -> tuple[NDArray, NDArray]:
+    """(R, 6) platform screws and (R,) why there are none; some rows one by one."""
+    screws = np.full((len(here), 6), np.nan)
+    reason = np.full(len(here), "", dtype=object)
+    left = np.ones(len(here), dtype=bool)
+    if not virtual_joints(here.robot).cones.shape[1]:
+        screws, solved = _without_play(here)
+        left = ~solved
+        screws[left] = np.nan
+    for row in np.flatnonzero(left)[:one_by_one].tolist():
+        try:
+            screws[row] = assemble_row(here, row).platform_screw
+        except (CannotAssemble, FreeMotion, SolverFailed) as error:
+            screws[row], reason[row] = np.nan, str(error)
+    return screws, reason
+
+
 def with_second_order(here: Conditions) -> Conditions:
     """Conditions whose linear answers carry what the declared errors do beyond it.
 
     Near a singularity a robot's own geometric errors move it so far that the linear
     model is wrong by more than a device's noise, whatever the load.  The difference of
-    the exact and the linear platform screw without load is found once a configuration,
-    where deviations are largest first; effects of load stay linear.
+    the exact and the linear platform screw without load is found once a configuration;
+    effects of load stay linear.
 
     Args:
         here: R situations of a robot, as declared.
@@ -98,20 +107,14 @@ def with_second_order(here: Conditions) -> Conditions:
     Returns:
         The same, ``second_order`` given.
     """
-    found = np.zeros((len(here), 6))
     if virtual_joints(here.robot).cones.shape[1]:
         return here  # where play rests without load is open
     zero = np.zeros_like(here.load)
-    still = replace(here, load=zero, gravity=np.zeros_like(here.gravity), laws=())
-    size = np.linalg.norm(predict(still).deviation, axis=1)
     _, which = in_groups(here.postures)
-    seen: set[int] = set()
-    for row in np.argsort(-np.nan_to_num(size), kind="stable").tolist():
-        if which[row] in seen or len(seen) == _CORRECTED:
-            continue
-        seen.add(int(which[row]))
-        found[which == which[row]] = _finite_part(still, row)
-    return replace(here, second_order=found)
+    _, first = np.unique(which, return_index=True)
+    still = replace(here, load=zero, gravity=np.zeros_like(here.gravity), laws=())
+    found = _finite_part(still.take(first), _CORRECTED)
+    return replace(here, second_order=found[which])
 
 
 def with_finite_motions(here: Conditions) -> Conditions:
@@ -126,18 +129,16 @@ def with_finite_motions(here: Conditions) -> Conditions:
     Returns:
         The same, ``second_order`` given, and no longer ``exact`` if they were.
     """
-    found = np.array([_finite_part(here, row) for row in range(len(here))])
-    return replace(here, exact=False, second_order=found.reshape(len(here), 6))
+    return replace(here, exact=False, second_order=_finite_part(here))
 
 
-def _finite_part(here: Conditions, row: int) -> NDArray:
-    """(6,) exact minus linear platform screw; none where one of them has no answer."""
-    try:
-        exact = assemble_row(replace(here, exact=True), row).platform_screw
-        linear = assemble_row(replace(here, exact=False), row).platform_screw
-    except (CannotAssemble, FreeMotion, SolverFailed):
-        return np.zeros(6)
-    return exact - linear
+def _finite_part(here: Conditions, one_by_one: int | None = None) -> NDArray:
+    """(R, 6) exact minus linear platform screws; none where one has no answer."""
+    exact, linear = (
+        _platform_screws(replace(here, exact=finite), one_by_one)[0]
+        for finite in (True, False)
+    )
+    return np.nan_to_num(exact - linear)
 
 
 def settle(here: Conditions) -> Conditions:
@@ -261,7 +262,8 @@ def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
     forces = row_forces(here.postures, here.load_at_origin(), here.gravity)
     errors = here.errors.reshape(len(here), -1)
     answer = flexible.solve(which, errors, forces)
-    screws = answer.platform_screw
+    screws, solved = answer.platform_screw, answer.solved
+    give = np.zeros((len(here), 0))
     if here.laws:
         columns = _law_columns(here)
         w = answer.joint_wrenches @ columns
@@ -269,8 +271,11 @@ def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
         give, settled = _deflections(here.laws, w, A)
         reach = flexible.platform_of(columns)[which]
         screws = screws + np.einsum("rij,rj->ri", reach, give)
-        return screws, answer.solved & settled
-    return screws, answer.solved
+        solved = solved & settled
+    if here.exact:
+        screws, found = solve_rows(here, give)
+        solved = solved & found
+    return screws, solved
 
 
 def _law_columns(here: Conditions) -> NDArray:
