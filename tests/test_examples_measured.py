@@ -174,16 +174,31 @@ def test_voron_reproduces_the_bars(tmp_path):
 
 @needs("hangprinter")
 def test_hangprinter_has_a_build_up_and_no_elasticity():
-    """Bars 7.3, 3.8 and 3.0 mm; elasticity is said not to be identifiable."""
+    """Bars 7.3, 3.8 and 3.0 mm; 1.8 without the outlier; no elasticity to be found."""
     samples = read_samples()
-    names = ("spool radius", "build-up", "elasticity")
-    scores = [hangprinter.score(names[:k], samples)[0] for k in range(4)]
-    assert np.all(np.array(scores[:3]) < [7.3e-3, 3.8e-3, 3.0e-3])
-    assert scores[3] >= scores[2]
-    model, _ = hangprinter.fit(names[:2], samples)
+    names = ("spool radius", "build-up")
+    scores = [hangprinter.score(names[:k], samples).pooled for k in range(3)]
+    assert np.all(np.array(scores) < [7.3e-3, 3.8e-3, 3.0e-3])
+    own = ("spool radius", "own build-up")
+    kept = samples.take(np.delete(np.arange(41), 17))
+    best = hangprinter.score(own, kept)
+    assert best.pooled < 1.8e-3
+    stretched = hangprinter.score((*own, "elasticity"), kept)
+    assert stretched.pooled >= best.pooled
+    model, std = hangprinter.fit((*own, "elasticity"), samples)
+    assert abs(model.values[-1]) < 2 * std[-1]
+    model, _ = hangprinter.fit(own, samples)
     assert hangprinter.outside("elasticity", model, samples) < 0.15
     assert hangprinter.outside("spool radius", hangprinter.fit((), samples)[0],
                                samples) > 0.3  # fmt: skip
+
+
+@needs("hangprinter")
+def test_a_tracking_offset_is_anchors_and_zeros():
+    """Where lines meet and what the camera follows: no signature of its own."""
+    samples = read_samples()
+    model, _ = hangprinter.fit(("spool radius", "own build-up"), samples)
+    assert hangprinter.outside("tracking offset", model, samples) < 1e-3
 
 
 @needs("hilti_trailblazer")

@@ -2,10 +2,11 @@
 
     python -m examples.hangprinter.study [--data DIR] [-o hangprinter_study]
 
-Twenty random hold-outs of ten samples; scored are the lengths of the four lines.
+Scored are the lengths of the four lines, on twenty random hold-outs of ten samples, and
+on each fifth of the file in turn, predicted from the rest.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +25,22 @@ from examples.study_output import arguments, print_table, run, write_results
 
 POSITION = np.array([2.0e-3, 1.2e-3, 2.7e-3])  # [m] of the camera, from what is left
 LENGTH = 0.5e-3  # [m] of a line's length, likewise
-SPLITS, HELD_OUT = 20, 10
+SPLITS, HELD_OUT, BLOCKS = 20, 10, 5
 OUTLIER = 0.01  # chance that the worst of all rows is that far off by chance
 
 # prior spreads: of anchors and of the zero of each line [m], then of what a step adds
 ANCHOR, ZERO = 0.05, 5e-3
-SPREADS = {"spool radius": 2e-3, "build-up": 3e-4, "elasticity": 1e-4}
-COUNTS = {"spool radius": 4, "build-up": 1, "elasticity": 1}  # unknowns of each
-UNITS = {"spool radius": "m", "build-up": "m/rad", "elasticity": "1/N"}
+SPREADS = {
+    "spool radius": 2e-3,  # [m]
+    "build-up": 3e-4,  # [m/rad] of all spools
+    "own build-up": 3e-4,  # [m/rad] of each spool
+    "tracking offset": 0.05,  # [m] from the camera's mark to where the lines meet
+    "elasticity": 1e-4,  # [1/N]
+}
+COUNTS = {
+    "spool radius": 4, "build-up": 1, "own build-up": 4, "tracking offset": 3,
+    "elasticity": 1,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +66,14 @@ def columns_of(effect: str, model: Model, samples: Samples) -> NDArray:
     k = len(samples.position)
     if effect == "spool radius":  # pays out more for each turn
         return np.eye(4) * (samples.spool / ADVANTAGE)[:, None, :]
-    if effect == "build-up":  # layers unwind: the radius falls with the turn
-        return (-(samples.spool**2) / 2 / ADVANTAGE)[..., None]
+    # layers unwind: r^2 falls with the length paid out, so r with the turn
+    layers = -(samples.spool**2) / 2 / ADVANTAGE
+    if effect == "build-up":
+        return layers[..., None]
+    if effect == "own build-up":
+        return np.eye(4) * layers[:, None, :]
+    if effect == "tracking offset":
+        return -directions(model, samples)
     length = np.linalg.norm(samples.position[:, None] - model.anchors, axis=2)
     return (samples.force * length).reshape(k, 4, 1)
 
@@ -128,18 +143,52 @@ def consistency(model: Model, samples: Samples) -> NDArray:
     return np.einsum("kl,kl->k", normals, r)
 
 
-def score(effects: tuple[str, ...], samples: Samples) -> tuple[float, float, float]:
-    """[m] rms on held-out rows: all line lengths, their median row, consistency."""
+@dataclass(frozen=True)
+class Score:
+    """Errors [m] of line lengths that played no part in fitting.
+
+    Attributes:
+        pooled: rms over all random hold-outs together.
+        mean: of the hold-outs' own rms.
+        median: of the samples' rms.
+        blocks: rms over the fifths of the file.
+        consistency: rms of the part that no position of the effector explains.
+    """
+
+    pooled: float
+    mean: float
+    median: float
+    blocks: float
+    consistency: float
+
+
+def score(effects: tuple[str, ...], samples: Samples) -> Score:
+    """Errors of a model of some effects on samples it was not fitted to."""
+    count = len(samples.position)
+    orders = [np.random.default_rng(k).permutation(count) for k in range(SPLITS)]
     lengths, closing = [], []
-    for seed in range(SPLITS):
-        order = np.random.default_rng(seed).permutation(len(samples.position))
-        model, _ = fit(effects, samples.take(order[HELD_OUT:]))
-        test = samples.take(order[:HELD_OUT])
+    for order in orders:
+        model, test = _left_out(effects, samples, order[:HELD_OUT])
         lengths.append(residuals(model, test) ** 2)
         closing.append(consistency(model, test) ** 2)
-    by_row = np.concatenate(lengths).mean(axis=1)
-    closing_rms = np.sqrt(np.mean(closing))
-    return float(np.sqrt(by_row.mean())), float(np.sqrt(np.median(by_row))), closing_rms
+    squares = np.array(lengths)
+    spans = np.array_split(np.arange(count), BLOCKS)
+    blocks = [residuals(*_left_out(effects, samples, span)) ** 2 for span in spans]
+    return Score(
+        pooled=float(np.sqrt(squares.mean())),
+        mean=float(np.sqrt(squares.mean(axis=(1, 2))).mean()),
+        median=float(np.sqrt(np.median(squares.mean(axis=2)))),
+        blocks=float(np.sqrt(np.concatenate(blocks).mean())),
+        consistency=float(np.sqrt(np.mean(closing))),
+    )
+
+
+def _left_out(
+    effects: tuple[str, ...], samples: Samples, rows: NDArray
+) -> tuple[Model, Samples]:
+    """A model fitted without some samples, and those samples."""
+    rest = np.setdiff1d(np.arange(len(samples.position)), rows)
+    return fit(effects, samples.take(rest))[0], samples.take(rows)
 
 
 def outside(effect: str, model: Model, samples: Samples) -> float:
@@ -156,24 +205,37 @@ def main() -> None:
     options = arguments(__doc__, "hangprinter_study")
     convert(options.output, options.data)
     samples = read_samples(options.data)
-    chosen = ("spool radius", "build-up")
+    chosen = ("spool radius", "own build-up")
     model, std = fit(chosen, samples)
     _, w = whitened(model, samples)
     large = np.sum(w.reshape(-1, 4) ** 2, axis=1)
     bad = np.flatnonzero(large > chi2.isf(OUTLIER / len(large), 4))
     rest = np.setdiff1d(np.arange(len(large)), bad)
-    ladder = ((), chosen[:1], chosen, (*chosen, "elasticity"))
-    rows, steps = [], []
+    shared, own = ("spool radius", "build-up"), ("spool radius", "own build-up")
+    ladder = (
+        (), shared[:1], shared, own, (*own, "tracking offset"), (*own, "elasticity"),
+    )  # fmt: skip
+    steps = {}
     for effects in ladder:
         name = " + ".join(("anchors", *effects))
-        every, kept = score(effects, samples), score(effects, samples.take(rest))
-        rows.append((name, every[0] * 1e3, *(x * 1e3 for x in kept)))
-        steps.append({"model": name, "all_rows": every, "without_outliers": kept})
-    print_table(
-        "held-out line lengths [mm]",
-        ("model", "rms, all rows", "rms, no outlier", "median row", "consistency"),
-        rows,
-    )
+        kept = samples.take(rest)
+        steps[name] = score(effects, samples), score(effects, kept)
+    for k, which in enumerate(("all samples", "outlier left out")):
+        print_table(
+            f"held-out line lengths [mm], {which}",
+            (
+                "model",
+                "pooled",
+                "mean of splits",
+                "median row",
+                "blocks",
+                "consistency",
+            ),
+            [
+                (name, *(1e3 * x for x in asdict(both[k]).values()))
+                for name, both in steps.items()
+            ],
+        )
     print("\noutliers (sample, chi2 of 4):", [(f"m{i + 1:05d}", large[i]) for i in bad])
     _parameters(model, std)
     stretched, stretched_std = fit(ladder[-1], samples.take(rest))
@@ -185,15 +247,20 @@ def main() -> None:
         f"{away:.2f} of its signature is its own, {even:.2f} if all forces were equal"
     )
     write_results(options.output, {
-        "unit": "m", "steps": steps, "outliers": [f"m{i + 1:05d}" for i in bad],
+        "unit": "m",
+        "steps": [
+            {"model": n, "all_rows": asdict(a), "without_outliers": asdict(b)}
+            for n, (a, b) in steps.items()
+        ],
+        "outliers": [f"m{i + 1:05d}" for i in bad],
         "anchors": model.anchors, "values": model.values, "std": std,
         "elasticity": {"value": stretched.values[-1], "std": stretched_std[-1],
                        "own_part": away, "own_part_equal_forces": even},
     })  # fmt: skip
     from examples.hangprinter.figure import draw
 
-    names = ("anchors", "+ spool radius", "+ build-up")
-    models = [fit(effects, samples)[0] for effects in ladder[:3]]
+    names = ("anchors", "+ spool radius", "+ build-up", "+ each spool's own")
+    models = [fit(effects, samples)[0] for effects in ladder[:4]]
     left = [residuals(m, samples) for m in models]
     draw(dict(zip(names, left, strict=True)), samples, options.output)
 
@@ -203,12 +270,12 @@ def _parameters(model: Model, std: NDArray) -> None:
     shift = (model.anchors - ANCHORS) * 1e3
     for k, line in enumerate(LINES):
         radius, spread = model.values[16 + k] * 1e3, std[16 + k] * 1e3
+        growth, wide = model.values[20 + k] * 1e6, std[20 + k] * 1e6
         print(
             f"  {line}: anchor moved {shift[k].round(1)} mm, spool radius "
-            f"{RADIUS * 1e3 + radius:.2f} +- {spread:.2f} mm"
+            f"{RADIUS * 1e3 + radius:.2f} +- {spread:.2f} mm, build-up "
+            f"{growth:.0f} +- {wide:.0f} um of radius per radian"
         )
-    growth, spread = model.values[20] * 1e6, std[20] * 1e6
-    print(f"  build-up {growth:.0f} +- {spread:.0f} um of radius per radian of spool")
 
 
 if __name__ == "__main__":
