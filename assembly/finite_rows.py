@@ -21,6 +21,7 @@ Sources:
     section 7.1 (chord methods).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,6 +34,7 @@ from assembly.dead_load import DeadLoads, resultants, row_loads
 from assembly.finite import along_own
 from assembly.flexibility import (
     Flexibility,
+    at_postures,
     flexibility,
     in_groups,
     pseudo_inverse,
@@ -45,16 +47,17 @@ from assembly.motion import (
     turn_jacobian,
 )
 from assembly.nominal import size_of
-from stiffness.screws import rotation_matrix, rotation_vector, screw_map, transform
+from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _CORRECTIONS = 60  # at most; 5 to 12 are usual
 _STILL = 1e-12  # [rad, reference lengths] largest change of a screw at the end
 _CLOSED = 1e-11  # [rad, reference lengths] what an answer may leave open
 _FREE = 1e-5  # of the largest wrench: what may push on a motion that stays where it is
+_MISFIT = 1e-9  # [rad, reference lengths] whose wrench counts as none
 _SHRINKS = 0.8  # by which every correction but the first few must be smaller
 _TRUSTED = 3  # corrections that may grow
 _TINY = 1e-9  # [rad or m] deflections of a contact below which it is linear
-_AT_ONCE = 400  # rows, so that memory stays small
+_AT_ONCE = 100  # rows, so that memory stays small
 
 
 def solve_rows(here: Conditions, give: NDArray) -> tuple[NDArray, NDArray]:
@@ -114,6 +117,12 @@ class _Rows:
         return bodies, np.union1d(joints, own).astype(int)
 
     @cached_property
+    def loose(self) -> NDArray:
+        """Frames whose joints move freely."""
+        moved = self.flexible.free.any(axis=1).reshape(-1, 6)
+        return np.flatnonzero(moved.any(axis=1))
+
+    @cached_property
     def contacts(self) -> NDArray:
         """(6n, s) unit screws of the joints with a contact."""
         columns = np.zeros((6 * len(self.here.robot.frames), len(self.here.laws)))
@@ -154,11 +163,20 @@ class _Rows:
         return (large / c) ** (1 / n) * w / large
 
     @cached_property
-    def inverse(self) -> NDArray:
-        """(R, m, m) of the scaled system, contacts as springs of their slope in it."""
-        flexible = self.flexible
+    def times(self) -> Callable[[NDArray, NDArray], NDArray]:
+        """What multiplies vectors of the rows by matrices of their postures."""
+        return at_postures(self.which)
+
+    def corrected(self, b: NDArray) -> NDArray:
+        """(R, m) what the linear model makes of right sides (R, m)."""
         if not self.here.laws:
-            return flexible.inverse[self.which]
+            return self.times(self.flexible.inverse, b)
+        return np.einsum("rij,rj->ri", self._with_contacts, b)
+
+    @cached_property
+    def _with_contacts(self) -> NDArray:
+        """(R, m, m) inverse of the scaled system, contacts springs of their slope."""
+        flexible = self.flexible
         through = np.einsum("cki,is->cks", flexible.rows, self.contacts)[self.which]
         M = flexible.system[self.which].copy()
         count = through.shape[1]
@@ -172,6 +190,11 @@ class _Rows:
         errors = self.here.errors
         off = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
         return self.here.robot.fixed_transforms @ off
+
+    @cached_property
+    def commanded(self) -> NDArray:
+        """(R, n, 4, 4) motions of the joints as commanded."""
+        return along_own(self.here.robot, self.here.coordinates)
 
     @cached_property
     def scale(self) -> NDArray:
@@ -218,15 +241,17 @@ class _State:
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """(R, n, 4, 4) before a body's deformation, after it, the joint's, all."""
-        robot = self.rows.here.robot
-        link, spring = exponential(self.screws)
-        local = [self.rows.bodies]
-        for motion in (link, spring, along_own(robot, self.own)):
-            local.append(local[-1] @ motion)
-        step = local[-1] @ along_own(robot, self.rows.here.coordinates)
+        rows = self.rows
+        local = [rows.bodies]
+        for frames, screws in zip(rows.soft, self.screws, strict=True):
+            T = local[-1].copy()
+            T[:, frames] = T[:, frames] @ exponential(screws[:, frames])
+            local.append(T)
+        local.append(local[-1] @ along_own(rows.here.robot, self.own))
+        step = local[-1] @ rows.commanded
         after = np.empty_like(step)
         before = np.broadcast_to(np.eye(4), step.shape).copy()
-        for i, parent in enumerate(robot.parents):
+        for i, parent in enumerate(rows.here.robot.parents):
             if parent >= 0:
                 before[:, i] = after[:, parent]
             after[:, i] = before[:, i] @ step[:, i]
@@ -265,9 +290,6 @@ class _State:
         here, loads = self.rows.here, self.rows.loads
         posture, robot = here.postures, here.robot
         last = robot.index(robot.platform)
-        ends = self.poses[1]
-        carried = self.poses[3] @ along_own(robot, here.coordinates)
-        held_body, held_joint, *_ = resultants(posture, loads, ends, carried)
         closing = self.multipliers.reshape(len(here), -1, 6) * self.rows.scale
         closing = np.einsum("kn,rkj->rnj", closure_signs(robot), closing)
         J = turn_jacobian(self.platform_screw[:, :3])
@@ -277,14 +299,19 @@ class _State:
         on_body = robot.on_path[last][:, None] * platform
         on_joint = on_body.copy()
         on_joint[:, last] = 0.0  # the load acts on the platform's body
-        return np.stack([held_body + on_body, held_joint + on_joint]) + closing
+        through = np.stack([on_body, on_joint]) + closing
+        if loads.beyond_platform:
+            carried = self.poses[3] @ self.rows.commanded
+            through += resultants(posture, loads, self.poses[1], carried)[:2]
+        return through
 
     def wrenches(self, through: NDArray, place: NDArray, frames: NDArray) -> NDArray:
         """(R, k, 6) wrenches at the platform's origin, read at some frames' places."""
         origin = self.rows.here.postures.platform[:, None, :3, 3]
-        T = place[:, frames]
-        A = screw_map(T[..., :3, 3] - origin, T[..., :3, :3])
-        return np.einsum("rkij,rki->rkj", A, through[:, frames])
+        T, w = place[:, frames], through[:, frames]
+        moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])
+        both = np.stack([moment, w[..., 3:]], axis=-2) @ T[..., :3, :3]
+        return both.reshape(w.shape)
 
     def misfit(self) -> tuple[NDArray, NDArray, NDArray]:
         """(2, R, n, 6) what springs lack; forces on motions (R, q), contacts (R, s)."""
@@ -294,12 +321,13 @@ class _State:
         for k, frames in enumerate(rows.soft):
             w = self.wrenches(self.through[k], self.poses[k], frames)
             J = left_jacobian(self.screws[k][:, frames])
-            w = np.einsum("rkij,rki->rkj", J, w)
+            w = (w[..., None, :] @ J)[..., 0, :]
             generalised[k][:, frames] = w
             C = (flexible.bodies, flexible.joints)[k][frames]
             lack[k][:, frames] += np.einsum("kij,rkj->rki", C, w)
-        every = np.arange(self.screws.shape[2])
-        own = self.wrenches(self.through[1], self.poses[2], every)
+        own = np.zeros_like(self.screws[0])
+        frames = rows.loose
+        own[:, frames] = self.wrenches(self.through[1], self.poses[2], frames)
         free = own.reshape(len(own), -1) @ flexible.free
         w = generalised[1].reshape(len(own), -1) @ rows.contacts
         return lack, free, w
@@ -335,7 +363,8 @@ def _come_to_rest(rows: _Rows) -> tuple[NDArray, NDArray]:
     found &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSED
     found &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, pushed, _ = state.misfit()
-    largest = np.abs(state.through / rows.scale).max(axis=(0, 2, 3), initial=0.0)
+    least = _MISFIT / flexible.softness  # without load there is but rounding
+    largest = np.abs(state.through / rows.scale).max(axis=(0, 2, 3), initial=least)
     found &= np.all(np.abs(pushed) * _lever(rows) <= _FREE * largest[:, None], axis=1)
     return state.platform_screw, found
 
@@ -354,13 +383,12 @@ def _correction(state: _State, first: bool) -> tuple[NDArray, NDArray, NDArray]:
     if rows.here.laws:
         give = rows.tangent(w) if first else rows.deflection(w)
         lack[1] += (give @ rows.contacts.T).reshape(shape)
-    J, softness = flexible.rows[rows.which], flexible.softness
-    short = lack.sum(axis=0).reshape(count, -1)
-    left = state.residual + np.einsum("rki,ri->rk", J, short)
+    J, softness, times = flexible.rows, flexible.softness, rows.times
+    left = state.residual + times(J, lack.sum(axis=0).reshape(count, -1))
     b = -np.concatenate([left, free * softness], axis=1)
-    x = np.einsum("rij,rj->ri", rows.inverse, b)
+    x = rows.corrected(b)
     multipliers, motions = x[:, : J.shape[1]] / softness, x[:, J.shape[1] :]
-    closing = np.einsum("rki,rk->ri", J, multipliers)
+    closing = times(np.swapaxes(J, 1, 2), multipliers)
     if rows.here.laws:
         further = (closing @ rows.contacts) * rows.slope @ rows.contacts.T
         lack[1] += further.reshape(shape)

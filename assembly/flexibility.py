@@ -19,6 +19,7 @@ w       ``joint_wrenches``    (R,6n)       through every joint
 ======  ====================  ===========  ===========================================
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from hashlib import blake2b
@@ -35,6 +36,7 @@ from assembly.posture import Posture
 
 # eigenvalues of the scaled system between these are neither rounding nor rank
 _ROUNDING, _RANK = 1e-13, 1e-10
+_PADDED = 4  # times the rows: where postures differ more in theirs, each by itself
 _CLOSED = 1e-9  # relative residual of a system that was solved
 
 
@@ -86,25 +88,19 @@ class Flexibility:
         """
         loose = errors + _each(self.bodies, forces.body)
         loose += _each(self.joints, forces.joint)
-        J, size = self.rows[posture], self.softness
-        b = -np.concatenate(
-            [
-                np.einsum("rki,ri->rk", J, loose),
-                forces.joint @ self.free * size,
-            ],
-            axis=1,
-        )
-        x = np.einsum("rij,rj->ri", self.inverse[posture], b)
+        J, size, times = self.rows, self.softness, at_postures(posture)
+        b = -np.concatenate([times(J, loose), forces.joint @ self.free * size], axis=1)
+        x = times(self.inverse, b)
         count = J.shape[1]
         multipliers, motions = x[:, :count] / size, x[:, count:]
-        left = np.einsum("rij,rj->ri", self.system[posture], x) - b
+        left = times(self.system, x) - b
         scale = np.abs(b).max(axis=1, initial=1e-300)
         closed = np.abs(left).max(axis=1, initial=0.0) <= _CLOSED * scale
         within = np.all(np.abs(motions) <= self.limit, axis=1)
-        closing = np.einsum("rki,rk->ri", J, multipliers)
+        closing = times(np.swapaxes(J, 1, 2), multipliers)
         screws = loose + _each(self.compliance, closing) + motions @ self.free.T
         return FlexibleAssembly(
-            np.einsum("rki,ri->rk", self.platform[posture], screws),
+            times(self.platform, screws),
             closing + forces.joint,
             multipliers,
             closed & within & ~self.doubt[posture],
@@ -160,6 +156,34 @@ class FlexibleAssembly:
     joint_wrenches: NDArray
     multipliers: NDArray
     solved: NDArray
+
+
+def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
+    """How matrices of postures multiply vectors of the rows that stand there.
+
+    Rows at one posture are multiplied together: nothing is copied for every row.
+
+    Args:
+        posture: (R,) which of c postures each row has.
+
+    Returns:
+        A function of matrices (c, a, b) and vectors (R, b) that gives (R, a).
+    """
+    names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
+    order = np.argsort(own, kind="stable")
+    place = np.empty_like(order)  # of a row among those of its posture
+    place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    most = int(count.max(initial=0))
+
+    def times(matrices: NDArray, vectors: NDArray) -> NDArray:
+        if len(names) * most > _PADDED * len(own):
+            return np.einsum("rij,rj->ri", matrices[posture], vectors)
+        used = matrices if len(names) == len(matrices) else matrices[names]
+        together = np.zeros((len(names), most, vectors.shape[1]))
+        together[own, place] = vectors
+        return (together @ np.swapaxes(used, 1, 2))[own, place]
+
+    return times
 
 
 def in_groups(postures: Posture) -> tuple[Posture, NDArray]:
