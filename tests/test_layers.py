@@ -19,7 +19,7 @@ OWNERS = {
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
         "assembly/reference.py",
-        "assembly/statistics/allocation.py",
+        "assembly/statistics/cutting_planes.py",
         "assembly/statistics/worst_case.py",
     ),
     "exudyn": (SIMULATION,),

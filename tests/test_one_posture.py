@@ -125,3 +125,21 @@ def test_errors_of_another_shape_are_refused():
         prepare_energies(posture).solve(np.zeros((3, 7, 6)))
     with pytest.raises(ValueError, match="all finite"):
         prepare_margins(posture).solve(np.full((1, 8, 6), np.nan))
+
+
+def test_a_joint_at_the_end_of_its_motion_carries_its_share_of_the_wrench():
+    """Robots whose passive joints have play only: the stop's wrench is the solver's."""
+    seen = 0
+    for seed in (1, 4, 16, 24):
+        robot = random_robot(np.random.default_rng(seed))
+        posture = place_robot(robot)
+        one = prepare_energies(posture)
+        found = one.solve(robot.errors[None])
+        assert found.slower.all()
+        answer = solve_assembly(posture)
+        wrenches = one.wrenches(found.multipliers)[0]
+        seen += int(np.abs(wrenches).max() > 0)
+        np.testing.assert_allclose(
+            wrenches, answer.wrenches, atol=1e-9 * np.abs(answer.wrenches).max()
+        )
+    assert seen == 4

@@ -8,7 +8,14 @@ import pytest
 from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import place_robot
 from assembly.robots import load_robot
-from assembly.statistics.sensitivity import energy_slopes, margin_slopes
+from assembly.solvers.one_posture import prepare_energies
+from assembly.statistics.distributions import tolerance_sources
+from assembly.statistics.responses import respond
+from assembly.statistics.sensitivity import (
+    energy_slopes,
+    margin_slopes,
+    solution_slopes,
+)
 from assembly.zone import zone_margin
 from tests.robots_for_tests import random_robot
 
@@ -89,3 +96,61 @@ def test_errors_that_nothing_decides_have_no_slopes():
     found = margin_slopes(place_robot(robot))
     assert found.margin == 0.0
     assert not found.slopes.any()
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_wrenches_of_random_robots_have_slopes(seed):
+    """A random sum of all wrenches, along a random direction of all errors."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    ready, errors = prepare_energies(place_robot(robot)), robot.errors
+    weights = rng.normal(size=errors.shape) * np.array([10.0] * 3 + [1.0] * 3)
+    step = 1e-5 * rng.normal(size=errors.shape) * np.abs(errors)
+    found = ready.solve(errors[None])
+    if found.slower.any():
+        pytest.skip("it does not close, or a passive joint is at the end of its motion")
+    slopes = solution_slopes(ready, found, weights[None], np.zeros((1, 6)))[0]
+    both = ready.solve(np.array([errors + step, errors - step]))
+    above, below = (ready.wrenches(both.multipliers) * weights).sum(axis=(1, 2))
+    scale = float((np.abs(slopes) * np.abs(step)).sum())
+    # gaps of 1e-10 leave wrenches 1e-5 off, nearly alike on both sides
+    assert (above - below) / 2 == pytest.approx(
+        float((slopes * step).sum()), abs=1e-3 * scale
+    )
+
+
+@pytest.mark.parametrize(
+    "key", ["force", "moment", "stress", "rotation", "translation"]
+)
+@pytest.mark.parametrize("pose", POSES)
+def test_limited_quantities_of_the_papers_robot_have_slopes(pose, key, rng):
+    """Along random directions, at errors so large that no play is left undecided."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=pose)
+    frames = tuple(f.name for f in robot.frames if f.link is not None)
+    sources = tolerance_sources(robot, [5e-3] * 3 + [2e-4] * 3, frames)
+    ready = prepare_energies(posture)
+    values = rng.normal(size=(1, len(sources))) * sources.scale
+    slopes = respond(ready, sources, values, key)[1][0]
+    for _ in range(4):
+        step = 1e-4 * rng.normal(size=len(sources)) * sources.scale
+        above, below = (
+            respond(ready, sources, values + s, key)[0][0] for s in (step, -step)
+        )
+        scale = float(np.linalg.norm(slopes * step))
+        assert (above - below) / 2 == pytest.approx(slopes @ step, abs=5e-3 * scale)
+
+
+def test_inside_a_zone_no_error_has_a_slope(rng):
+    """Play takes up everything: no wrench, and none after small changes either."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=POSES[0])
+    ready = prepare_energies(posture)
+    found = ready.solve(0.02 * some_errors(robot, rng)[None])
+    assert found.energy[0] < 1e-20
+    slopes = solution_slopes(
+        ready, found, np.ones((1, len(robot.frames), 6)), np.zeros((1, 6))
+    )
+    scale = np.abs(ready.wrenches(ready.closing.sum(axis=1)[None])).max()
+    outside = 0.02 * np.array([5e-3] * 3 + [2e-4] * 3)
+    assert np.abs(slopes * outside).max() < 1e-9 * scale

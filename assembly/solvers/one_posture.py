@@ -64,7 +64,9 @@ class OnePosture:
         pulls: (ny, r) how they pull the springs, before any elimination.
         cones: (nu, r) how they pull the clearances, likewise.
         free: (nq, r) how they pull free motions: nothing but rounding.
-        unanswered: (m - .., 6n) what of the errors no spring takes up.
+        over: (m, m - ..) closure rows that neither free motions nor springs take up,
+            orthonormal columns.
+        unanswered: (m - .., 6n) what of the errors they ask, over.T @ closures.
         screws: (6, nu + 6n) platform screw.
         platform: (6, 6n) screws of all frames to the platform's.
         motions: (nq, nu + 6n) free motions.
@@ -85,6 +87,7 @@ class OnePosture:
     pulls: NDArray
     cones: NDArray
     free: NDArray
+    over: NDArray
     unanswered: NDArray
     screws: NDArray
     platform: NDArray
@@ -167,9 +170,9 @@ class OnePosture:
         answer.clearances[rows] = found.clearances
         multipliers = found.multipliers
         if not len(self.H):
-            # the smallest wrenches where rigid parts leave them undetermined
-            springs = multipliers @ (self.closures @ self.joints.elastic @ self.pulls)
-            multipliers = springs @ self.closing.T
+            # the smallest wrenches where rigid parts leave them undetermined; those of
+            # joints at the end of their motion stay
+            multipliers = multipliers - multipliers @ self.over @ self.over.T
         answer.multipliers[rows] = multipliers
 
 
@@ -219,7 +222,7 @@ def prepare_energies(
         posture, joints, starts.astype(np.int64),
         small.G, small.H, A, misfit, closing, A_y.T @ closing,
         np.ascontiguousarray(A_u.T @ closing), A_q.T @ closing,
-        over.T @ A, lin.platform @ moved, lin.platform, motions, A @ moved,
+        over, over.T @ A, lin.platform @ moved, lin.platform, motions, A @ moved,
         bounds[np.flatnonzero(joints.free.any(axis=1))],
         wrench.reshape(len(robot.frames), 6, -1) / size,
         loads_of(small, misfit, push, g) if forces else None,

@@ -152,7 +152,8 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
         data: of :func:`assembly.statistics.tolerances.tolerance_dataset`.
 
     Returns:
-        A figure; above it the requirement and what the verification found.
+        A figure: wide bars cost least, narrow ones are the convex programme's, scaled
+        alike, where these are others.  Above it the price and the verification.
 
     Raises:
         ValueError: the data set has no tolerances.
@@ -172,7 +173,11 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
         rows = np.flatnonzero(units == unit)
         value = scale * data["tolerance"].values[rows]
         most = scale * data["loosest_allowed"].values[rows]
-        panel.barh(np.arange(len(rows)), value, color="steelblue")
+        panel.barh(np.arange(len(rows)), value, color="steelblue", label="least cost")
+        alike = scale * data["scaled_alike"].values[rows]
+        if not np.allclose(alike, value, rtol=1e-6):
+            panel.barh(np.arange(len(rows)) + 0.3, alike, 0.15, color="darkorange",
+                       label="scaled alike")  # fmt: skip
         panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
         panel.set_yticks(np.arange(len(rows)), data["class"].values[rows], fontsize=8)
         panel.set(xlabel=f"tolerance, plus or minus [{shown}]", xscale="log")

@@ -11,12 +11,12 @@ from assembly.posture import Posture
 from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.distributions import ErrorSources
 from assembly.statistics.monte_carlo import Experiment
-from assembly.statistics.worst_case import respond
+from assembly.statistics.responses import respond
 from stiffness.reading import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-TRAINING, FRESH = 10, 11  # streams of random numbers
+TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,38 +95,62 @@ class Requirement:
         return found
 
     @cached_property
-    def convex(self) -> dict[str, list]:
-        """By convex limit, the postures prepared for it."""
+    def ready(self) -> dict[str, list]:
+        """By limit, the postures prepared for it."""
         readings = {"margin": "rigid", "margin_free": "free"}
         return {
             key: [prepare_margins(p, readings[key]) for p in self.postures]
             if key in readings else [e.energies for e in self.experiments]
-            for key in CONVEX if key in self.plan.limits
+            for key in self.plan.limits
         }  # fmt: skip
 
+    @cached_property
+    def convex(self) -> dict[str, list]:
+        """Those of the limits that are convex in the errors."""
+        return {key: self.ready[key] for key in CONVEX if key in self.ready}
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether all limits are convex in the tolerances: none may ever be failed."""
+        return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.ready)
+
+    @property
+    def places(self) -> list[tuple[str, int]]:
+        """Limit and posture of every row of :meth:`shares`."""
+        return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
+
     def shares(self, values: NDArray) -> NDArray:
-        """(k,) largest quantity over its limit, of all limits and postures."""
-        worst = np.zeros(len(values))
-        others = [key for key in self.plan.limits if not key.startswith("margin")]
-        for key, ready in self.convex.items():
+        """Every limited quantity over its limit, for given errors.
+
+        Args:
+            values: (k, m) [rad or m].
+
+        Returns:
+            (limits x postures, k), see :attr:`places`; inf where there is no answer.
+        """
+        found = {}
+        for key, ready in self.ready.items():
             if key.startswith("margin"):
-                for one in ready:
-                    found = respond(one, self.plan.sources, values)[0]
-                    share = found / self.plan.limits[key]
-                    worst = np.maximum(worst, np.where(np.isnan(share), np.inf, share))
-        for one in self.experiments if others else ():
+                for i, one in enumerate(ready):
+                    found[key, i] = respond(one, self.plan.sources, values)[0]
+        others = any(not key.startswith("margin") for key in self.plan.limits)
+        for i, one in enumerate(self.experiments if others else ()):
             rows = one.answer(values, range(len(values)))
             screws = rows["platform_screw"]
-            sizes = {
-                "rotation": np.linalg.norm(screws[:, :3], axis=1),
-                "translation": np.linalg.norm(screws[:, 3:], axis=1),
-                "stress": rows["stress"].max(axis=1, initial=0.0),
+            found |= {
+                ("rotation", i): np.linalg.norm(screws[:, :3], axis=1),
+                ("translation", i): np.linalg.norm(screws[:, 3:], axis=1),
+                ("stress", i): rows["stress"].max(axis=1, initial=0.0),
             }
-            for key in others:
-                found = sizes[key] if key in sizes else rows[key]
-                share = found / self.plan.limits[key]
-                worst = np.maximum(worst, np.where(np.isnan(share), np.inf, share))
-        return worst
+            found |= {(key, i): rows[key] for key in ("energy", "force", "moment")}
+        shares = np.array([found[p] / self.plan.limits[p[0]] for p in self.places])
+        return np.where(np.isnan(shares), np.inf, shares)
+
+    def share_slopes(self, place: int, values: NDArray) -> NDArray:
+        """(k, m) slopes of a row of :meth:`shares` with each error."""
+        key, i = self.places[place]
+        slopes = respond(self.ready[key][i], self.plan.sources, values, key)[1]
+        return slopes / self.plan.limits[key]
 
     def check_taken_up(self) -> None:
         """Refuse errors that neither play nor springs take up anywhere.

@@ -125,6 +125,7 @@ def allocation_of(answer: Allocation) -> dict[str, Any]:
     classes = [
         {
             "name": name, "tolerance": answer.tolerances[g], "unit": _unit(answer, g),
+            "scaled_alike": answer.alike[g],
             "cost": plan.costs[g], "loosest_allowed": plan.most[g],
             "at_loosest": bool(answer.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
         }
@@ -132,7 +133,7 @@ def allocation_of(answer: Allocation) -> dict[str, Any]:
     ]  # fmt: skip
     return {
         "limits": dict(plan.limits), "yield": plan.asked_yield, "cost": plan.cost,
-        "tolerances": classes, "price": answer.price,
+        "tolerances": classes, "price": answer.price, "price_alike": answer.price_alike,
         "price_bound": answer.price_bound, "cuts": answer.cuts,
         "worst": {k: {"found": a, "proven": b} for k, (a, b) in answer.worst.items()},
         "proven_scale": answer.proven_scale, "verification": answer.verification,
@@ -153,10 +154,15 @@ def allocation_text(found: dict[str, Any]) -> str:
         scale, unit = scales[one["unit"]]
         said = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
         lines.append(said + (" (the loosest allowed)" if one["at_loosest"] else ""))
+    lines.append(_price_text(found))
     for key, worst in found["worst"].items():
+        proven = (
+            f"at most {worst['proven']:.4g} proven" if np.isfinite(worst["proven"])
+            else "nothing proven"
+        )  # fmt: skip
         lines.append(
-            f"worst {key}: {worst['found']:.4g} found, at most {worst['proven']:.4g} "
-            f"proven, limit {found['limits'][key]:g}"
+            f"worst {key}: {worst['found']:.4g} found, {proven}, "
+            f"limit {found['limits'][key]:g}"
         )
     if np.isfinite(found["proven_scale"]):
         lines.append(f"proven when scaled by {found['proven_scale']:.4f}")
@@ -171,6 +177,19 @@ def allocation_text(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _price_text(found: dict[str, Any]) -> str:
+    """What the tolerances cost, and what that is known to be worth."""
+    price, alike, bound = (found[k] for k in ("price", "price_alike", "price_bound"))
+    said = f"price {price:.5g}"
+    if np.isfinite(bound):
+        return f"{said}, no tolerances cost less than {bound:.5g}"
+    if alike > price:
+        said += f", {alike:.5g} with those of the convex programme scaled alike"
+        if found["cost"] == "reciprocal":
+            said += f": {1 - price / alike:.1%} less"
+    return said
+
+
 def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
     """An allocation as a data set over ``class``."""
     import xarray
@@ -180,6 +199,7 @@ def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
     units = np.array([c["unit"] for c in found["tolerances"]])
     data = {
         "tolerance": ("class", answer.tolerances, {"units": "rad or m, see unit"}),
+        "scaled_alike": ("class", answer.alike, {"units": "rad or m, see unit"}),
         "loosest_allowed": ("class", plan.most, {"units": "rad or m, see unit"}),
         "cost": ("class", plan.costs, {"units": "1"}),
         "unit": ("class", units),
@@ -191,7 +211,8 @@ def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
         "robot": robot.name, "robot_sha256": robot_hash(robot),
         "program": f"forcefit {version('forcefit')}", "seed": plan.seed,
         "yield": plan.asked_yield, "cost_law": plan.cost, "price": answer.price,
-        "price_bound": answer.price_bound, "said": said,
+        "price_alike": answer.price_alike, "price_bound": answer.price_bound,
+        "said": said,
         "verified_yield": check["yield"]["probability"] if check else float("nan"),
         **limits,
     })  # fmt: skip

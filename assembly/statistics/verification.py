@@ -16,6 +16,8 @@ from assembly.statistics.worst_case import (
     worst_corner,
 )
 
+_CHUNK = 256  # draws between two reports
+
 
 def prove_worst(
     work: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
@@ -28,36 +30,38 @@ def prove_worst(
         progress: called with what is done, how far, and of how much.
 
     Returns:
-        By convex limit the worst corner found and the proven upper bound; and the
-        factor on the tolerances, 1 or less, at which the proof meets all limits, NaN
-        if some limit is not convex.
+        By limit the worst corner found and the proven upper bound, NaN where the
+        limit is not convex; and the factor on the tolerances, 1 or less, at which the
+        proof meets all limits, NaN if some limit is not convex.
     """
     plan = work.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
     corners = random_corners(CORNERS, len(spread), plan.seed + 1)
-    total = sum(map(len, work.convex.values()))
+    total = sum(map(len, work.ready.values()))
     done = 0
-    for key, ready in work.convex.items():
+    for key, ready in work.ready.items():
         lower, upper = 0.0, 0.0
+        bound = bound_energy if key == "energy" else bound_margin
         for one in ready:
-            found = worst_corner(one, plan.sources, spread, corners).value
-            bound = bound_energy if key == "energy" else bound_margin
+            found = worst_corner(one, plan.sources, spread, corners, key).value
             lower = max(lower, found)
-            upper = max(upper, bound(one, plan.sources, spread))
+            if key in work.convex:
+                upper = max(upper, bound(one, plan.sources, spread))
             done += 1
             progress("proofs", done, total)
-        worst[key] = lower, upper
+        worst[key] = lower, upper if key in work.convex else np.nan
+        if key not in work.convex:
+            scale = np.nan
+            continue
         # tighter tolerances need that much less play, springs that much less again
         power = 0.5 if key == "energy" else 1.0
-        scale = min(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
-    covered = set(plan.limits) <= set(worst)
-    proven = min(1.0, scale) if covered else float("nan")
-    return worst, proven
+        scale = np.minimum(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
+    return worst, float(np.minimum(1.0, scale))
 
 
 def verify_yield(
     work: Requirement, t: NDArray, fresh: int,
-    progress: Callable[[str, int, int], None],
+    progress: Callable[[str, int, int], None], stream: int = FRESH,
 ) -> dict[str, Any]:  # fmt: skip
     """Yield of fresh draws: of each posture, and of all postures together.
 
@@ -66,19 +70,23 @@ def verify_yield(
         t: (G,) [rad or m] tolerances.
         fresh: draws, used for nothing else.
         progress: called with what is done, how far, and of how much.
+        stream: of random numbers.
 
     Returns:
         Plain values: the yield with its interval, that of every posture, the verdict.
     """
     plan = work.plan
-    values = plan.draws_of(FRESH, fresh) * plan.spread(t)
-    worst, each = np.zeros(fresh), []
-    for i, posture in enumerate(work.postures):
-        shares = Requirement([posture], plan).shares(values)
-        worst = np.maximum(worst, shares)
-        each.append(int((shares <= 1.0 + 1e-9).sum()) / fresh)
-        progress("verification", i + 1, len(work.postures))
-    good = int((worst <= 1.0 + 1e-9).sum())
+    values = plan.draws_of(stream, fresh) * plan.spread(t)
+    worst = np.zeros((len(work.postures), fresh))
+    row = np.array([i for _, i in work.places])
+    for first in range(0, fresh, _CHUNK):
+        some = slice(first, first + _CHUNK)
+        np.maximum.at(worst[:, some], row, work.shares(values[some]))
+        progress("verification", min(first + _CHUNK, fresh), fresh)
+    fits = worst <= 1.0 + 1e-9
+    each = fits.mean(axis=1).tolist()
+    worst = worst.max(axis=0)
+    good = int(fits.all(axis=0).sum())
     found = proportion(good, fresh)
     return {
         "draws": fresh, "yield": found, "worst_posture_yield": min(each),

@@ -2,7 +2,8 @@
 
 Margin and energy are convex in the errors, so the worst lies where every error is at
 one end of its tolerance.  Going from such a corner to the one its slopes point to never
-lowers either: from many corners this gives a lower bound.  An upper bound comes from
+lowers either: from many corners this gives a lower bound, as it does of a wrench, a
+stress or a pose error, whose worst may lie elsewhere.  An upper bound comes from
 play that answers every error in proportion, ``u = sum_i V_i s_i`` for errors
 ``t_i s_i``, abs(s_i) <= 1: one cone programme, whose V proves the bound by itself.
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from assembly.solvers.one_posture import OnePosture
 from assembly.solvers.posture_margins import PostureMargins
 from assembly.statistics.distributions import ErrorSources
+from assembly.statistics.responses import respond
 
 CORNERS = 24  # to start from
 _STEPS = 12  # from corner to corner; most searches end after three
@@ -29,9 +31,9 @@ class Corner:
     """The worst corner of the tolerances that was found.
 
     Attributes:
-        value: margin [1] or energy [J] there: a lower bound of the worst.
+        value: the quantity there: a lower bound of the worst.
         signs: (m,) of the errors, -1 or 1.
-        slopes: (m,) [1/rad, 1/m or J/rad, J/m] of the value with each error.
+        slopes: (m,) [its unit per rad or m] of the value with each error.
     """
 
     value: float
@@ -39,39 +41,18 @@ class Corner:
     slopes: NDArray
 
 
-def respond(
-    ready: PostureMargins | OnePosture, sources: ErrorSources, values: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Margin or energy of given errors, and its slopes with each of them.
-
-    Args:
-        ready: a posture prepared for one or the other.
-        sources: m of them.
-        values: (k, m) [rad or m].
-
-    Returns:
-        (k,) and (k, m).
-    """
-    errors = sources.errors(values)
-    if isinstance(ready, PostureMargins):
-        found = ready.solve(errors)
-        return found.margin, found.slopes[:, sources.frame, sources.component]
-    answer = ready.solve(errors)
-    wrenches = ready.wrenches(answer.multipliers)
-    return answer.energy, -wrenches[:, sources.frame, sources.component]
-
-
 def worst_corner(
     ready: PostureMargins | OnePosture, sources: ErrorSources, tolerances: NDArray,
-    corners: NDArray,
+    corners: NDArray, key: str = "energy",
 ) -> Corner:  # fmt: skip
     """Climb from corner to corner; the best end of all.
 
     Args:
-        ready: a posture prepared for margins or energies.
+        ready: a posture prepared for margins, or for energies and all others.
         sources: m of them; only their places count.
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
+        key: which quantity, see :func:`assembly.statistics.responses.respond`.
 
     Returns:
         The worst corner found.
@@ -85,7 +66,7 @@ def worst_corner(
         ])
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
     for _ in range(_STEPS):
-        values, slopes = respond(ready, sources, signs * tolerances)
+        values, slopes = respond(ready, sources, signs * tolerances, key)
         i = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[i] > best.value:
             best = Corner(float(values[i]), signs[i].copy(), slopes[i].copy())

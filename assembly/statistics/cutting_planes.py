@@ -1,0 +1,136 @@
+"""Cheapest tolerances within convex limits: a convex programme by cutting planes.
+
+Two requirements are convex in the tolerances t:
+
+- *always* (yield 1): margin or energy at every corner of the tolerances, for
+  ``m(t s)`` is convex in t for every choice s of signs, and proportional to t if it is
+  the margin;
+- *with a yield*: the mean of the worst (1 - yield) of many fixed draws s (the
+  conditional value at risk), which is more than the yield asks.
+
+Solve, find where the requirement is violated most, add the plane that its slopes give,
+repeat.  Every plane holds for all tolerances that meet the requirement, so the
+programme's cost bounds theirs from below.
+
+Sources:
+    Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
+    Uryasev (2000), Optimization of conditional value-at-risk.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.statistics.requirement import TRAINING, Plan, Requirement
+from assembly.statistics.responses import respond
+from assembly.statistics.worst_case import CORNERS, random_corners, worst_corner
+from stiffness.reading import BadInput
+
+_TOLERANCE = 1e-3  # of a limit: by how much the programme may still violate it
+_MOST_CUTS = 200
+
+
+def cut_planes(
+    work: Requirement, progress: Callable[[str, int, int], None]
+) -> tuple[NDArray, float, int]:
+    """Cheapest tolerances that meet the convex limits of a requirement.
+
+    Args:
+        work: what is required.
+        progress: called with what is done, how far, and of how much.
+
+    Returns:
+        (G,) [rad or m] tolerances, a lower bound of their cost, and how many planes.
+
+    Raises:
+        BadInput: even perfect parts, or the tightest tolerances, exceed a limit.
+    """
+    plan = work.plan
+    planes: list[NDArray] = []
+    t = np.array(plan.most, dtype=float)
+    bound = -np.inf
+    for step in range(_MOST_CUTS):
+        progress("cutting planes", step, _MOST_CUTS)
+        found = list(_violated(work, t))
+        if not found:
+            break
+        planes += found
+        t = cheapest_within(plan, planes, plan.least, plan.most)
+        bound = plan.price(t)
+    progress("cutting planes", _MOST_CUTS, _MOST_CUTS)
+    return t, bound, len(planes)
+
+
+def cheapest_within(
+    plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
+) -> NDArray:
+    """Cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
+
+    Args:
+        plan: its costs.
+        planes: (G,) each [1/rad or 1/m].
+        least: (G,) [rad or m].
+        most: (G,) [rad or m].
+
+    Returns:
+        (G,) [rad or m].
+
+    Raises:
+        BadInput: there are none.
+    """
+    import cvxpy as cp
+
+    A = np.array(planes)
+    # scaled: each alone would use up its plane at 1
+    steepest = np.maximum(A, 0.0).max(axis=0)
+    scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
+    x = cp.Variable(len(plan.names))
+    if plan.cost == "reciprocal":
+        costs = plan.costs / scale
+        goal = cp.Minimize((costs / costs.sum()) @ cp.inv_pos(x))
+    else:
+        goal = cp.Minimize(-(plan.costs / plan.costs.sum()) @ cp.log(x))
+    held = [(A * scale) @ x <= 1.0, x <= most / scale]
+    if least.any():
+        held.append(x >= least / scale)
+    problem = cp.Problem(goal, held)
+    problem.solve(solver="CLARABEL")
+    if x.value is None:
+        raise BadInput("tolerances: even the tightest ones allowed violate a limit")
+    return np.clip(x.value * scale, least, most)
+
+
+def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
+    """Planes ``a.t <= 1`` that the tolerances violate."""
+    plan = work.plan
+    spread = plan.spread(t)
+    for key, ready in work.convex.items():
+        limit = plan.limits[key]
+        if plan.asked_yield == 1.0:
+            corners = random_corners(CORNERS, len(spread), plan.seed)
+            for one in ready:
+                worst = worst_corner(one, plan.sources, spread, corners)
+                slopes = plan.gather(worst.slopes * worst.signs)
+                if worst.value > limit * (1 + _TOLERANCE):
+                    yield _plane(slopes, worst.value, t, limit)
+            continue
+        draws = plan.draws_of(TRAINING, plan.draws)
+        values = np.full(len(draws), -np.inf)
+        slopes = np.zeros_like(draws)
+        for one in ready:
+            here, there = respond(one, plan.sources, draws * spread)
+            higher = here > values
+            values[higher], slopes[higher] = here[higher], (there * draws)[higher]
+        tail = np.argsort(values)[-max(1, round((1 - plan.asked_yield) * len(draws))) :]
+        if values[tail].mean() > limit * (1 + _TOLERANCE):
+            mean = plan.gather(slopes[tail].mean(axis=0))
+            yield _plane(mean, float(values[tail].mean()), t, limit)
+
+
+def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
+    """The plane through a value and its slopes that must stay below a limit."""
+    right = limit - value + float(slopes @ t)
+    if right <= 0:
+        raise BadInput(f"even perfect parts exceed a limit of {limit:g}")
+    return slopes / right
