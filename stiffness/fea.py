@@ -209,6 +209,7 @@ def solve_link(
     solid = first_mesh(surface, base, tip, budget, cache)
     level = _solve_level(solid, materials, centers, interface)
     history = [(level.solution.stiffness, level.errors.sum(axis=0))]
+    sizes = [len(solid.cells)]
     while True:
         error, factor = estimated_error(history)
         worst = float(np.abs(scaled(error, level.solution.stiffness)).max())
@@ -216,14 +217,14 @@ def solve_link(
         # a first mesh has nothing to check its estimate against
         if (worst <= accuracy and len(history) > 1) or len(history) == budget.levels:
             break
-        # the error falls with the count of elements, or faster
-        wanted = float(np.clip(1.15 * worst / accuracy, 1.2, 3.0))
-        finer = _affordable_mesh(level, wanted, budget, start)
+        finer = _affordable_mesh(
+            level, _wanted_growth(history, sizes, worst / accuracy), budget, start
+        )
         if finer is None:
             break
-        solid = finer
-        level = _solve_level(solid, materials, centers, interface)
+        level = _solve_level(finer, materials, centers, interface)
         history.append((level.solution.stiffness, level.errors.sum(axis=0)))
+        sizes.append(len(finer.cells))
     report = _report(level, surface, len(history), start) | {
         "accuracy": accuracy,
         "reached": worst <= accuracy,
@@ -358,15 +359,30 @@ def estimated_error(
     return -factor * recovered, factor
 
 
+def _wanted_growth(
+    history: Sequence[tuple[NDArray, NDArray]], sizes: Sequence[int], excess: float
+) -> float:
+    """How many times the elements would bring the error down by an excess."""
+    rate = 1.2  # of the error over the count of elements; 1 where edges are singular
+    if len(history) > 1:
+        then, now = (np.max(np.diag(e) / np.diag(K)) for K, e in history[-2:])
+        fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
+        rate = min(max(fell, 0.9), 1.6)  # what was gained on coarse meshes ends
+    return float(np.clip((1.1 * excess) ** (1 / rate), 1.2, 3.0))
+
+
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float
 ) -> Solid | None:
     """A finer mesh that the budget allows, of as many times the elements as wanted."""
     part = growth**0.5 - 1  # what neighbours add is about as much again
-    grown = len(_finer(level, 1 + part).cells) / len(level.solid.cells) - 1
-    part *= (growth - 1) / max(grown, growth - 1)
+    solid = _finer(level, 1 + part)
+    added = len(solid.cells) / len(level.solid.cells) - 1
+    if not 0.8 < added / (growth - 1) < 1.25:
+        part *= (growth - 1) / added
+        solid = _finer(level, 1 + part)
     for share in (1.0, 0.4, 0.1):
-        solid = _finer(level, 1 + share * part)
+        solid = solid if share == 1 else _finer(level, 1 + share * part)
         unknowns = int(4.4 * len(solid.cells))  # measured: 1.45 nodes an element
         memory, seconds = expected_cost(unknowns)
         spent = time.monotonic() - start

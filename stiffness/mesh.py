@@ -1,10 +1,11 @@
 """Surfaces to tetrahedra, with exact interfaces and curved faces kept curved.
 
-Pytetwild makes the tetrahedra, in a process of its own that a time limit can end.  Its
-boundary follows the surface to within an envelope only, so every boundary triangle is
-then told which patch of the surface it stands for, and the nodes are moved onto the
-patches' exact shapes.  Meshes are kept in a cache by the content they were made from:
-pytetwild is slow, and never makes the same mesh twice.
+Pytetwild makes the tetrahedra, in a process of its own that a time limit can end, from
+a surface with fewer triangles (:mod:`stiffness.coarser`).  The mesh's boundary follows
+the surface to within an envelope only, so every boundary triangle is then told which
+patch of the surface it stands for, and the nodes are moved onto the patches' exact
+shapes.  Meshes are kept in a cache by the content they were made from: pytetwild is
+slow, and never makes the same mesh twice.
 """
 
 import hashlib
@@ -21,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.coarser import coarser_surface, euler_characteristic
 from stiffness.interface import Interface, parse_interface
 from stiffness.patches import Patches, find_patches
 from stiffness.reading import BadInput
@@ -30,7 +32,8 @@ from stiffness.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
-_FORMAT = 1  # of the cached meshes; raised when what they hold changes
+_WORKER = Path(__file__).with_name("mesh_worker.py")
+_FORMAT = 2  # of the cached meshes; raised when what they hold changes
 
 
 class MeshFailed(BadInput):
@@ -78,7 +81,8 @@ def mesh_solid(
         base: the held interface.
         tip: the loaded interface.
         edge: [m] wanted length of edges; a 20th of the diagonal if absent.
-        envelope: [1] how far the mesher may leave the surface, share of the diagonal.
+        envelope: [1] share of the diagonal by which the mesher may leave a surface
+            that has fewer triangles than this one and leaves it by as much.
         time_limit: [s] for the mesher.
         cache: folder; the user's cache if absent.
 
@@ -142,13 +146,10 @@ def _tetrahedralize(
     """Run the mesher in a process of its own."""
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
-        np.savez(
-            given,
-            points=surface.points,
-            triangles=surface.triangles,
-            settings=[edge, envelope],
-        )
-        command = [sys.executable, "-m", "stiffness.mesh", str(given), str(made)]
+        points, triangles = coarser_surface(surface, envelope * surface.diagonal)
+        np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
+        # -P: our modules' names are not to be taken for others'
+        command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         try:
             # the mesher leaves a file in the folder it runs in
             run = subprocess.run(
@@ -168,24 +169,6 @@ def _tetrahedralize(
         last = run.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise MeshFailed(f"{surface.name}: the mesher gave nothing {' '.join(last)}")
     return mesh
-
-
-def _run_mesher(given: Path, made: Path) -> None:
-    """The child's work: pytetwild on a stored surface."""
-    import pytetwild
-
-    with np.load(given) as stored:
-        points, triangles = stored["points"], stored["triangles"]
-        edge, envelope = stored["settings"]
-    points, cells = pytetwild.tetrahedralize(
-        np.ascontiguousarray(points, dtype=float),
-        np.ascontiguousarray(triangles, dtype=np.int32),
-        edge_length_abs=float(edge),
-        epsilon=float(envelope),
-        stop_energy=8.0,
-        quiet=True,
-    )
-    np.savez(made, points=np.asarray(points, dtype=float), cells=np.asarray(cells))
 
 
 def fit_to_patches(
@@ -257,20 +240,6 @@ def boundary_faces(cells: NDArray) -> NDArray:
     alone = np.ones(len(faces), dtype=bool)
     alone[order[1:][same]] = alone[order[:-1][same]] = False
     return faces[alone]
-
-
-def euler_characteristic(triangles: NDArray) -> int:
-    """Corners less edges plus triangles: 2 a closed shell, less 2 each way through it.
-
-    Args:
-        triangles: (m, 3) corners.
-
-    Returns:
-        The characteristic, the sum over all shells.
-    """
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    corners = len(np.unique(triangles))
-    return corners - len(np.unique(edges, axis=0)) + len(triangles)
 
 
 def _nearest_patch(
@@ -372,7 +341,3 @@ def moved_onto_shapes(solid: Solid) -> Solid:
             break
         share[np.unique(solid.cells[bad])] *= 0.5
     return moved
-
-
-if __name__ == "__main__":
-    _run_mesher(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -396,9 +396,10 @@ def test_the_papers_bar_from_its_surface(cache):
     assert link.relative_error_estimate < 5 * true
     assert link.stiffness[2, 2] == pytest.approx(205304.8977, rel=1e-3)
     np.testing.assert_allclose(link.tip, [0, 0, 0.452], atol=1e-12)
-    # mass of the true cylinder, not of the polygon (0.3 % less), and a kilogram
+    # mass of the true cylinder, not of the polygon (0.3 % less), and a kilogram: n
+    # parabolas for a circle lack pi^4 / (30 n^4) of its area, 2.5e-5 where n = 19
     body = 2700 * np.pi * 0.04**2 * 0.452
-    assert link.mass == pytest.approx(body + 1, rel=1e-5)
+    assert link.mass - 1 == pytest.approx(body, rel=2.5e-5)
     center = (body * 0.226 + 0.452) / (body + 1)
     np.testing.assert_allclose(link.center_of_mass, [0, 0, center], atol=1e-6)
     spin = body * 0.04**2 / 2

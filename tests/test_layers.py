@@ -12,7 +12,7 @@ BELOW = {"stiffness": (), "assembly": ("stiffness",)}
 BELOW["validation"] = ("stiffness", "assembly")
 SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
-    "pytetwild": ("stiffness/mesh.py", "stiffness/mesh_worker.py"),
+    "pytetwild": ("stiffness/mesh_worker.py",),
     "skfem": ("stiffness/elements.py",),
     "meshio": ("stiffness/surface_files.py",),
     "gmsh": ("stiffness/surface_files.py",),
