@@ -40,7 +40,9 @@ def diagnose(
     for path in (report, save, Path(json) if json not in {None, "-"} else None):
         if path is not None:
             check_writable(path)
-    found = trace(read_campaign(campaign), finite=exact)
+    data = read_campaign(campaign)
+    with progress_bars() as update:
+        found = trace(data, finite=exact, update=update)
     tally = None
     if calibrate:
         from validation.diagnosis.verdict import calibrate as simulate

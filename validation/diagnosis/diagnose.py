@@ -27,7 +27,7 @@ from validation.diagnosis.next_measurement import NextMeasurement, next_measurem
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
 from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, named
-from validation.diagnosis.selection import Selection, select
+from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
@@ -100,13 +100,19 @@ class Diagnosis:
     next: NextMeasurement | None
 
 
-def diagnose(campaign: Campaign, *, finite: bool = False) -> Diagnosis:
+def diagnose(
+    campaign: Campaign,
+    *,
+    finite: bool = False,
+    update: Update = lambda what, done, total: None,
+) -> Diagnosis:
     """Trace a campaign's residual to the effect that the declared model lacks.
 
     Args:
         campaign: measured deviations.
         finite: whether motions of the declared model are finite; they are too if the
             robot's file has the effect ``geometric_stiffening``.
+        update: told what is done, how much of it and of how much.
 
     Returns:
         The diagnosis.
@@ -123,7 +129,7 @@ def diagnose(campaign: Campaign, *, finite: bool = False) -> Diagnosis:
     outliers = np.zeros(len(campaign), dtype=bool)
     while True:
         used = parts.fitted & ~outliers
-        found = select(campaign.take(used), here.take(used), finite=finite)
+        found = select(campaign.take(used), here.take(used), update, finite=finite)
         far = np.zeros_like(outliers)
         far[used] = outlying(campaign.take(used), found.fit.residual)
         if not far.any():

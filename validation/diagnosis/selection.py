@@ -5,7 +5,7 @@ fitted in the full model, signatures retaken there, and scored again until the b
 stays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,8 @@ from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.scoring import FINITE, Scored, Screen
 from validation.diagnosis.signatures import Signature, Tangents, loaded_components
+
+Update = Callable[[str, int, int], None]
 
 _ROUNDS = 4  # of refitting and scoring again
 _VISIBLE = 4.0  # squared whitened change of the readings
@@ -52,7 +54,9 @@ class Selection:
     tangents: Tangents
 
 
-def select(campaign: Campaign, here: Conditions, *, finite: bool = False) -> Selection:
+def select(
+    campaign: Campaign, here: Conditions, update: Update, *, finite: bool = False
+) -> Selection:
     """Score all small sets, refit the best, and again about it until it stays.
 
     Declared play in closed chains is held where it rests: as declared, then as found.
@@ -60,12 +64,13 @@ def select(campaign: Campaign, here: Conditions, *, finite: bool = False) -> Sel
     Args:
         campaign: rows to be fitted.
         here: their conditions as declared, with the registration if that was fitted.
+        update: told what is done, how much of it and of how much.
         finite: whether the best set is fitted once more with finite motions.
 
     Returns:
         The selection.
     """
-    found = _select_settled(campaign, here)
+    found = _select_settled(campaign, here, update)
     if not finite:
         return found
     members = (*found.fit.hypotheses, Hypothesis(FINITE, (), ()))
@@ -73,28 +78,32 @@ def select(campaign: Campaign, here: Conditions, *, finite: bool = False) -> Sel
     return replace(found, fit=exact)
 
 
-def _select_settled(campaign: Campaign, here: Conditions) -> Selection:
+def _select_settled(campaign: Campaign, here: Conditions, update: Update) -> Selection:
     """The selection with motions to first order beside what ``here`` carries."""
     # where play rests in closed chains is found row by row, too slowly for every trial
     play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
     if not play:
-        return _select(campaign, here)
-    found = _select(campaign, settle(here))
+        return _select(campaign, here, update)
+    found = _select(campaign, settle(here), update)
     there = settle(apply_effects(here, found.fit.effects))
     assert there.rest is not None
     rest = there.rest[:, -len(here.robot.frames) :]
-    return _select(campaign, replace(here, rest=rest))
+    return _select(campaign, replace(here, rest=rest), update)
 
 
-def _select(campaign: Campaign, here: Conditions) -> Selection:
+def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
     """Score all small sets; refit the best; score again about it until it stays."""
     tangents = Tangents(campaign, here)
     nuisance = [device_frame(here)] if campaign.registration == "unknown" else []
     candidates = hypotheses(here, loaded_components(campaign))
     if nuisance:
         candidates = [h for h in candidates if not _moves_base(h)]
-    signatures = [tangents.at_start(h) for h in candidates]
-    signatures = [s for s in signatures if _finite(s) and _shows(s)]
+    signatures = []
+    for k, h in enumerate(candidates):
+        signature = tangents.at_start(h)
+        if _finite(signature) and _shows(signature):
+            signatures.append(signature)
+        update("signatures", k + 1, len(candidates))
     project = _Projector([tangents.at_start(h) for h in nuisance])
     finite = next((s.offset for s in signatures if s.hypothesis.effect == FINITE), 0.0)
     best: tuple[Hypothesis, ...] = ()
@@ -110,6 +119,7 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
         fits: dict[tuple[int, ...], Fit] = {}
         waiting = _worth_refitting(screen, sets)
         while waiting:
+            update(f"fits, round {turn + 1}", len(fits), len(fits) + len(waiting))
             one = waiting.pop(0)
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
@@ -130,6 +140,7 @@ def _select(campaign: Campaign, here: Conditions) -> Selection:
                 ]
                 there = {s.members for s in sets}
                 sets += [p for p in waiting if p.members not in there]
+        update(f"fits, round {turn + 1}", len(fits), len(fits))
         sets = refitted
         chosen = fits[sets[0].members]
         if turn and _names(chosen.hypotheses) == _names(best):
