@@ -10,6 +10,7 @@ import pytest
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
+from assembly.statistics.distributions import tolerance_sources
 from validation.multibody.contact import (
     Cone,
     Play,
@@ -270,3 +271,34 @@ def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
     )
     answer = playcheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0])
     assert not answer.passed
+
+
+def drawn(name, size, pose=None):
+    """A built-in robot with random errors of a millirad and a tenth of a millimetre."""
+    robot = load_robot(name)
+    sources = tolerance_sources(robot, size * np.array([1e-3] * 3 + [1e-4] * 3))
+    errors = sources.errors(sources.draw(0, 1, seed=7))[0]
+    posture = home_posture(robot) if pose is None else place_robot(robot, pose)
+    return replace(posture, robot=robot.with_errors(errors))
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "pose"),
+    [("hexapod", 1.0, None), ("delta", 1.0, None),
+     ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5})],
+)  # fmt: skip
+def test_play_that_takes_up_everything_costs_nothing(name, size, pose):
+    """No load, and errors within the play: any place in the valley, and no energy."""
+    answer = playcheck(drawn(name, size, pose), (1.0, 0.5))
+    assert answer.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
+    assert answer.pairs[0].simulated.energy < 1e-8
+    assert answer.passed
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta"])
+def test_under_a_load_the_gap_is_measured_by_what_is_stored(name):
+    """Without errors, closing costs nothing: the reference is the load's energy."""
+    load = np.array([0, 0, 0, 0, 0, -50.0])
+    answer = playcheck(home_posture(load_robot(name)), (1.0, 0.5), load=load)
+    assert answer.passed
+    assert 0 <= answer.gaps[0] < 0.02

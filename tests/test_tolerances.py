@@ -324,7 +324,7 @@ def test_a_tolerance_file_is_read(write_file):
     assert (plan.asked_yield, plan.cost) == (0.95, "logarithm")
 
 
-@pytest.mark.parametrize("name", ["always", "mostly", "forced"])
+@pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
 def test_the_plans_of_the_example_are_read(name):
     folder = Path(__file__).parents[1] / "examples" / "tolerance_allocation"
     plan = read_plan(folder / f"{name}.toml", load_robot("irsbot2"))

@@ -72,7 +72,8 @@ class PlayCheck:
     def gaps(self) -> NDArray:
         """(k,) optimality gap of the simulated play, relative to the reference energy.
 
-        The reference is the energy that closing would cost without any play.
+        The reference is the energy that closing would cost without any play, or what
+        is stored under the load if that is more.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
@@ -200,7 +201,8 @@ def optimality_gap(pair: Pair) -> float:
 
     Returns:
         [-] energy minus the load's work at the simulated play, brought back into its
-        cones, minus the least one; relative to the energy stored without any play.
+        cones, minus the least one; relative to the energy stored without any play, or
+        with it under the load if that is more, or to :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
     small = reduce_problem(linearise(best.posture), best.joints, best.forces)
@@ -210,7 +212,9 @@ def optimality_gap(pair: Pair) -> float:
     u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h
     cost = (strain @ strain - least @ least) / 2 - small.d @ (u - best.clearances)
-    return float(cost / max(small.energy_without_play, 1e-300))
+    least_reference = FLOOR_ENERGY * pair.scale**2
+    reference = max(small.energy_without_play, best.energy, least_reference)
+    return float(cost / reference)
 
 
 def playcheck(

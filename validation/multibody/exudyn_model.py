@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from validation.multibody.contact import WIDE, Play, cone_pushes
+from validation.multibody.contact import NARROW, WIDE, Play, cone_pushes
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
@@ -32,10 +32,14 @@ class Stiffness:
     Attributes:
         closing: [N m/rad, N/m] of the connectors that shut closures.
         idle: [N m/rad, N/m] that is left on motions that nothing resists.
+        narrow: [-] last width of the smoothing of contacts, which centres play.
+        tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
     """
 
     closing: float
     idle: float
+    narrow: float = NARROW
+    tolerance: float = 1e-10
 
 
 class Model:

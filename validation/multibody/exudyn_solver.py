@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.multibody.contact import NARROW, WIDE
+from validation.multibody.contact import WIDE
 from validation.multibody.exudyn_model import HELD, Model
 from validation.multibody.exudyn_parts import Closure, OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import left_open, pose
@@ -27,7 +27,6 @@ _LOAD_STEPS = 4
 _RELEASING_STEPS = 4  # of motions that nothing resists
 _NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
 _CLOSING_STEPS = 30
-_NEWTON_TOLERANCE = 1e-10  # [m, -] of the last increment; convergence is quadratic
 _STAGES = (
     "closures are pulled shut and loads grow",
     "contacts harden and free motions are released",
@@ -82,7 +81,8 @@ def _pull(
         try:
             model.check_time()
             _look(model)
-            model.width = WIDE * (NARROW / WIDE) ** min(max(t - 1.0, 0.0), 1.0)
+            narrow = model.stiffness.narrow / WIDE
+            model.width = WIDE * narrow ** min(max(t - 1.0, 0.0), 1.0)
             left = model.stiffness.idle / HELD
             model.hold_idle(HELD * left ** min(max(t - 1.0, 0.0), 1.0))
             way = min(max(t - 2.0, 0.0), 1.0)
@@ -152,7 +152,7 @@ def _settings(model: Model, start: float, steps: int) -> Any:
     static.minimumStepSize = 1e-3
     newton = static.newton
     newton.residualMode = 1  # of increments: residuals hide behind weak springs
-    newton.absoluteTolerance = newton.relativeTolerance = _NEWTON_TOLERANCE
+    newton.absoluteTolerance = newton.relativeTolerance = model.stiffness.tolerance
     newton.maxIterations = 25
     newton.numericalDifferentiation.relativeEpsilon = 1e-8  # of user functions
     return settings
