@@ -45,7 +45,7 @@ def sweep(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help="A number of the robot file, PATH=VALUE,.. or PATH=A:B:STEP."
+            help="A number of the robot file, PATH=VALUE,.. or PATH=FIRST:LAST:STEP."
         ),
     ] = None,
     errors: Annotated[
