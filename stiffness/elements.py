@@ -21,7 +21,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csr_array, triu
+from scipy.sparse import bsr_array, csr_array
 
 from stiffness.mesh import Solid, node_patches, on_shapes
 
@@ -240,7 +240,14 @@ def assemble(mesh: Quadratic, lam: NDArray, mu: NDArray) -> csr_array:
             values[k, low:high] += np.bincount(place - low, entries, high - low)
     start = np.searchsorted(code // count, np.arange(count + 1))
     blocks = (values.T.reshape(-1, 3, 3), code % count, start)
-    return triu(bsr_array(blocks, shape=(3 * count, 3 * count)).tocsr(), format="csr")
+    whole = bsr_array(blocks, shape=(3 * count, 3 * count)).tocsr()
+    # a node's own block comes first: its second row loses one entry, its third two
+    first = whole.indptr[:-1].reshape(-1, 3)
+    upper = np.ones(whole.nnz, dtype=bool)
+    upper[[first[:, 1], first[:, 2], first[:, 2] + 1]] = False
+    lost = np.r_[0, np.cumsum(np.tile([0, 1, 2], count))]
+    kept = (whole.data[upper], whole.indices[upper], whole.indptr - lost)
+    return csr_array(kept, shape=whole.shape)
 
 
 def _node_blocks(G: NDArray, w: NDArray, lam: NDArray, mu: NDArray) -> NDArray:

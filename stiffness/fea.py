@@ -368,17 +368,17 @@ def _wanted_growth(
         then, now = (np.max(np.diag(e) / np.diag(K)) for K, e in history[-2:])
         fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
         rate = min(max(fell, 0.9), 1.6)  # what was gained on coarse meshes ends
-    return float(np.clip((1.1 * excess) ** (1 / rate), 1.2, 3.0))
+    return float(np.clip((1.08 * excess) ** (1 / rate), 1.2, 3.0))
 
 
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float
 ) -> Solid | None:
     """A finer mesh that the budget allows, of as many times the elements as wanted."""
-    part = growth**0.5 - 1  # what neighbours add is about as much again
+    part = growth**0.55 - 1  # what neighbours add is about as much again
     solid = _finer(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
-    if not 0.8 < added / (growth - 1) < 1.25:
+    if not 0.85 < added / (growth - 1) < 1.08:
         part *= (growth - 1) / added
         solid = _finer(level, 1 + part)
     for share in (1.0, 0.4, 0.1):
