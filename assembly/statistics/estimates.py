@@ -176,12 +176,15 @@ def summarise(
         values = _worst(data, key)
         over = ~(values <= limit)
         met &= ~over
-        exceeds[key] = {"limit": limit, **proportion(int(over.sum()), count, level)}
+        exceeds[key] = {
+            "limit": limit, "unit": _unit(data, key),
+            **proportion(int(over.sum()), count, level),
+        }  # fmt: skip
     report["exceeds"] = exceeds
     if limits:
         report["within_limits"] = proportion(int(met.sum()), count, level)
     report["quantities"] = {
-        key: _described(_worst(data, key)[solved], level)
+        key: _described(_worst(data, key)[solved], _unit(data, key), level)
         for key in map(str, data)
         if data[key].dims[0] == "draw" and data[key].size
         and key not in {"status", "duality_gap", "platform_screw"}
@@ -206,7 +209,12 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
     return values.max(axis=1) if values.ndim == 2 else values
 
 
-def _described(values: NDArray, level: float) -> dict[str, Any]:
+def _unit(data: "xarray.Dataset", key: str) -> str:
+    """Unit of a quantity."""
+    return str(data[key].attrs.get("units", "1"))
+
+
+def _described(values: NDArray, unit: str, level: float) -> dict[str, Any]:
     """Mean, quantiles and most probable value of sizes, 0 if that is half of them."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2:
@@ -217,6 +225,7 @@ def _described(values: NDArray, level: float) -> dict[str, Any]:
     if zero.sum() <= len(finite) / 2:
         often = most_probable(finite[~zero], level, positive=True)
     return {
+        "unit": unit,
         "zero": proportion(int(zero.sum()), len(finite), level),
         "mean": mean(finite, level),
         "quantiles": {str(q): quantile(values, q, level) for q in QUANTILES},
@@ -231,6 +240,10 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         low, high = found["lower"], found["upper"]
         return f"{found['probability']:.5g} ({low:.5g} to {high:.5g})"
 
+    def named(value: float, found: Mapping[str, Any]) -> str:
+        unit = found["unit"]
+        return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
     lines = [
         f"{summary['draws']} draws; in brackets {summary['confidence']:.0%} intervals"
     ]
@@ -242,7 +255,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     for key, found in summary["assembles"].items():
         lines.append(f"{words[key]}: {share(found)}")
     for key, found in summary["exceeds"].items():
-        lines.append(f"{key} above {found['limit']:g}: {share(found)}")
+        lines.append(f"{key} above {named(found['limit'], found)}: {share(found)}")
     if "within_limits" in summary:
         lines.append(f"yield, all limits met: {share(summary['within_limits'])}")
     for key, found in summary["quantities"].items():
@@ -251,8 +264,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         often, half = found["most_probable"], found["quantiles"]["0.5"]
         high = found["quantiles"]["0.95"]
         lines.append(
-            f"{key}: most probable {often['value']:.4g}, median {half['value']:.4g} "
-            f"({half['lower']:.4g} to {half['upper']:.4g}), 95 % below "
-            f"{high['value']:.4g} ({high['lower']:.4g} to {high['upper']:.4g})"
+            f"{key}: most probable {named(often['value'], found)}, median "
+            f"{half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), 95 % "
+            f"below {high['value']:.4g} ({high['lower']:.4g} to {high['upper']:.4g})"
         )
     return "\n".join(lines)

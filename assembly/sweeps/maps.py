@@ -52,9 +52,8 @@ def figure_of(
     dims = [str(d) for d in view["energy"].dims]
     if len(dims) > 2:
         long = ", ".join(f"{d} ({view.sizes[d]})" for d in dims)
-        raise BadInput(
-            f"figure: found axes {long}; choose with --at, such as {dims[0]}="
-        )
+        such = f"{dims[0]}={view[dims[0]].values.ravel()[0]}"
+        raise BadInput(f"figure: found axes {long}; choose with --at, such as {such}")
     if not dims:
         raise BadInput("figure: found a single point; expected an axis or two")
     figure = map_figure(view) if len(dims) == 2 else path_figure(view)
