@@ -35,6 +35,18 @@ Unit = Annotated[
 Accuracy = Annotated[float, typer.Option(help="Asked largest relative error of K.")]
 Kind = Annotated[str, typer.Option(help="rigid, distributing, distributing-both.")]
 Density = Annotated[float, typer.Option(help="[kg/m^3] for mass and inertia.")]
+Parts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--part",
+        help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800"; '
+        "a box along the mesh's axes [m]. May be repeated; the last counts.",
+    ),
+]
+Masses = Annotated[
+    list[str] | None,
+    typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
+]
 Seconds = Annotated[float, typer.Option(help="Budget of time [s].")]
 Json = Annotated[
     str | None, typer.Option("--json", help="Write results as JSON; - is stdout.")

@@ -17,6 +17,8 @@ from stiffness.arguments import (
     InnerRadius,
     Json,
     Kind,
+    Masses,
+    Parts,
     Poisson,
     Radius,
     Seconds,
@@ -159,24 +161,30 @@ def fea(
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
     density: Density = 0.0,
+    part: Parts = None,
+    mass: Masses = None,
     seconds: Seconds = 300.0,
     json: Json = None,
 ) -> None:
     """K_E of a link by finite elements, refined to the asked accuracy."""
-    from stiffness.fea import Budget, mesh_link
+    from stiffness.fea import Budget, Material, solve_link
+    from stiffness.parts import parse_mass, parse_part
+    from stiffness.surface import read_surface
 
     E, nu = BeamOptions(young, poisson).material()
     held, moved = _interfaces(base, tip)
     density = checked("--density", density, "kg/m^3", least=0)
     budget = Budget(seconds=checked("--seconds", seconds, "s", above=0))
     accuracy = _accuracy(accuracy)
+    materials = [Material(E, nu, density)]
+    materials += [parse_part("--part", text) for text in part or ()]
+    masses = [parse_mass("--mass", text) for text in mass or ()]
     _check_outputs(json)
     _tell_progress()
-    link = mesh_link(
-        surface, held, moved, E, nu,
-        unit=unit, accuracy=accuracy, interface=interface, density=density,
-        budget=budget,
-    )  # fmt: skip
+    link = solve_link(
+        read_surface(surface, unit), held, moved, materials,
+        accuracy=accuracy, interface=interface, point_masses=masses, budget=budget,
+    ).link  # fmt: skip
     write_json(link_results(link), json)
     if json != "-":
         print(link_text(link))

@@ -113,6 +113,14 @@ def test_beam_refuses_with_the_options_name(options, message):
         (["--seconds", "0"], "--seconds: found 0"),
         (["--unit", "mile"], "unit: found 'mile'"),
         (["--interface", "rigd"], "interface: found 'rigd'"),
+        (["--part", "z=0..1"], "--part: found 'z=0..1', expected"),
+        (["--part", "z=1..0/young=1e9,poisson=0.3"], "--part: found 'z=1..0/"),
+        (["--part", "q=0..1/young=1e9,poisson=0.3"], "--part: found 'q=0..1/"),
+        (["--part", "z=0..1/young=1e9,poison=0.3"], "--part: found 'z=0..1/"),
+        (["--part", "z=0..1/young=1e9,poisson=0.7"], "--part: material: nu = 0.7"),
+        (["--mass", "1.5"], "--mass: found '1.5', expected"),
+        (["--mass", "-1/0,0,0"], "--mass: found -1"),
+        (["--mass", "1/0,0,nan"], "--mass: found '1/0,0,nan'"),
         (["--json", "/absent/folder/x.json"], "no folder"),
     ],
 )
@@ -141,6 +149,30 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
     assert results["mesh"]["volume"] == pytest.approx(np.pi * 0.04**2 * 0.452, rel=1e-4)
     assert results["mass"] == pytest.approx(2700 * np.pi * 0.04**2 * 0.452, rel=1e-4)
     assert "the asked 0.005 was reached" in text
+
+
+def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
+    """Without Poisson's effect plane sections stay plane and compliances add up:
+    of pure bending h/EI, of torsion h/GJ with G = E/2, of tension h/EA.
+
+    Accuracy 1 %; the faces between the materials are those of elements, not the plane,
+    which costs half a per cent of the mass at most."""
+    text = run(
+        "fea", *PLAIN, "--young", "6e10", "--poisson", "0", "--density", "2700",
+        "--part", "z=0.226..1/young=1.8e11,poisson=0,density=7800",
+        "--mass", "1.5/0.3,0,0.452", "--accuracy", "0.01", "--json", "-",
+    )  # fmt: skip
+    found = json.loads(text)
+    C, half, area = np.array(found["compliance"]), 0.226, np.pi * 0.04**2
+    inertia, soft = np.pi * 0.04**4 / 4, 1 / 6e10 + 1 / 1.8e11
+    # torsion: 2 (1 + nu) / E over 2 I, bending: 1 / E over I
+    expected = half * soft * np.array([1 / inertia, 1 / inertia, 1 / inertia, 1 / area])
+    np.testing.assert_allclose(np.diag(C)[[0, 1, 2, 5]], expected, rtol=0.01)
+    body = area * half * np.array([2700, 7800])
+    assert found["mass"] == pytest.approx(body.sum() + 1.5, rel=5e-3)
+    center = [0.3 * 1.5, 0, 0.113 * body[0] + 0.339 * body[1] + 0.452 * 1.5]
+    center = np.array(center) / (body.sum() + 1.5)
+    np.testing.assert_allclose(found["center_of_mass"], center, atol=2e-3)
 
 
 def test_compare_writes_both_and_draws(tmp_path):
