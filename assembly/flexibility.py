@@ -38,6 +38,7 @@ from assembly.posture import Posture
 _ROUNDING, _RANK = 1e-13, 1e-10
 _PADDED = 4  # times the rows: where postures differ more in theirs, each by itself
 _CLOSED = 1e-9  # relative residual of a system that was solved
+_SHUT = 1e-12  # [rad, reference lengths] that is rounding, whatever it is relative to
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +92,13 @@ class Flexibility:
         J, size, times = self.rows, self.softness, at_postures(posture)
         b = -np.concatenate([times(J, loose), forces.joint @ self.free * size], axis=1)
         x = times(self.inverse, b)
+        x -= times(self.inverse, times(self.system, x) - b)  # what rounding left
         count = J.shape[1]
         multipliers, motions = x[:, :count] / size, x[:, count:]
         left = times(self.system, x) - b
-        scale = np.abs(b).max(axis=1, initial=1e-300)
-        closed = np.abs(left).max(axis=1, initial=0.0) <= _CLOSED * scale
+        scale = np.abs(b).max(axis=1, initial=0.0)
+        gap = np.abs(left).max(axis=1, initial=0.0)
+        closed = gap <= np.maximum(_CLOSED * scale, _SHUT)
         within = np.all(np.abs(motions) <= self.limit, axis=1)
         closing = times(np.swapaxes(J, 1, 2), multipliers)
         screws = loose + _each(self.compliance, closing) + motions @ self.free.T
