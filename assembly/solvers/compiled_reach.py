@@ -20,7 +20,8 @@ from assembly.solvers.compiled_reduction import (
 )
 from assembly.solvers.compiled_zone import largest_clearance, orthonormal_rows
 from assembly.solvers.farthest import DONE, advance, begin
-from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.householder import triangulate, turn_all
+from assembly.solvers.interior import LANES
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import Body
 
@@ -178,7 +179,8 @@ def body_of(
     F = free_columns(s, P, m)
     turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
     rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    centre = _at_point(centre, offset)
+    centre = centre.copy()
+    _shift(centre, offset)
     nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
     if rank < 0:
         return False, Body(centre, *nothing)
@@ -206,7 +208,7 @@ def body_of(
         starts[cones] = at
     _into_cones(start, starts, cones)
     for j in range(kept):
-        X[:, j] = _at_point(X[:, j].copy(), offset)
+        _shift(X[:, j], offset)
     decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
     return decided, Body(centre, X, B, start, starts[: cones + 1].copy())
 
@@ -222,20 +224,20 @@ def _follow(
         False where free motions move the platform and no closure; what it does.
     """
     nq = len(s.free_frame)
-    follow, largest = np.zeros((6, m)), 0.0
+    follow, largest = np.zeros((m, LANES)), 0.0
     for a in range(6):
         drive = np.zeros(nq)
         for i in range(nq):
             j = s.free_frame[order[i]]
             drive[i] = s.on_path[j] * P[j, s.free_axis[order[i]], a]
             for l in range(min(i, rank)):
-                drive[i] -= F[i, l] * follow[a, l]
+                drive[i] -= F[i, l] * follow[l, a]
             if i < rank:
-                follow[a, i] = drive[i] / diagonal[i]
+                follow[i, a] = drive[i] / diagonal[i]
             else:
                 largest = max(largest, abs(drive[i]))
-        turn(F, turns, rank, follow[a])
-    return largest <= _UNBOUNDED / _CLEAR, follow
+    turn_all(F, turns, rank, follow)
+    return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,13 +257,11 @@ def _move_platform(
 
 
 @njit(cache=True, error_model="numpy")
-def _at_point(screw: NDArray, offset: NDArray) -> NDArray:
-    """The same screw read at another point of the platform."""
-    moved = screw.copy()
+def _shift(screw: NDArray, offset: NDArray) -> None:
+    """Read a screw at another point of the platform."""
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        moved[3 + a] += screw[b] * offset[c] - screw[c] * offset[b]
-    return moved
+        screw[3 + a] += screw[b] * offset[c] - screw[c] * offset[b]
 
 
 @njit(cache=True, error_model="numpy")

@@ -24,7 +24,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from assembly.solvers.householder import triangulate, turn, turn_back
+from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
+from assembly.solvers.interior import LANES
 
 _NOISE = 1e-12  # as in assembly.solvers.reduction
 _CLEAR = 10.0  # what is within this factor of a threshold decides nothing
@@ -110,26 +111,12 @@ def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
 @njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
     """Orthonormal rows orthogonal to all triangulated ones."""
-    # all of them turned at once: Z's columns as rows
     count = m - rank
-    Zt, dots = np.zeros((m, count)), np.empty(count)
+    Zt = np.zeros((m, count + -count % LANES))
     for i in range(count):
         Zt[rank + i, i] = 1.0
-    for step in range(rank - 1, -1, -1):
-        own = F[step]
-        for i in range(count):
-            dots[i] = 0.0
-        for a in range(step, m):
-            row, weight = Zt[a], own[a]
-            for i in range(count):
-                dots[i] += weight * row[i]
-        for i in range(count):
-            dots[i] *= turns[step]
-        for a in range(step, m):
-            row, weight = Zt[a], own[a]
-            for i in range(count):
-                row[i] -= weight * dots[i]
-    return np.ascontiguousarray(Zt.T)
+    turn_all(F, turns, rank, Zt)
+    return np.ascontiguousarray(Zt[:, :count].T)
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from assembly.solvers.interior import LANES
+
 _CLEAR = 10.0  # a pivot within this factor of the threshold decides nothing
 
 
@@ -37,17 +39,21 @@ def triangulate(
         The rank; -1 where it hangs on rounding.
     """
     p, m = F.shape
+    # what is left of the rows, zero where the triangle is and beyond m: see LANES
+    rest, sizes = np.zeros((p, m + -m % LANES)), np.empty(p)
     for i in range(p):
         order[i] = i
+        size = 0.0
+        for a in range(m):
+            rest[i, a] = F[i, a]
+            size += F[i, a] * F[i, a]
+        sizes[i] = size
     first = 0.0
     for step in range(p):
         best, at = -1.0, step
         for i in range(step, p):
-            size = 0.0
-            for a in range(step, m):
-                size += F[i, a] * F[i, a]
-            if size > best:
-                best, at = size, i
+            if sizes[i] > best:
+                best, at = sizes[i], i
         best = np.sqrt(best)
         if step == 0:
             first = best
@@ -55,23 +61,53 @@ def triangulate(
         if not best > limit * _CLEAR:
             doubtful = best > limit / _CLEAR or (clean >= 0.0 and best > clean * first)
             return -1 if doubtful or best != best else step
+        own = rest[step]
         if at != step:
             order[step], order[at] = order[at], order[step]
-            for a in range(m):
+            sizes[at] = sizes[step]
+            for a in range(len(own)):
+                own[a], rest[at, a] = rest[at, a], own[a]
+            for a in range(step):
                 F[step, a], F[at, a] = F[at, a], F[step, a]
-        own = F[step]
         diagonal[step] = -best if own[step] > 0.0 else best
         own[step] -= diagonal[step]
         turns[step] = -1.0 / (diagonal[step] * own[step])
         for i in range(step + 1, p):
-            dot = 0.0
-            for a in range(step, m):
-                dot += own[a] * F[i, a]
-            dot *= turns[step]
-            if dot != 0.0:
-                for a in range(step, m):
-                    F[i, a] -= dot * own[a]
+            # written out: as calls these loops take half as long again
+            row, along, size = rest[i], 0.0, 0.0
+            for a in range(len(own)):
+                along += own[a] * row[a]
+            along *= turns[step]
+            for a in range(len(own)):
+                row[a] -= along * own[a]
+            F[i, step], row[step] = row[step], 0.0
+            for a in range(len(own)):
+                size += row[a] * row[a]
+            sizes[i] = size
+        for a in range(step, m):
+            F[step, a] = own[a]
     return p
+
+
+@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+def turn_all(F: NDArray, turns: NDArray, rank: int, X: NDArray) -> None:
+    """From the triangle's coordinates back: every column x of X becomes Q x."""
+    m, count = X.shape
+    dots = np.empty(count)
+    for step in range(rank - 1, -1, -1):
+        own = F[step]
+        for i in range(count):
+            dots[i] = 0.0
+        for a in range(step, m):
+            row, weight = X[a], own[a]
+            for i in range(count):
+                dots[i] += weight * row[i]
+        for i in range(count):
+            dots[i] *= turns[step]
+        for a in range(step, m):
+            row, weight = X[a], own[a]
+            for i in range(count):
+                row[i] -= weight * dots[i]
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
@@ -79,12 +115,12 @@ def turn(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
     """From the triangle's coordinates back: x becomes Q x."""
     for step in range(rank - 1, -1, -1):
         own = F[step]
-        dot = 0.0
+        along = 0.0
         for a in range(step, len(x)):
-            dot += own[a] * x[a]
-        dot *= turns[step]
+            along += own[a] * x[a]
+        along *= turns[step]
         for a in range(step, len(x)):
-            x[a] -= dot * own[a]
+            x[a] -= along * own[a]
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
@@ -92,9 +128,9 @@ def turn_back(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
     """Into the triangle's coordinates: x becomes Q^T x."""
     for step in range(rank):
         own = F[step]
-        dot = 0.0
+        along = 0.0
         for a in range(step, len(x)):
-            dot += own[a] * x[a]
-        dot *= turns[step]
+            along += own[a] * x[a]
+        along *= turns[step]
         for a in range(step, len(x)):
-            x[a] -= dot * own[a]
+            x[a] -= along * own[a]

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the way to the nearest cone's boundary
+# 3 is usual; on these problems 2 takes a seventh, 1.5 a sixth less iterations
+_CENTRING = 1.5
 _FAR = 1e30
 LANES = 16
 FAST = {"contract", "reassoc", "nsz", "arcp"}
@@ -115,7 +117,7 @@ def interior_point(
         _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1, left, r,
                    sums, e, f, right, du, dz0, dz1)  # fmt: skip
         step = min(1.0, _longest(layers, u, du, z0, z1, dz0, dz1, sums))
-        sigma = (1.0 - step) ** 3
+        sigma = (1.0 - step) ** _CENTRING
         # corrector: centre, and what the predictor's product of steps leaves
         _corrected(layers, eta, w0, w1, l0, l1, du, dz0, dz1, sigma * mu, sums,
                    t0, t1, r0)  # fmt: skip
