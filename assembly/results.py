@@ -224,10 +224,13 @@ def _linearisation_text(found: dict[str, Any]) -> str:
     """What the linear closures cost."""
     if found.get("status", "ok") != "ok":
         return f"linearisation error: unknown, {found['status']}"
+    rotation, translation = (
+        _rounded(scale * float(np.linalg.norm(found[part])))
+        for part, scale in (("rotation", 1e3), ("translation", 1e6))
+    )
     return (
-        f"linearisation error: {1e3 * np.linalg.norm(found['rotation']):.3g} mrad, "
-        f"{1e6 * np.linalg.norm(found['translation']):.3g} um, energy "
-        f"{100 * found['relative_energy']:+.3g} %"
+        f"linearisation error: {rotation:.3g} mrad, {translation:.3g} um, energy "
+        f"{_rounded(100 * found['relative_energy']):+.3g} %"
     )
 
 
@@ -361,4 +364,9 @@ def _factor(value: float | None) -> str:
 
 def _numbers(values: Any) -> str:
     """Numbers in brackets."""
-    return "[" + " ".join(f"{v:.4g}" for v in values) + "]"
+    return "[" + " ".join(f"{_rounded(v):.4g}" for v in values) + "]"
+
+
+def _rounded(value: float) -> float:
+    """A number for people: rounding errors, below 1e-9 in any unit here, are zero."""
+    return 0.0 if abs(value) < 1e-9 else float(value)
