@@ -60,11 +60,14 @@ def predict(here: Conditions) -> Prediction:
     """
     play = bool(virtual_joints(here.robot).cones.shape[1])
     open_ = np.zeros(len(here), dtype=bool)
-    if play and not here.exact and here.rest is not None:
+    one_by_one = None
+    if play and here.rest is not None:
         here = at_rest(here)
+        # held play that finite motions cannot close has no answer one by one either
+        one_by_one = 0 if here.exact else None
     elif play and not here.robot.closures and not here.exact:
         here, open_ = taken_up(here)
-    screws, reason = _platform_screws(here)
+    screws, reason = _platform_screws(here, one_by_one)
     if not here.exact:
         screws = screws + here.second_order
     known = np.isfinite(screws).all(axis=1)
@@ -84,10 +87,11 @@ def _platform_screws(
     if not virtual_joints(here.robot).cones.shape[1]:
         screws, solved = _without_play(here)
         left = ~solved
-        screws[left] = np.nan
+        screws[left], reason[left] = np.nan, "does not close together with others"
     for row in np.flatnonzero(left)[:one_by_one].tolist():
         try:
             screws[row] = assemble_row(here, row).platform_screw
+            reason[row] = ""
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
     return screws, reason
