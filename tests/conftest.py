@@ -1,11 +1,14 @@
 """What several test files need."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+import forcefit
 
 # The same cases in every run: a commit is judged by what it changes, not by luck.
 # Others, on purpose: pytest --hypothesis-profile search --hypothesis-seed N
@@ -30,3 +33,17 @@ def write_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Run the command in this process: exit status, standard output, error output."""
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
+        with pytest.raises(SystemExit) as done:
+            forcefit.main()
+        out, err = capsys.readouterr()
+        return done.value.code, out, err
+
+    return call

@@ -8,23 +8,8 @@ import numpy as np
 import pytest
 import xarray
 
-import forcefit
 from assembly.robot_file import write_robot
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
-
-
-@pytest.fixture
-def run(capsys, monkeypatch):
-    """Run the command in this process: exit status, standard output, error output."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
-        with pytest.raises(SystemExit) as done:
-            forcefit.main()
-        out, err = capsys.readouterr()
-        return done.value.code, out, err
-
-    return call
 
 
 @pytest.fixture

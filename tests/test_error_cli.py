@@ -1,6 +1,5 @@
 """``assembly error`` at a point and along a direction; ``exact`` under gravity."""
 
-# ruff: noqa: F811  fixtures are arguments
 import json
 
 import numpy as np
@@ -11,7 +10,6 @@ from assembly.exact import solve_exact
 from assembly.pose_error import bound_pose_error, reachable_screws
 from assembly.posture import home_posture, place_robot
 from assembly.robots import load_robot
-from tests.test_cli import run  # noqa: F401  a fixture
 
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 

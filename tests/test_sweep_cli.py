@@ -1,7 +1,6 @@
 """``forcefit assembly sweep`` and ``plot``: what they write, and how they refuse."""
 
 import json
-import sys
 
 import pytest
 import xarray
@@ -13,20 +12,6 @@ ERRORS = """
 frames = ["elbow", "arm"]
 most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
 """
-
-
-@pytest.fixture
-def run(capsys, monkeypatch):
-    """Run the command in this process: exit status, standard output, error output."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
-        with pytest.raises(SystemExit) as done:
-            forcefit.main()
-        out, err = capsys.readouterr()
-        return done.value.code, out, err
-
-    return call
 
 
 def test_everything_at_once_ends_in_one_file_and_one_object(run, tmp_path):
