@@ -24,7 +24,6 @@ from examples.campaign_folder import data_folder
 from stiffness.reading import BadInput
 from stiffness.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
-from tests.test_cli import run  # noqa: F401
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
 from validation.diagnosis.results import corrected, effects, sentence, table, text
@@ -219,7 +218,7 @@ def small(tmp_path_factory):
     return folder
 
 
-def test_the_command_writes_results_report_and_robot(small, tmp_path, run):  # noqa: F811
+def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     out = {name: tmp_path / name for name in ("d.json", "d.html", "robot.toml")}
     status, printed, err = run(
         "validation", "diagnose", small, "--json", out["d.json"],
@@ -255,7 +254,7 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):  # n
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 
-def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):  # noqa: F811
+def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):
     folder = measure(tmp_path / "campaign", configurations=8, passes=3)
     status, _, err = run(
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"
@@ -265,7 +264,7 @@ def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):  # noq
     assert not (tmp_path / "r.toml").exists()
 
 
-def test_what_cannot_be_done_is_said_before_any_work(tmp_path, small, run):  # noqa: F811
+def test_what_cannot_be_done_is_said_before_any_work(tmp_path, small, run):
     for words, told in (
         (("nowhere",), "nowhere"),
         ((small, "--report", tmp_path / "no" / "d.html"), "no folder"),

@@ -9,7 +9,6 @@ from assembly.effect_file import parameter_names
 from assembly.effects import LIBRARY
 from assembly.robot_file import read_robot, write_robot
 from stiffness.reading import BadInput
-from tests.test_cli import run  # noqa: F401
 
 L = 0.8
 ARM = f"""
@@ -74,13 +73,13 @@ def test_an_effect_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
         assert word in told
 
 
-def solved(run, *words):  # noqa: F811
+def solved(run, *words):
     status, out, err = run("assembly", "solve", *words, "--json", "-")
     assert status == 0, err
     return json.loads(out)
 
 
-def test_effects_of_a_file_act_in_solve(tmp_path, run):  # noqa: F811
+def test_effects_of_a_file_act_in_solve(tmp_path, run):
     """F L / k of a second spring in series; alpha T L of a warm beam."""
     plain = arm_with(tmp_path)
     words = ("--load", "fy=10")
@@ -93,7 +92,7 @@ def test_effects_of_a_file_act_in_solve(tmp_path, run):  # noqa: F811
     assert after[3] - before[3] == pytest.approx(2e-5 * 6 * L, rel=1e-9)
 
 
-def test_what_the_device_adds_is_the_reading_not_the_pose(tmp_path, run):  # noqa: F811
+def test_what_the_device_adds_is_the_reading_not_the_pose(tmp_path, run):
     drift = 'name = "drift"\nparameters = { "amplitude.tz" = 1e-5, time_constant = 10 }'
     path = arm_with(tmp_path, drift)
     found = solved(run, path, "--under", "time=10")
@@ -101,7 +100,7 @@ def test_what_the_device_adds_is_the_reading_not_the_pose(tmp_path, run):  # noq
     assert found["reading"][5] == pytest.approx(1e-5 * (1 - 1 / 2.718281828459045))
 
 
-def test_an_effect_asks_for_what_it_depends_on(tmp_path, run):  # noqa: F811
+def test_an_effect_asks_for_what_it_depends_on(tmp_path, run):
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
     path = arm_with(tmp_path, warm)
     status, out, err = run("assembly", "solve", path)

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
-from tests.test_cli import run  # noqa: F401
 from validation.campaign.campaign_file import read_campaign
 from validation.campaign.counts import correlation
 from validation.campaign.design_remarks import remarks_on
@@ -244,7 +243,7 @@ def test_heat_is_kept_out_of_the_noise_wherever_the_device_stands(
     assert noise.taken_out["temperature"] < 1e-9
 
 
-def test_the_command_writes_everything(tmp_path, rng, run):  # noqa: F811
+def test_the_command_writes_everything(tmp_path, rng, run):
     elastic_campaign(tmp_path / "arm", rng, temperature=6.0)
     status, out, _ = run("validation", "inspect", tmp_path / "arm", "--json", "-")
     assert status == 0
@@ -269,7 +268,7 @@ def test_the_command_writes_everything(tmp_path, rng, run):  # noqa: F811
     assert "What this campaign cannot tell:" in out
 
 
-def test_the_command_refuses_what_is_no_campaign(tmp_path, run):  # noqa: F811
+def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
     status, out, err = run("validation", "inspect", tmp_path, "--json", "-")
     assert status == 2
     assert out == ""
