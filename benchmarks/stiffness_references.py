@@ -99,6 +99,10 @@ LINKS = {
 }  # fmt: skip
 
 
+# middles [m] of the singular edges that belong to no interface; None: all edges
+INNER_EDGES = {"l_bracket": [(0.02, 0.0, 0.18)], "distal_forks": None}
+
+
 def netgen_mesh(name, layers=2, finer=1.0):
     """A link's mesh of straight elements, still to be curved, and its solid."""
     make, _, size = LINKS[name]
@@ -107,6 +111,11 @@ def netgen_mesh(name, layers=2, finer=1.0):
         if face.name in {"base", "tip"} and layers:
             for edge in face.edges:
                 edge.hpref = 1
+    inner = INNER_EDGES.get(name, [])
+    for edge in solid.edges if layers else []:
+        middle = np.mean([[p[0], p[1], p[2]] for p in edge.bounding_box], axis=0)
+        if inner is None or any(np.abs(middle - p).max() < 1e-6 for p in inner):
+            edge.hpref = 1
     mesh = ng.Mesh(OCCGeometry(solid).GenerateMesh(maxh=size / finer))
     if layers:
         mesh.RefineHP(layers, factor=0.2)

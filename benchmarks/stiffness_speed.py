@@ -34,17 +34,16 @@ INTERFACES = {
     "distal_forks": (BORE.format(0), BORE.format(0.452)),
 }
 CASES = [
-    "ours distal_plain 0.01", "ours distal_plain 0.002", "ours distal_plain 0.001",
+    "ours distal_plain 0.01", "ours distal_plain 0.001",
     "ngsolve distal_plain 2 0 1", "ngsolve distal_plain 3 0 1",
-    "ngsolve distal_plain 3 0 2", "ngsolve distal_plain 4 1 1",
-    "ccx distal_plain 0.01", "ccx distal_plain 0.002",
-    "ours l_bracket 0.01", "ours l_bracket 0.002", "ours l_bracket 0.001",
-    "ngsolve l_bracket 3 0 1", "ngsolve l_bracket 3 0 2", "ngsolve l_bracket 4 1 1",
-    "ccx l_bracket 0.01", "ccx l_bracket 0.002",
-    "ours distal_forks 0.02", "ours distal_forks 0.005",
-    "ngsolve distal_forks 2 0 2", "ngsolve distal_forks 3 0 1",
-    "ngsolve distal_forks 3 0 1.7", "ngsolve distal_forks 4 1 1",
-    "ccx distal_forks 0.02",
+    "ngsolve distal_plain 3 1 1", "ngsolve distal_plain 4 1 1",
+    "ccx distal_plain 0.01", "ccx distal_plain 0.001",
+    "ours l_bracket 0.01", "ours l_bracket 0.001",
+    "ngsolve l_bracket 3 2 1", "ngsolve l_bracket 4 2 1",
+    "ngsolve l_bracket 4 3 1.5", "ccx l_bracket 0.01", "ccx l_bracket 0.001",
+    "ours distal_forks 0.01", "ours distal_forks 0.005",
+    "ngsolve distal_forks 3 0 1", "ngsolve distal_forks 3 1 0.8",
+    "ngsolve distal_forks 4 1 0.7", "ccx distal_forks 0.01",
 ]  # fmt: skip
 
 
