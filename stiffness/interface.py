@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffness.beam import unit_vector
-from stiffness.reading import BadInput, describe, nearest, number_array
+from stiffness.reading import (
+    BadInput,
+    comma_numbers,
+    describe,
+    nearest,
+    number_array,
+)
 
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -94,7 +100,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 def _from_text(text: str) -> Interface:
     """An interface of one line."""
     kind, equals, value = (part.strip() for part in text.partition("="))
-    parts = [_numbers(part) for part in value.split("/")]
+    parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
     if equals and kind in _AXES and lengths == [1]:
         direction = np.array(_AXES[kind])
@@ -104,15 +110,6 @@ def _from_text(text: str) -> Interface:
     if equals and kind in {"bore", "disc"} and lengths == [3, 3, 1]:
         return Interface(kind, parts[0], parts[1], float(parts[2][0]))
     raise BadInput(f"found {describe(text)}, expected {_EXPECTED}")
-
-
-def _numbers(text: str) -> NDArray:
-    """Finite numbers between commas; none at all if one of them is not."""
-    try:
-        numbers = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        return np.empty(0)
-    return numbers if np.isfinite(numbers).all() else np.empty(0)
 
 
 def _from_table(table: Mapping) -> Interface:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stiffness.beam import THEORIES, Section, beam_compliance, declared_section
 from stiffness.link import LinkStiffness
-from stiffness.reading import BadInput, describe, nearest
+from stiffness.reading import BadInput, comma_numbers, describe, nearest
 from stiffness.screws import WRENCH
 
 _SECTIONS = (
@@ -76,11 +76,8 @@ def direction(option: str, text: str) -> NDArray:
     if name.lstrip("+-") in _AXES and len(name) <= 2:
         sign = -1.0 if name.startswith("-") else 1.0
         return sign * np.array(_AXES[name.lstrip("+-")])
-    try:
-        vector = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        vector = np.empty(0)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+    vector = comma_numbers(text)
+    if vector.shape != (3,) or not vector.any():
         raise BadInput(
             f"{option}: found {describe(text)}, expected x, y, z or three numbers "
             "such as 0,0,1, not all zero"

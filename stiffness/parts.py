@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from stiffness.body import PointMass
 from stiffness.fea import Material
 from stiffness.options import assignments, checked
-from stiffness.reading import BadInput, describe
+from stiffness.reading import BadInput, comma_numbers, describe
 
 _PART = '"z=0.2..0.4/young=2e11,poisson=0.3" or "x=0..1,z=0..0.1/...,density=7800"'
 _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
@@ -36,7 +36,7 @@ def parse_part(option: str, text: str) -> Material:
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
-        ends = _numbers(span.replace("..", ","))
+        ends = comma_numbers(span.replace("..", ","))
         if axis not in {"x", "y", "z"} or ends.shape != (2,) or ends[0] >= ends[1]:
             raise BadInput(f"{option}: found {describe(text)}, expected {_PART}")
         low["xyz".index(axis)], high["xyz".index(axis)] = ends
@@ -63,7 +63,7 @@ def parse_mass(option: str, text: str) -> PointMass:
         BadInput: it is not that.
     """
     mass, _, place = text.partition("/")
-    weight, point = _numbers(mass), _numbers(place)
+    weight, point = comma_numbers(mass), comma_numbers(place)
     if weight.shape != (1,) or point.shape != (3,):
         raise BadInput(f"{option}: found {describe(text)}, expected {_MASS}")
     return PointMass(checked(option, float(weight[0]), "kg", above=0), point)
@@ -72,12 +72,3 @@ def parse_mass(option: str, text: str) -> PointMass:
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
     """Which points are in a box."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
-
-
-def _numbers(text: str) -> NDArray:
-    """Finite numbers between commas; none at all if one of them is not."""
-    try:
-        found = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        return np.empty(0)
-    return found if np.isfinite(found).all() else np.empty(0)

@@ -398,6 +398,15 @@ def number_array(value: object) -> NDArray | None:
     return np.array([_number(v) for v in value]) if _proper(value) else None
 
 
+def comma_numbers(text: str) -> NDArray:
+    """Finite numbers between commas; none at all if one of them is not."""
+    try:
+        found = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        return np.empty(0)
+    return found if np.isfinite(found).all() else np.empty(0)
+
+
 def _proper(values: list) -> bool:
     """Whether all are numbers that a float can hold; nan and inf are, true is not."""
     return all(isinstance(v, float) or not math.isnan(_number(v)) for v in values)
