@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.elements import Quadratic, integration
+from stiffness.elements import Elements, integration
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +23,12 @@ class PointMass:
 
 
 def mass_properties(
-    mesh: Quadratic, density: NDArray, point_masses: Sequence[PointMass] = ()
+    mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
 ) -> tuple[float, NDArray, NDArray]:
     """Mass, centre and inertia of elements and added points.
 
     Args:
-        mesh: quadratic tetrahedra.
+        mesh: the tetrahedra.
         density: (t,) [kg/m^3] of each element.
         point_masses: added to the elements.
 
@@ -37,7 +37,7 @@ def mass_properties(
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-    for part, N, _, w in integration(mesh):
+    for part, _, _, N, _, w in integration(mesh):
         x = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         x, dm = x - origin, w * density[part, None]
         mass += float(dm.sum())

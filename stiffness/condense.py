@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from stiffness.elements import Quadratic, assemble, triangle_areas
+from stiffness.elements import Elements, assemble, triangle_areas
 from stiffness.link import inverted
 from stiffness.screws import screw_map, skew
 from stiffness.solver import solve
 
 KINDS = ("rigid", "distributing", "distributing-both")
+# patches that stand still or move as one, by kind: stress at their edges is singular
+HELD = {"rigid": (0, 1), "distributing": (0,), "distributing-both": ()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class Condensed:
 
 
 def condense(
-    mesh: Quadratic,
+    mesh: Elements,
     lam: NDArray,
     mu: NDArray,
     centers: NDArray,
@@ -47,7 +49,7 @@ def condense(
     """Stiffness of a meshed link.
 
     Args:
-        mesh: quadratic tetrahedra; patch 0 is the base, 1 the tip.
+        mesh: the tetrahedra; patch 0 is the base, 1 the tip.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         centers: (2, 3) [m] centres of base and tip.
@@ -83,7 +85,7 @@ def _product(upper: csr_array, fields: NDArray) -> NDArray:
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
-def _rigid(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Condensed:
+def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     """Base nodes stand still, tip nodes follow six unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
@@ -100,7 +102,7 @@ def _rigid(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Condensed:
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
 
-def _mean_of_tip(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Condensed:
+def _mean_of_tip(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     """Base nodes stand still; wrenches spread at the tip, its mean motion read."""
     flat = _averaging(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
@@ -109,7 +111,7 @@ def _mean_of_tip(mesh: Quadratic, upper: csr_array, tip_center: NDArray) -> Cond
     return _from_loads(upper, flat, free)
 
 
-def _distributing(mesh: Quadratic, upper: csr_array, centers: NDArray) -> Condensed:
+def _distributing(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
     """Wrenches spread at the tip, balanced at the base; mean motions read."""
     base, tip = (_averaging(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and what balances them at the base
@@ -133,7 +135,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
     return Condensed(K, fields, int(free.sum()))
 
 
-def _averaging(mesh: Quadratic, patch: int, center: NDArray) -> NDArray:
+def _averaging(mesh: Elements, patch: int, center: NDArray) -> NDArray:
     """(n, 3, 6) nodal loads of unit wrenches; transposed, the mean of a field."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
@@ -150,7 +152,7 @@ def _averaging(mesh: Quadratic, patch: int, center: NDArray) -> NDArray:
     return loads
 
 
-def _three_supports(mesh: Quadratic) -> NDArray:
+def _three_supports(mesh: Elements) -> NDArray:
     """Six unknowns that hold a body without straining it: three nodes far apart."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))

@@ -1,201 +1,244 @@
-r"""Quadratic isoparametric tetrahedra for linear elasticity.
+r"""Isoparametric tetrahedra for linear elasticity.
 
 ====== ========================================================== ==========
 symbol meaning                                                    shape
 ====== ========================================================== ==========
-N      quadratic shape functions at quadrature points             (q, 10)
-G      their gradients in space                                   (t, q, 10, 3)
+N      shape functions at quadrature points                       (q, m)
+G      their gradients in space                                   (t, q, m, 3)
 w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
-A tetrahedron's nodes are its 4 corners, then the middles of the edges in ``EDGES``, as
-in scikit-fem, whose element and quadrature these are.  The stiffness is assembled from
-the scalar gradients, all elements at once, much faster than from a weak form:
-K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
-Straight tetrahedra are integrated exactly; curved ones with a rule of degree 5.
+An element's m nodes are its lattice's (:mod:`stiffness.lagrange`): 20 in a cubic
+tetrahedron, 10 in a quadratic one.  The quadrature is scikit-fem's.  The stiffness is
+assembled from the scalar gradients, all elements at once, much faster than from a weak
+form: K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
+Straight tetrahedra are integrated exactly; curved ones two degrees beyond.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from stiffness.mesh import Solid, node_patches, on_shapes
+from stiffness.curved import curved
+from stiffness.lagrange import (
+    FACES,
+    face_nodes,
+    lattice,
+    numbered,
+    quadrature,
+    shape_functions,
+)
+from stiffness.layers import Parts, uncut
+from stiffness.mesh import Solid
 
-EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-_CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference tetrahedron
-TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [0, 2]])
-_CHUNK = 4096  # elements at a time: 4096 x 900 numbers are 30 MB
+ORDER = 3  # cubic: a tenth of the unknowns of quadratic ones at 0.1 %
+_CHUNK = 3_600_000  # numbers of the elements' matrices at a time, 30 MB
 
 
 @dataclass(frozen=True, eq=False)
-class Quadratic:
-    """A solid's quadratic tetrahedra.
+class Elements:
+    """A solid's isoparametric tetrahedra.
 
     Attributes:
-        nodes: (n, 3) [m] corners first, then middles of edges, on the exact shapes.
-        cells: (t, 10) nodes of each tetrahedron.
-        faces: (f, 6) nodes of each boundary triangle: 3 corners, 3 middles.
+        order: of the polynomials, 1 to 3.
+        nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
+        cells: (t, m) nodes of each tetrahedron.
+        faces: (f, k) nodes of each boundary triangle.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        curved: (t,) whether an edge of the tetrahedron is bent.
+        owner: (f,) the tetrahedron each boundary triangle belongs to.
+        curved: (t,) whether the tetrahedron is bent.
     """
 
+    order: int
     nodes: NDArray
     cells: NDArray
     faces: NDArray
     patch: NDArray
+    owner: NDArray
     curved: NDArray
 
 
-def quadratic(solid: Solid) -> Quadratic:
-    """Quadratic tetrahedra whose boundary nodes lie on the known shapes.
+class Chunk(NamedTuple):
+    """Some elements, with what integrals over them need.
+
+    Attributes:
+        part: (c,) indices of the elements.
+        L: (q, 4) barycentric coordinates of the quadrature's points.
+        weights: (q,) on the reference element.
+        N: (q, m) shape functions.
+        G: (c, q, m, 3) [1/m] their gradients in space.
+        w: (c, q) [m^3] weights in space.
+    """
+
+    part: NDArray
+    L: NDArray
+    weights: NDArray
+    N: NDArray
+    G: NDArray
+    w: NDArray
+
+
+def isoparametric(
+    solid: Solid, order: int = ORDER, parts: Parts | None = None
+) -> Elements:
+    """Elements whose boundary nodes lie on the known shapes.
 
     Args:
         solid: the straight tetrahedra.
+        order: of the polynomials, 1 to 3.
+        parts: of the tetrahedra, to be elements in their stead.
 
     Returns:
-        The tetrahedra; one that bending would turn over somewhere keeps straight edges.
+        The elements.
     """
-    corners = len(solid.points)
-    pairs = np.sort(solid.cells[:, EDGES].reshape(-1, 2), axis=1)
-    code, index = np.unique(pairs[:, 0] * corners + pairs[:, 1], return_inverse=True)
-    middle = solid.points[np.column_stack([code // corners, code % corners])].mean(1)
-    straight = np.concatenate([solid.points, middle])
-    cells = np.column_stack([solid.cells, corners + index.reshape(-1, 6)])
-    edges = np.sort(solid.faces[:, TRIANGLE_EDGES].reshape(-1, 2), axis=1)
-    middles = corners + np.searchsorted(code, edges[:, 0] * corners + edges[:, 1])
-    middles = middles.reshape(-1, 3)
-    groups = [
-        (key, group + corners)
-        for key, group in node_patches(len(middle), middles - corners, solid.patch)
-    ]
-    longest = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    bent = on_shapes(straight, groups, solid.shapes, 0.05 * longest)
-    nodes = _without_folds(straight, bent, cells)
-    moved = np.abs(nodes - straight).max(axis=1) > 1e-12 * longest
-    curved = moved[cells].any(axis=1)
-    faces = np.column_stack([solid.faces, middles])
-    return Quadratic(nodes, cells, faces, solid.patch, curved)
-
-
-def _without_folds(straight: NDArray, bent: NDArray, cells: NDArray) -> NDArray:
-    """Bent nodes, straightened step by step where an element would fold."""
-    nodes = bent.copy()
-    suspects = np.flatnonzero((bent != straight)[cells].any(axis=(1, 2)))
-    check = np.concatenate([_quadrature(4)[0], _CORNERS])
-    dN = _shape_functions(check)[1]
-    for _ in range(4):
-        J = np.einsum("qai,tax->tqix", dN, nodes[cells[suspects]])
-        size = np.linalg.det(J)
-        folded = suspects[size.min(axis=1) < 0.05 * size.max(axis=1)]
-        if len(folded) == 0:
-            break
-        touched = np.unique(cells[folded])
-        nodes[touched] = (nodes[touched] + straight[touched]) / 2
-    else:
-        nodes[touched] = straight[touched]
-    return nodes
-
-
-def _shape_functions(points: NDArray) -> tuple[NDArray, NDArray]:
-    """N (q, 10) and derivatives (q, 10, 3) at reference points (q, 3)."""
-    from skfem import ElementTetP2
-
-    element = ElementTetP2()
-    found = [element.lbasis(points.T, i) for i in range(10)]
-    N = np.stack([values for values, _ in found], axis=1)
-    return N, np.stack([gradients.T for _, gradients in found], axis=1)
-
-
-@lru_cache(maxsize=4)
-def _quadrature(degree: int) -> tuple[NDArray, NDArray]:
-    """Points (q, 3) and positive weights (q,) of a rule of at least a degree."""
-    from skfem.quadrature import get_quadrature
-    from skfem.refdom import RefTet
-
-    # the rules of degree 3 and 4 have negative weights; 5 has 14 points, all positive
-    points, weights = get_quadrature(RefTet, degree if degree <= 2 else max(degree, 5))
-    return points.T, weights
+    whole, parts = curved(solid, order), parts or uncut(solid)
+    cells, count = numbered(parts.corners, order)
+    nodes = np.zeros((count, 3))
+    L = (lattice(order) / order) @ parts.places
+    # parts are cut in few different ways: all parts of a way at once
+    ways = parts.places.reshape(len(L), 16)
+    _, first, way = np.unique(ways, axis=0, return_index=True, return_inverse=True)
+    for k, example in enumerate(first):
+        members = np.flatnonzero(way == k)
+        N, _ = shape_functions(order, L[example])
+        corners = whole.nodes[whole.cells[parts.parent[members]]]
+        nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
+    # a part's face is on the boundary if it lies in a face there of its tetrahedron
+    faces, patch, owner = [], [], []
+    for side, on in zip(FACES, face_nodes(order), strict=True):
+        for other, missing in enumerate((3, 2, 1, 0)):
+            known = whole.patch[parts.parent, other]
+            inside = (parts.places[:, side, missing] == 0).all(axis=1)
+            member = np.flatnonzero(inside & (known >= 0))
+            faces.append(cells[member][:, on])
+            patch.append(known[member])
+            owner.append(member)
+    return Elements(
+        order,
+        nodes,
+        cells,
+        np.concatenate(faces),
+        np.concatenate(patch),
+        np.concatenate(owner),
+        whole.bent[parts.parent],
+    )
 
 
 def integration(
-    mesh: Quadratic, degree: int | None = None
-) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray]]:
+    mesh: Elements, degree: int | None = None
+) -> Iterator[Chunk]:
     """Elements in chunks, with what integrals over them need.
 
     Args:
         mesh: the tetrahedra.
-        degree: of the rule, 2 or 4; 2 for straight and 4 for curved ones if absent.
+        degree: of the rule; what the elements' stiffness needs if absent.
 
     Yields:
-        Indices (c,) of elements, shape functions N (q, 10), gradients G (c, q, 10, 3)
-        [1/m] and weights w (c, q) [m^3].
+        A :class:`Chunk`.
     """
-    for bent, natural in ((False, 2), (True, 4)):
-        points, weights = _quadrature(degree or natural)
-        N, dN = _shape_functions(points)
+    own = 2 * (mesh.order - 1)
+    for bent, natural in ((False, own), (True, own + 2)):
+        L, weights = quadrature(degree or natural)
+        N, dN = shape_functions(mesh.order, L)
         members = np.flatnonzero(mesh.curved == bent)
-        for first in range(0, len(members), _CHUNK):
-            part = members[first : first + _CHUNK]
-            J = np.einsum("qai,tax->tqix", dN, mesh.nodes[mesh.cells[part]])
-            G = np.einsum("qai,tqxi->tqax", dN, np.linalg.inv(J))
-            yield part, N, G, weights * np.linalg.det(J)
+        step = max(1, _CHUNK // (9 * N.shape[1] ** 2))
+        for first in range(0, len(members), step):
+            part = members[first : first + step]
+            J = _jacobians(dN, mesh.nodes[mesh.cells[part]])
+            G = dN @ np.linalg.inv(J)
+            w = weights * np.abs(np.linalg.det(J))
+            yield Chunk(part, L, weights, N, G, w)
 
 
-def node_gradients(mesh: Quadratic) -> Iterator[tuple[NDArray, NDArray]]:
+def gradients_on_faces(
+    mesh: Elements, faces: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """What integrals of stresses over boundary triangles need.
+
+    Args:
+        mesh: the tetrahedra.
+        faces: (f,) indices of boundary triangles.
+
+    Returns:
+        Places (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
+        gradients (f, q, m, 3) [1/m] of the owners' shape functions.
+    """
+    N, dN, weights = triangle_rule(mesh.order)
+    flat = mesh.nodes[mesh.faces[faces]]
+    J = np.einsum("qai,tax->tqix", dN, flat)
+    normal = np.cross(J[:, :, 0], J[:, :, 1])
+    size = np.linalg.norm(normal, axis=2)
+    places = np.einsum("qa,tax->tqx", N, flat)
+    cells = mesh.cells[mesh.owner[faces]]
+    inner = mesh.nodes[cells].mean(axis=1)[:, None]
+    outward = np.sign(np.einsum("tqx,tqx->tq", normal, places - inner))
+    G = np.zeros((*size.shape, cells.shape[1], 3))
+    corners = mesh.faces[faces, :3]
+    for side in FACES:
+        members = np.flatnonzero((cells[:, side] == corners).all(axis=1))
+        L = np.zeros((len(weights), 4))
+        L[:, side] = quadrature(2 * mesh.order, corners=3)[0]
+        slope = shape_functions(mesh.order, L)[1]
+        J = _jacobians(slope, mesh.nodes[cells[members]])
+        G[members] = slope @ np.linalg.inv(J)
+    return places, normal * (outward / size)[..., None], weights * size, G
+
+
+def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
+    """(c, q, 3, 3) derivatives of the place, reference coordinates first."""
+    q, m, _ = dN.shape
+    flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
+    return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
+
+
+def node_gradients(mesh: Elements) -> Iterator[tuple[NDArray, NDArray]]:
     """Gradients of the shape functions at the nodes of each element.
 
     Args:
         mesh: the tetrahedra.
 
     Yields:
-        Indices (c,) of elements and gradients (c, 10, 10, 3) [1/m]: node, function,
+        Indices (c,) of elements and gradients (c, m, m, 3) [1/m]: node, function,
         direction.
     """
-    places = np.concatenate([_CORNERS, _CORNERS[EDGES].mean(axis=1)])
-    dN = _shape_functions(places)[1]
-    for first in range(0, len(mesh.cells), _CHUNK):
-        part = np.arange(first, min(first + _CHUNK, len(mesh.cells)))
-        J = np.einsum("qai,tax->tqix", dN, mesh.nodes[mesh.cells[part]])
-        yield part, np.einsum("qai,tqxi->tqax", dN, np.linalg.inv(J))
+    dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
+    step = max(1, _CHUNK // (9 * dN.shape[1] ** 2))
+    for first in range(0, len(mesh.cells), step):
+        part = np.arange(first, min(first + step, len(mesh.cells)))
+        yield part, dN @ np.linalg.inv(_jacobians(dN, mesh.nodes[mesh.cells[part]]))
 
 
-def triangle_areas(mesh: Quadratic, faces: NDArray) -> tuple[NDArray, NDArray]:
+def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
     """What integrals over curved triangles need.
 
     Args:
         mesh: whose nodes they have.
-        faces: (f, 6) nodes of triangles.
+        faces: (f, k) nodes of triangles.
 
     Returns:
-        Shape functions (6, 6) at the quadrature points and weights (f, 6) [m^2].
+        Shape functions (q, k) at the quadrature points and weights (f, q) [m^2].
     """
-    N, dN, weights = triangle_rule()
+    N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
     return N, np.linalg.norm(np.cross(J[:, :, 0], J[:, :, 1]), axis=2) * weights
 
 
-def triangle_rule() -> tuple[NDArray, NDArray, NDArray]:
-    """Quadrature of six points on a quadratic triangle, degree 4 (Dunavant).
+def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Quadrature on a triangle that integrates products of two shape functions.
+
+    Args:
+        order: of the polynomials.
 
     Returns:
-        Shape functions (6, 6), their gradients (6, 6, 2) and weights (6,).
+        Shape functions (q, k), their gradients (q, k, 2) and weights (q,).
     """
-    a, b = 0.445948490915965, 0.091576213509771
-    v, w = 0.223381589678011 / 2, 0.109951743655322 / 2
-    L = np.array([np.roll([1 - 2 * p, p, p], k) for p in (a, b) for k in range(3)])
-    pairs = [(0, 1), (1, 2), (0, 2)]
-    middle = np.stack([4 * L[:, i] * L[:, j] for i, j in pairs], axis=1)
-    d = np.zeros((6, 6, 3))
-    for k in range(3):
-        d[:, k, k] = 4 * L[:, k] - 1
-    for k, (i, j) in enumerate(pairs):
-        d[:, 3 + k, i], d[:, 3 + k, j] = 4 * L[:, j], 4 * L[:, i]
-    N = np.concatenate([L * (2 * L - 1), middle], axis=1)
-    return N, d[:, :, 1:] - d[:, :, :1], np.repeat([v, w], 3)
+    L, weights = quadrature(2 * order, corners=3)
+    N, dN = shape_functions(order, L)
+    return N, dN, weights
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:
@@ -211,7 +254,7 @@ def lame(E: float, nu: float) -> tuple[float, float]:
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
 
-def assemble(mesh: Quadratic, lam: NDArray, mu: NDArray) -> csr_array:
+def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
     """The stiffness of all elements together.
 
     Args:
@@ -222,16 +265,16 @@ def assemble(mesh: Quadratic, lam: NDArray, mu: NDArray) -> csr_array:
     Returns:
         (3n, 3n) [N/m] the upper triangle; row 3 i + k is direction k of node i.
     """
-    count = len(mesh.nodes)
-    a, b = np.triu_indices(10)
-    row, column = mesh.cells[:, a], mesh.cells[:, b]
+    cells, count = mesh.cells, len(mesh.nodes)
+    a, b = np.triu_indices(cells.shape[1])
+    row, column = cells[:, a], cells[:, b]
     swapped = row > column
     code = np.minimum(row, column) * np.int64(count) + np.maximum(row, column)
     code, position = np.unique(code.ravel(), return_inverse=True)
     position = position.reshape(row.shape)
     values = np.zeros((9, len(code)))
-    for part, _, G, w in integration(mesh):
-        block = _node_blocks(G, w, lam[part], mu[part])[:, a, b]
+    for part, _, _, _, G, w in integration(mesh):
+        block = _node_blocks(G, w, lam[part], mu[part], a, b)
         turned = swapped[part]
         block[turned] = block[turned].transpose(0, 2, 1)
         place = position[part].ravel()
@@ -250,13 +293,16 @@ def assemble(mesh: Quadratic, lam: NDArray, mu: NDArray) -> csr_array:
     return csr_array(kept, shape=whole.shape)
 
 
-def _node_blocks(G: NDArray, w: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, 10, 10, 3, 3) stiffness between pairs of nodes of each element."""
-    flat = (G * np.sqrt(w)[:, :, None, None]).reshape(len(G), w.shape[1], 30)
-    S = (flat.transpose(0, 2, 1) @ flat).reshape(-1, 10, 3, 10, 3)
-    S = S.transpose(0, 1, 3, 2, 4)  # [a, b, i, j] = sum w G_ai G_bj
-    m = mu[:, None, None, None, None]
-    block = lam[:, None, None, None, None] * S + m * S.swapaxes(3, 4)
-    trace = np.trace(S, axis1=3, axis2=4)
-    block[..., range(3), range(3)] += mu[:, None, None, None] * trace[..., None]
-    return block
+def _node_blocks(
+    G: NDArray, w: NDArray, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
+) -> NDArray:
+    """(c, p, 3, 3) stiffness between the pairs a, b (p,) of nodes of each element."""
+    count, points, nodes, _ = G.shape
+    flat = (G * np.sqrt(w)[:, :, None, None]).reshape(count, points, 3 * nodes)
+    S = (flat.transpose(0, 2, 1) @ flat).reshape(count, nodes, 3, nodes, 3)
+    S = S[:, a, :, b, :].swapaxes(0, 1)  # [., p, i, j] = sum w G_ai G_bj
+    m = mu[:, None, None, None]
+    block = lam[:, None, None, None] * S + m * S.swapaxes(2, 3)
+    trace = np.trace(S, axis1=2, axis2=3)
+    block[..., range(3), range(3)] += m[:, 0] * trace[..., None]
+    return np.asarray(block)

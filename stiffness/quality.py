@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.elements import Quadratic, integration, triangle_areas
+from stiffness.elements import Elements, integration, triangle_areas
 from stiffness.mesh import Solid
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
-def mesh_report(solid: Solid, mesh: Quadratic) -> dict[str, Any]:
+def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
     """Counts, size and shape of a mesh.
 
     Args:

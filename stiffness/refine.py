@@ -40,33 +40,60 @@ def refine(solid: Solid, halvings: NDArray) -> Finer:
     Returns:
         The finer solid.
     """
-    points, cells, faces, patch = solid.points, solid.cells, solid.faces, solid.patch
-    parent, need = np.arange(len(cells)), np.array(halvings, dtype=int)
+    parent, need = np.arange(len(solid.cells)), np.array(halvings, dtype=int)
     while (need > 0).any():
-        ends, of_cell = _edges(cells, _TETRA, len(points))
-        split = _terminal_edges(points, ends, of_cell, need > 0)
-        middle = np.full(len(ends), -1)
-        middle[split] = len(points) + np.arange(split.sum())
-        points = np.concatenate([points, points[ends[split]].mean(axis=1)])
-        code = ends[:, 0] * np.int64(len(points)) + ends[:, 1]
-        pairs = np.sort(faces[:, _TRIANGLE], axis=2)
-        of_face = np.searchsorted(code, pairs[..., 0] * len(points) + pairs[..., 1])
-        faces, (patch,) = _halved(faces, middle[of_face], _TRIANGLE, patch)
-        cells, (parent, need) = _halved(
-            cells, middle[of_cell], _TETRA, parent, need, spent=True
-        )
-    finer = Solid(points, cells, faces, patch, solid.shapes)
-    return Finer(moved_onto_shapes(finer), parent)
+        ends, of_cell = edges_of(solid.cells, len(solid.points))
+        split = _terminal_edges(solid.points, ends, of_cell, need > 0)
+        solid, row = split_edges(solid, ends, of_cell, split)
+        need[row] = np.maximum(need[row] - 1, 0)
+        need, parent = np.r_[need, need[row]], np.r_[parent, parent[row]]
+    return Finer(moved_onto_shapes(solid), parent)
 
 
-def _edges(cells: NDArray, pairs: NDArray, points: int) -> tuple[NDArray, NDArray]:
-    """Ends (e, 2) of all edges, in order, and the edges (t, 6) of each cell."""
-    ends = np.sort(cells[:, pairs].reshape(-1, 2), axis=1)
+def split_edges(
+    solid: Solid, ends: NDArray, of_cell: NDArray, split: NDArray
+) -> tuple[Solid, NDArray]:
+    """Halve some edges with all that is around them; at most one of each tetrahedron.
+
+    Args:
+        solid: to refine; new corners are not yet moved onto its shapes.
+        ends: (e, 2) of :func:`edges_of`.
+        of_cell: (t, 6) of :func:`edges_of`.
+        split: (e,) whether an edge is to be halved.
+
+    Returns:
+        The solid, and the tetrahedra (r,) that were halved: their first halves keep
+        their places, the second ones are appended in this order.
+    """
+    count = len(solid.points)
+    middle = np.full(len(ends), -1)
+    middle[split] = count + np.arange(split.sum())
+    points = np.concatenate([solid.points, solid.points[ends[split]].mean(axis=1)])
+    code = ends[:, 0] * np.int64(count) + ends[:, 1]
+    pairs = np.sort(solid.faces[:, _TRIANGLE], axis=2)
+    of_face = np.searchsorted(code, pairs[..., 0] * np.int64(count) + pairs[..., 1])
+    faces, face_row = _halved(solid.faces, middle[of_face], _TRIANGLE)
+    cells, row = _halved(solid.cells, middle[of_cell], _TETRA)
+    patch = np.r_[solid.patch, solid.patch[face_row]]
+    return Solid(points, cells, faces, patch, solid.shapes), row
+
+
+def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
+    """Edges of tetrahedra.
+
+    Args:
+        cells: (t, 4) corners.
+        points: how many corners there are.
+
+    Returns:
+        Ends (e, 2), the smaller number first, in order; the edges (t, 6) of each cell.
+    """
+    ends = np.sort(cells[:, _TETRA].reshape(-1, 2), axis=1)
     code, index = np.unique(
         ends[:, 0] * np.int64(points) + ends[:, 1], return_inverse=True
     )
     ends = np.column_stack([code // points, code % points])
-    return ends, index.reshape(-1, len(pairs))
+    return ends, index.reshape(-1, 6)
 
 
 def _terminal_edges(
@@ -92,13 +119,9 @@ def _terminal_edges(
 
 
 def _halved(
-    cells: NDArray,
-    middle: NDArray,
-    pairs: NDArray,
-    *labels: NDArray,
-    spent: bool = False,
-) -> tuple[NDArray, list[NDArray]]:
-    """Cells with a split edge become two; the last label counts down if spent."""
+    cells: NDArray, middle: NDArray, pairs: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Cells with a split edge become two, the second ones appended; and which did."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()
@@ -107,10 +130,4 @@ def _halved(
     second[each, pairs[which, 0]] = new
     result = cells.copy()
     result[row] = first
-    carried = []
-    for k, label in enumerate(labels):
-        label = label.copy()
-        if spent and k == len(labels) - 1:
-            label[row] = np.maximum(label[row] - 1, 0)
-        carried.append(np.concatenate([label, label[row]]))
-    return np.concatenate([result, second]), carried
+    return np.concatenate([result, second]), row

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffness.beam import section_axes
 from stiffness.beam_stress import peak_beam_stress
-from stiffness.elements import Quadratic, node_gradients, triangle_areas
+from stiffness.elements import Elements, node_gradients, triangle_areas
 from stiffness.estimate import PAIRS
 from stiffness.fea import Level, MeshedLink
 from stiffness.reading import BadInput
@@ -186,7 +186,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     return StressInfluence(mesh.nodes[far], influence, float(distance))
 
 
-def _interface_radius(mesh: Quadratic, patch: int) -> float:
+def _interface_radius(mesh: Elements, patch: int) -> float:
     """[m] largest distance of an interface's nodes from its area's middle."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)

@@ -1,0 +1,157 @@
+r"""Polynomials on tetrahedra and triangles by their values on a lattice of points.
+
+====== ========================================================== ==========
+symbol meaning                                                    shape
+====== ========================================================== ==========
+L      barycentric coordinates of points                          (q, c)
+N      shape functions at the points                              (q, m)
+dN     their derivatives, L_1 .. L_(c-1) independent              (q, m, c-1)
+====== ========================================================== ==========
+
+c is 4 for a tetrahedron, 3 for a triangle.  The lattice of degree p holds all points
+whose coordinates are multiples of 1 / p: corners first, then along the edges, in the
+faces, inside.  An element's corners are always in the rising order of their numbers, so
+that two elements see the nodes of a common edge or face in the same order; half of the
+elements are therefore left-handed.
+"""
+
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+EDGES = np.array(list(combinations(range(4), 2)))
+FACES = np.array(list(combinations(range(4), 3)))  # the k-th lacks corner 3 - k
+
+
+@lru_cache(maxsize=16)
+def lattice(degree: int, corners: int = 4) -> NDArray:
+    """Barycentric coordinates of a lattice, as multiples of 1 / degree.
+
+    Args:
+        degree: of the polynomials, >= 1.
+        corners: 4 of a tetrahedron, 3 of a triangle.
+
+    Returns:
+        (m, corners) integers: the corners, then edge by edge, face by face, inside.
+    """
+    points = []
+    for size in range(1, corners + 1):
+        for members in combinations(range(corners), size):
+            for shares in _partitions(degree, size):
+                point = np.zeros(corners, dtype=int)
+                point[list(members)] = shares
+                points.append(point)
+    return np.array(points)
+
+
+def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
+    """Ways to share a total among parts that all get some; the first falls slowest."""
+    if parts == 1:
+        return [(total,)]
+    return [
+        (first, *rest)
+        for first in range(total - parts + 1, 0, -1)
+        for rest in _partitions(total - first, parts - 1)
+    ]
+
+
+def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
+    """Polynomials that are 1 at one point of the lattice and 0 at the others.
+
+    Args:
+        degree: of the polynomials.
+        L: (q, c) barycentric coordinates.
+
+    Returns:
+        N (q, m) and dN (q, m, c - 1).
+
+    Sources:
+        Silvester (1969): products of one polynomial for each coordinate.
+    """
+    count, corners = L.shape
+    P = np.ones((degree + 1, count, corners))
+    D = np.zeros_like(P)
+    for k in range(1, degree + 1):
+        factor = (degree * L - k + 1) / k
+        P[k] = P[k - 1] * factor
+        D[k] = D[k - 1] * factor + P[k - 1] * degree / k
+    order = lattice(degree, corners)
+    values = np.stack([P[order[:, c], :, c].T for c in range(corners)])
+    slopes = np.stack([D[order[:, c], :, c].T for c in range(corners)])
+    by_corner = [
+        slopes[c] * np.delete(values, c, axis=0).prod(axis=0) for c in range(corners)
+    ]
+    dN = np.stack([d - by_corner[0] for d in by_corner[1:]], axis=-1)
+    return values.prod(axis=0), dN
+
+
+@lru_cache(maxsize=16)
+def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
+    """A rule on the reference element, exact to at least a degree.
+
+    Args:
+        degree: of polynomials, up to 7 in a tetrahedron.
+        corners: 4 of a tetrahedron, 3 of a triangle.
+
+    Returns:
+        L (q, corners) and positive weights (q,).
+    """
+    from skfem.quadrature import get_quadrature
+    from skfem.refdom import RefTet, RefTri
+
+    # in the tetrahedron the rules of degree 3 and 4 have negative weights, 5 has none
+    least = degree if corners == 3 or degree <= 2 else max(degree, 5)
+    points, weights = get_quadrature(RefTet if corners == 4 else RefTri, least)
+    return np.vstack([1 - points.sum(axis=0), points]).T, weights
+
+
+def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
+    """Numbers of the lattices' points, shared by the elements that share them.
+
+    Args:
+        corners: (t, 4) numbers of the corners, rising in each row.
+        degree: of the polynomials.
+
+    Returns:
+        (t, m) numbers, the corners' own first, and how many there are.
+    """
+    total = int(corners.max()) + 1
+    parts = [corners]
+    for members in (EDGES, FACES):
+        size = members.shape[1]
+        each = len(_partitions(degree, size)) if degree >= size else 0
+        if each:
+            code = np.zeros((len(corners), len(members)), dtype=np.int64)
+            for k in range(size):
+                code = code * (int(corners.max()) + 1) + corners[:, members[:, k]]
+            unique, index = np.unique(code, return_inverse=True)
+            first = total + each * index.reshape(code.shape + (1,))
+            parts.append((first + np.arange(each)).reshape(len(corners), -1))
+            total += each * len(unique)
+    inside = len(lattice(degree)) - sum(part.shape[1] for part in parts)
+    if inside:
+        own = total + np.arange(inside * len(corners))
+        parts.append(own.reshape(len(corners), inside))
+        total += inside * len(corners)
+    return np.concatenate(parts, axis=1), total
+
+
+@lru_cache(maxsize=8)
+def face_nodes(degree: int) -> NDArray:
+    """Which of a tetrahedron's lattice points lie on its faces.
+
+    Args:
+        degree: of the polynomials.
+
+    Returns:
+        (4, k) one row for each of ``FACES``, in the order of a triangle's lattice.
+    """
+    whole = [tuple(point) for point in lattice(degree)]
+    rows = []
+    for face in FACES:
+        points = np.zeros((len(lattice(degree, 3)), 4), dtype=int)
+        points[:, face] = lattice(degree, 3)
+        rows.append([whole.index(tuple(point)) for point in points])
+    return np.array(rows)
