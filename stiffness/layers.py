@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from stiffness.mesh import Solid, moved_onto_shapes
 from stiffness.refine import edges_of, split_edges
 
-SHARE = 0.15  # of an element's width that its layer takes; 0.1 to 0.2 do as well
+SHARE = 0.25  # of an element's width that its layer takes; 0.15 to 0.3 do as well
 _INNER = np.cos(np.radians(35.0))  # a flatter inner edge is hardly singular
 # a prism's six corners so turned that the k-th comes first (Dompierre et al. 1999)
 _TURNS = np.array([
