@@ -139,11 +139,9 @@ def without_folds(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, bent: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """(t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds.
-
-    The shapes are met at the Lobatto points instead, s = (1 -+ 1 / sqrt 5) / 2, where a
-    cubic leaves an arc to both sides alike, and the cubic is then read at the thirds.
-    """
+    """(t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
+    # met at the Lobatto points, where a cubic leaves an arc to both sides alike, the
+    # cubic is then read at the thirds
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2
     places = np.zeros((int(pairs.max()) + 1, 3))
     places[pairs] = ends[:, :, :1] + s[:, None] * (ends[:, :, 1:] - ends[:, :, :1])
@@ -155,11 +153,9 @@ def _cubic_edges(
 
 
 def _carried_by_edges(moved: NDArray) -> NDArray:
-    """(t, 4, 3) displacement of cubic faces' nodes by those (t, 20, 3) of edges.
-
-    Along an edge the displacement is L_a L_b (c_0 + c_1 (L_b - L_a)), which is carried
-    on over the faces: at a face's middle each of its edges adds c_0 / 9.
-    """
+    """(t, 4, 3) displacement of cubic faces' nodes by those (t, 20, 3) of edges."""
+    # along an edge it is L_a L_b (c_0 + c_1 (L_b - L_a)), which is carried on over the
+    # faces: at a face's middle each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))
     # at thirds L_a L_b is 2 / 9: c_0 is the mean of the two nodes' times 9 / 2
     mean = moved[:, 4:16].reshape(-1, 6, 2, 3).mean(axis=2)

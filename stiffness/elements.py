@@ -128,9 +128,7 @@ def isoparametric(
     )
 
 
-def integration(
-    mesh: Elements, degree: int | None = None
-) -> Iterator[Chunk]:
+def integration(mesh: Elements, degree: int | None = None) -> Iterator[Chunk]:
     """Elements in chunks, with what integrals over them need.
 
     Args:

@@ -4,10 +4,10 @@ The stiffness of cubic elements is too large by the energy of what they cannot f
 Their stresses are quadratic; take them apart in every element into the best linear part
 and the rest, and the linear part into its mean and the rest: s_3 and s_2 are the
 energies of the two rests.  If an error e falls with the polynomials' degree p as p^-b,
-s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) tells b, and with it the share e_3 / (e_2 - e_3) of
-s_3 that is still to come: nothing where the field is smooth, all of it and more where it
-is not.  Elements on a singular edge are known to be of the second kind whatever their
-two numbers say; all of s_3 is taken there.
+s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) tells b, and with it the share e_3 / (e_2 - e_3)
+of s_3 that is still to come: nothing where the field is smooth, all of it and more
+where it is not.  Elements on a singular edge are known to be of the second kind
+whatever their two numbers say; all of s_3 is taken there, and a little more.
 
 The estimate sees the field, not the shape: what a bent element leaves of a shape is
 counted apart, by :func:`shape_errors`.
@@ -121,8 +121,7 @@ def shape_errors(
 
 
 def _stress_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, q, k, 7) numbers whose products are the energies: six of the stress that
-    changes shape and one of the pressure, each over the root of its modulus."""
+    """(c, q, k, 7) numbers whose products are the energies, six of shear, one of bulk."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -140,5 +139,7 @@ def _stress_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 def _products(roots: NDArray, w: NDArray) -> NDArray:
     """(c, k, k) integrals of the products of each case's numbers with each other's."""
     count, _, cases, _ = roots.shape
-    flat = (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)
+    flat = (
+        (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)
+    )
     return np.asarray(flat @ flat.swapaxes(1, 2))

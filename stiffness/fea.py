@@ -24,8 +24,8 @@ from stiffness.curved import without_folds
 from stiffness.elements import ORDER, Elements, isoparametric, lame
 from stiffness.estimate import error_matrices, shape_errors
 from stiffness.interface import Interface
-from stiffness.link import LinkStiffness, inverted, scaled
 from stiffness.layers import layered, singular_edges, without_chords
+from stiffness.link import LinkStiffness, inverted, scaled
 from stiffness.mesh import MeshFailed, Solid, mesh_solid
 from stiffness.patches import triangles_on
 from stiffness.quality import mesh_report
@@ -98,9 +98,13 @@ class Level:
     errors: NDArray
     shape_errors: NDArray
 
-    def totals(self) -> tuple[NDArray, NDArray]:
-        """(6, 6) the stiffness and its indicated error."""
-        return self.solution.stiffness, self.errors.sum(axis=0)
+    def totals(self) -> tuple[NDArray, NDArray, NDArray]:
+        """(6, 6) the stiffness, its indicated error and that of the shapes."""
+        return (
+            self.solution.stiffness,
+            self.errors.sum(axis=0),
+            self.shape_errors.sum(axis=0),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +224,6 @@ def solve_link(
     history, sizes = [level.totals()], [len(level.solid.cells)]
     while True:
         error, factor = estimated_error(history)
-        error -= np.abs(level.shape_errors.sum(axis=0))
         worst = float(np.abs(scaled(error, level.solution.stiffness)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
@@ -354,37 +357,38 @@ def _material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDAr
 
 
 def estimated_error(
-    history: Sequence[tuple[NDArray, NDArray]],
+    history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
     """Error of the last stiffness: what the elements indicate, scaled.
 
     Args:
-        history: (6, 6) stiffness and indicated error of each mesh, finest last.
+        history: of each mesh, finest last, the totals of its :class:`Level`.
 
     Returns:
         (6, 6) estimate of the exact stiffness minus the last one, and the factor on
         the indicated error that it uses: what the last refinement did to the stiffness
         over what it did to the indicated error, and some more.
     """
-    K, indicated = history[-1]
-    if len(history) == 1:
-        return -_BLIND * indicated, _BLIND
-    coarse, indicated_then = history[-2]
-    # the entry that matters: the one with the largest error
-    worst = int(np.argmax(np.diag(indicated) / np.diag(K)))
-    fell = (indicated_then - indicated)[worst, worst]
-    proved = (coarse - K)[worst, worst] / fell if fell > 0 else _BLIND
-    factor = float(_SAFETY * np.clip(proved, 1.0, 2 * _BLIND))
-    return -factor * indicated, factor
+    K, indicated, shape = history[-1]
+    factor = _BLIND
+    if len(history) > 1:
+        coarse, indicated_then, _ = history[-2]
+        # the entry that matters: the one with the largest error
+        worst = int(np.argmax(np.diag(indicated) / np.diag(K)))
+        fell = (indicated_then - indicated)[worst, worst]
+        proved = (coarse - K)[worst, worst] / fell if fell > 0 else _BLIND
+        factor = float(_SAFETY * np.clip(proved, 1.0, 2 * _BLIND))
+    # what leaves the shapes outward and inward may cancel in K, not in the estimate
+    return -factor * indicated - np.abs(shape), factor
 
 
 def _wanted_growth(
-    history: Sequence[tuple[NDArray, NDArray]], sizes: Sequence[int], excess: float
+    history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
     """How many times the elements would bring the error down by an excess."""
     rate = 1.3  # of the error over the count of elements; 2 were it smooth
     if len(history) > 1:
-        then, now = (np.max(np.diag(e) / np.diag(K)) for K, e in history[-2:])
+        then, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
         fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
         rate = min(max(fell, 1.0), 2.0)  # what was gained on coarse meshes ends
     return float(np.clip((1.08 * excess) ** (1 / rate), 1.2, 6.0))

@@ -185,15 +185,15 @@ def _code(ends: NDArray, count: int) -> NDArray:
 
 
 def _of_corner(numbers: NDArray) -> NDArray:
-    """(t, 4, 4) parts of tetrahedra whose corner 0 is singular; 4, 5, 6 are the cuts
-    on the way to 1, 2, 3."""
+    """(t, 4, 4) parts of tetrahedra whose corner 0 is singular."""
+    # 4, 5, 6 are the cuts on the way to 1, 2, 3
     tip = np.broadcast_to([[[0, 4, 5, 6]]], (len(numbers), 1, 4))
     return np.concatenate([tip, _of_prism([4, 5, 6, 1, 2, 3], numbers)], axis=1)
 
 
 def _of_edge(numbers: NDArray) -> NDArray:
-    """(t, 6, 4) parts of tetrahedra whose edge 01 is singular; 4, 5 are the cuts on
-    the way from 0 to 2, 3 and 6, 7 from 1."""
+    """(t, 6, 4) parts of tetrahedra whose edge 01 is singular."""
+    # 4, 5 are the cuts on the way from 0 to 2, 3 and 6, 7 from 1
     wedge = _of_prism([0, 4, 5, 1, 6, 7], numbers)
     return np.concatenate([wedge, _of_prism([2, 4, 6, 3, 5, 7], numbers)], axis=1)
 

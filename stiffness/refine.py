@@ -118,9 +118,7 @@ def _terminal_edges(
     return marked & (around == first)
 
 
-def _halved(
-    cells: NDArray, middle: NDArray, pairs: NDArray
-) -> tuple[NDArray, NDArray]:
+def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
     """Cells with a split edge become two, the second ones appended; and which did."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
