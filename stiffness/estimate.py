@@ -121,7 +121,7 @@ def shape_errors(
 
 
 def _stress_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, q, k, 7) numbers whose products are the energies, six of shear, one of bulk."""
+    """(c, q, k, 7) numbers whose products are energies: six of shear, one of bulk."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G

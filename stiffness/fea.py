@@ -218,7 +218,7 @@ def solve_link(
     centers = np.array([
         interface_center(surface, f, n) for f, n in ((base, "base"), (tip, "tip"))
     ])
-    level = _solve_level(
+    level = solve_level(
         first_mesh(surface, base, tip, budget, cache), materials, centers, interface
     )
     history, sizes = [level.totals()], [len(level.solid.cells)]
@@ -233,7 +233,7 @@ def solve_link(
         )
         if finer is None:
             break
-        level = _solve_level(finer, materials, centers, interface)
+        level = solve_level(finer, materials, centers, interface)
         history.append(level.totals())
         sizes.append(len(level.solid.cells))
     report = _report(level, surface, len(history), start) | {
@@ -319,10 +319,24 @@ def first_mesh(
     return mesh(0.2)
 
 
-def _solve_level(
+def solve_level(
     solid: Solid, materials: Sequence[Material], centers: NDArray, interface: str
 ) -> Level:
-    """Stiffness, fields and error shares of one mesh."""
+    """Stiffness, fields and error shares of one mesh.
+
+    Args:
+        solid: straight tetrahedra; those that would fold when bent, or that touch two
+            singular edges, are halved first.
+        materials: the first fills the link, later ones where they say.
+        centers: (2, 3) [m] of base and tip.
+        interface: one of ``KINDS``.
+
+    Returns:
+        The answer, on cubic elements with a layer along the singular edges.
+
+    Raises:
+        BadInput: no material fills the link.
+    """
     held = HELD[interface]
     solid = without_chords(without_folds(solid, ORDER), held)
     parts = layered(solid, held)

@@ -13,7 +13,7 @@ BELOW["validation"] = ("stiffness", "assembly")
 SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
     "pytetwild": ("stiffness/mesh_worker.py",),
-    "skfem": ("stiffness/elements.py",),
+    "skfem": ("stiffness/lagrange.py",),
     "meshio": ("stiffness/surface_files.py",),
     "gmsh": ("stiffness/surface_files.py",),
     "clarabel": ("assembly/solvers/conic.py",),
