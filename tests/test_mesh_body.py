@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix, diags
 from assembly.posture import home_posture
 from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from stiffness.condense import condense
-from stiffness.elements import assemble, lame, quadratic
+from stiffness.elements import assemble, isoparametric, lame
 from stiffness.reading import BadInput
 from tests.solids_for_tests import box_solid
 from validation.crosscheck import crosscheck
@@ -29,7 +29,7 @@ TURN = np.array([0.4, -0.3, 0.8])  # rad: mesh axes seen from the frame's
 def block():
     """A slender box as a mesh body, and its K_E at the tip in the frame's axes."""
     solid = box_solid((2, 2, 8), SIZE)
-    mesh = quadratic(solid)
+    mesh = isoparametric(solid)
     constants = np.array(lame(70e9, 0.33))[:, None] * np.ones(len(solid.cells))
     centers = np.array([[*SIZE[:2] / 2, 0], [*SIZE[:2] / 2, SIZE[2]]])
     upper = assemble(mesh, *constants)

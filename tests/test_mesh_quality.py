@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.elements import quadratic
+from stiffness.elements import isoparametric
 from stiffness.mesh import Solid
 from stiffness.quality import dihedral_angles, element_quality, mesh_report
 from tests.solids_for_tests import bar_solid, box_solid
@@ -41,14 +41,14 @@ def test_a_flat_tetrahedron_is_seen():
 def test_the_report_of_a_box_and_of_a_bar():
     """A box's numbers are exact; a bar's quadratic sides miss the circle by 1e-4."""
     box = box_solid((2, 3, 4), (0.1, 0.2, 0.3))
-    report = mesh_report(box, quadratic(box))
+    report = mesh_report(box, isoparametric(box))
     assert report["elements"] == len(box.cells)
     assert report["volume"] == pytest.approx(6e-3, rel=1e-12)
     assert report["area"] == pytest.approx(0.22, rel=1e-12)
     assert report["closed"]
     assert 0 < report["smallest_angle"] < np.pi / 3 < report["largest_angle"]
     opened = Solid(box.points, box.cells, box.faces[1:], box.patch[1:], box.shapes)
-    assert not mesh_report(opened, quadratic(opened))["closed"]
+    assert not mesh_report(opened, isoparametric(opened))["closed"]
     bar = bar_solid(3, 8, 0.04, 0.2)
     area = 2 * np.pi * 0.04 * (0.2 + 0.04)
-    assert mesh_report(bar, quadratic(bar))["area"] == pytest.approx(area, rel=1e-3)
+    assert mesh_report(bar, isoparametric(bar))["area"] == pytest.approx(area, rel=1e-3)
