@@ -23,10 +23,12 @@ from stiffness.lagrange import (
 )
 from stiffness.mesh import Solid, node_patches, on_shapes
 from stiffness.refine import refine
+from stiffness.shapes import Shape
 
 _REACH = 0.05  # of the part's size: no node is moved further
 _FOLDED = 0.05  # of an element's largest Jacobian determinant
 _ROUNDS = 3  # of halving elements that would fold
+_MET = 0.2128543571118083  # solves 9 t^3 - 10 t^2 + 3.6 t = 0.4: two of three L
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,8 @@ def curved(solid: Solid, order: int) -> Curved:
         nodes[pairs] += _cubic_edges(solid.points[corners][:, EDGES], pairs, bent)
         moved = (np.abs(nodes - straight).max(axis=1) > 0)[cells].any(axis=1)
         nodes[cells[moved, 16:]] += _carried_by_edges((nodes - straight)[cells[moved]])
-        nodes = bent(nodes, cells[:, 16:])
+        faces, reach = (nodes[members], patch[row, face]), _REACH * size
+        nodes[members[:, 9]] += _cubic_faces(*faces, solid.shapes, reach)
     nodes, folded = _without_folds(straight, nodes, cells, order)
     off = np.abs(nodes - straight).max(axis=1) > 1e-12 * size
     return Curved(order, corners, cells, nodes, patch, off[cells].any(axis=1), folded)
@@ -163,6 +166,24 @@ def _carried_by_edges(moved: NDArray) -> NDArray:
         around = [np.isin(edge, face).all() for edge in EDGES]
         carried[:, f] = mean[:, around].sum(axis=1) / 2
     return carried
+
+
+def _cubic_faces(
+    corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
+) -> NDArray:
+    """(f, 3) displacements of faces' middle nodes; their other nodes are in place."""
+    # met at three points, where a quartic x^2, x = L_1 L_2 + L_2 L_3 + L_3 L_1, leaves
+    # the cubic that it has along the edges and the same integral as it: then what is
+    # left of a shape is to both sides alike
+    L = np.full((3, 3), _MET) + (1 - 3 * _MET) * np.eye(3)
+    N, _ = shape_functions(3, L)
+    places = N @ corners
+    number = np.arange(3 * len(corners)).reshape(-1, 3)
+    groups: list[tuple[tuple[int, ...], NDArray]] = [
+        ((int(p),), number[patch == p].ravel()) for p in np.unique(patch)
+    ]
+    goal = on_shapes(places.reshape(-1, 3), groups, shapes, reach)
+    return np.asarray((goal.reshape(-1, 3, 3) - places).mean(axis=1) / N[0, 9])
 
 
 def _without_folds(

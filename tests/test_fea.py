@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from stiffness.beam import beam_compliance, rectangular_section, round_section
-from stiffness.condense import KINDS, condense, rigid_motions
-from stiffness.elements import assemble, integration, lame, quadratic
-from stiffness.estimate import complementary_work, error_matrices
+from stiffness.condense import HELD, KINDS, condense, rigid_motions
+from stiffness.elements import assemble, integration, isoparametric, lame
 from stiffness.fea import (
     Budget,
     Material,
     PointMass,
-    estimated_error,
     interface_center,
     solve_link,
 )
 from stiffness.interface import parse_interface
+from stiffness.lagrange import lattice
+from stiffness.layers import layered, without_chords
 from stiffness.link import inverted, scaled
 from stiffness.mesh import Solid
 from stiffness.reading import BadInput
@@ -49,26 +49,34 @@ def crooked(rng):
     return Solid(points, solid.cells, solid.faces, solid.patch, solid.shapes)
 
 
-def curved_mesh():
-    mesh = quadratic(bar_solid(2, 4, 0.04, 0.2))
+def curved_mesh(order, layers=False):
+    solid = without_chords(bar_solid(1, 3, 0.04, 0.2), HELD["rigid"])
+    parts = layered(solid, HELD["rigid"]) if layers else None
+    mesh = isoparametric(solid, order, parts)
     assert mesh.curved.sum() > 30
     return mesh
 
 
-def solved(solid, kind="rigid", tip=None):
-    mesh = quadratic(solid)
+def solved(solid, order, kind="rigid", tip=None):
+    mesh = isoparametric(solid, order)
     top = solid.points[:, 2].max()
     middle = solid.points.mean(axis=0)
     centers = np.array([[*middle[:2], 0], [*middle[:2], top] if tip is None else tip])
     return mesh, condense(mesh, *constants(mesh), centers, kind)
 
 
+both_orders = pytest.mark.parametrize("order", [2, 3])
+
+
 # --- laws ----------------------------------------------------------------------------
 
 
-def test_six_rigid_motions_cost_nothing():
-    """Curved elements included: their shape functions hold linear fields exactly."""
-    mesh = curved_mesh()
+@pytest.mark.parametrize(
+    ("order", "layers"), [(2, False), (3, False), (2, True), (3, True)]
+)
+def test_six_rigid_motions_cost_nothing(order, layers):
+    """Curved and cut elements included: they hold linear fields exactly."""
+    mesh = curved_mesh(order, layers)
     K = full(assemble(mesh, *constants(mesh)))
     motions = rigid_motions(mesh.nodes, np.array([0.3, 0.2, 0.1])).reshape(-1, 6)
     # forces of a rigid motion against those of a strain of the same size
@@ -80,9 +88,14 @@ def test_six_rigid_motions_cost_nothing():
     assert values[6] > 0
 
 
-def test_a_linear_field_is_exact_on_any_mesh(rng):
+@pytest.mark.parametrize(
+    ("order", "layers"), [(2, False), (3, False), (2, True), (3, True)]
+)
+def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
     """The patch test: inner nodes find the linear field that the boundary has."""
-    mesh = quadratic(crooked(rng))
+    solid = without_chords(crooked(rng), HELD["rigid"])
+    parts = layered(solid, HELD["rigid"]) if layers else None
+    mesh = isoparametric(solid, order, parts)
     upper = assemble(mesh, *constants(mesh))
     slope = rng.normal(size=(3, 3))
     exact = mesh.nodes @ slope.T
@@ -108,8 +121,8 @@ def test_the_matrix_is_scikit_fems(curved, tol):
 
     solid = bar_solid(2, 4, 0.04, 0.2)
     straight = Solid(solid.points, solid.cells, solid.faces, solid.patch, (None,) * 3)
-    flat = quadratic(straight)
-    mesh = quadratic(solid) if curved else flat
+    flat = isoparametric(straight, 2)
+    mesh = isoparametric(solid, 2) if curved else flat
     ours = full(assemble(mesh, *constants(mesh)))
     theirs = skfem.MeshTet2.from_mesh(skfem.MeshTet(solid.points.T, solid.cells.T))
     ours_of_theirs = cKDTree(flat.nodes).query(theirs.doflocs.T)[1]
@@ -126,14 +139,43 @@ def test_the_matrix_is_scikit_fems(curved, tol):
     assert np.abs(difference).max() < tol * np.abs(ours).max()
 
 
-def test_stiffness_is_symmetric_definite_and_reciprocal():
-    _, solution = solved(bar_solid(2, 4, 0.04, 0.2))
+@both_orders
+def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
+    """A second road: the strain energy of u = A m, m all monomials of the degree, by
+    differentiating monomials and a tensor rule on the whole box."""
+    size = np.array([0.5, 0.6, 0.8])
+    mesh = isoparametric(box_solid((1, 2, 2), size), order)
+    powers = lattice(order)[:, 1:]
+    A = rng.normal(size=(len(powers), 3))
+    u = (mesh.nodes[:, None] ** powers).prod(axis=2) @ A
+    upper = assemble(mesh, *constants(mesh))
+    found = 2 * u.ravel() @ (upper @ u.ravel()) - u.ravel() ** 2 @ upper.diagonal()
+    point, weight = np.polynomial.legendre.leggauss(4)
+    grid = np.stack(np.meshgrid(point, point, point), axis=-1).reshape(-1, 3)
+    x = (1 + grid) / 2 * size
+    w = np.prod(np.stack(np.meshgrid(weight, weight, weight), axis=-1), axis=-1)
+    w = w.ravel() * size.prod() / 8
+    slope = np.zeros((len(x), 3, 3))
+    for k in range(3):
+        lower = powers - np.eye(3, dtype=int)[k]
+        grown = (x[:, None] ** np.maximum(lower, 0)).prod(axis=2) * powers[:, k]
+        slope[:, :, k] = grown @ A
+    strain = (slope + slope.swapaxes(1, 2)) / 2
+    trace = np.trace(strain, axis1=1, axis2=2)
+    energy = LAM * trace**2 + 2 * MU * (strain**2).sum(axis=(1, 2))
+    assert found == pytest.approx(w @ energy, rel=1e-12)
+
+
+@both_orders
+def test_stiffness_is_symmetric_definite_and_reciprocal(order):
+    _, solution = solved(bar_solid(2, 4, 0.04, 0.2), order)
     K = solution.stiffness
     np.testing.assert_allclose(K, K.T, atol=0)
     assert np.linalg.eigvalsh(scaled(K, K))[0] > 0.01
 
 
-def test_a_mirrored_link_has_the_mirrored_stiffness():
+@both_orders
+def test_a_mirrored_link_has_the_mirrored_stiffness(order):
     """x to -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
     solid = box_solid((2, 3, 3), (0.05, 0.08, 0.2))
     flipped = solid.points * [-1, 1, 1]
@@ -141,15 +183,16 @@ def test_a_mirrored_link_has_the_mirrored_stiffness():
     faces = solid.faces[:, [0, 2, 1]]
     mirror = Solid(flipped, cells, faces, solid.patch, solid.shapes)
     tip = np.array([0.01, 0.03, 0.2])
-    _, one = solved(solid, tip=tip)
-    _, other = solved(mirror, tip=tip * [-1, 1, 1])
+    _, one = solved(solid, order, tip=tip)
+    _, other = solved(mirror, order, tip=tip * [-1, 1, 1])
     signs = np.diag([1, -1, -1, -1, 1, 1])
     difference = scaled(signs @ one.stiffness @ signs - other.stiffness, one.stiffness)
     assert np.abs(difference).max() < 1e-11
 
 
+@both_orders
 @pytest.mark.parametrize("kind", KINDS)
-def test_turning_the_mesh_turns_the_stiffness(rng, kind):
+def test_turning_the_mesh_turns_the_stiffness(rng, kind, order):
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     R = rotation_matrix(rng.normal(size=3))
     turned = Solid(
@@ -159,15 +202,16 @@ def test_turning_the_mesh_turns_the_stiffness(rng, kind):
     A = np.kron(np.eye(2), R)
     K = []
     for each, places in ((solid, centers), (turned, centers @ R.T)):
-        mesh = quadratic(each)
+        mesh = isoparametric(each, order)
         K.append(condense(mesh, *constants(mesh), places, kind).stiffness)
     assert np.abs(scaled(A @ K[0] @ A.T - K[1], K[1])).max() < 1e-10
 
 
-def test_millimetres_give_the_same_link():
+@both_orders
+def test_millimetres_give_the_same_link(order):
     """Lengths times 1000, Pa as N/mm^2: N mm/rad and N/mm come out."""
-    mesh = quadratic(box_solid((2, 2, 3), (0.05, 0.08, 0.2)))
-    large = quadratic(box_solid((2, 2, 3), (50.0, 80.0, 200.0)))
+    mesh = isoparametric(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), order)
+    large = isoparametric(box_solid((2, 2, 3), (50.0, 80.0, 200.0)), order)
     tip = np.array([[0, 0, 0], [0.025, 0.04, 0.2]])
     small = condense(mesh, *constants(mesh), tip).stiffness
     lam, mu = (1e-6 * v for v in constants(large))
@@ -176,19 +220,21 @@ def test_millimetres_give_the_same_link():
     np.testing.assert_allclose(ratio, [1e3] * 3 + [1e-3] * 3, rtol=1e-10)
 
 
-def test_reading_at_another_tip_is_a_screw_map():
+@both_orders
+def test_reading_at_another_tip_is_a_screw_map(order):
     """The same mesh, K read elsewhere: K' = A^T K A with A from there to here."""
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     here, there = np.array([0.02, 0.04, 0.2]), np.array([0.1, -0.2, 0.3])
-    _, one = solved(solid, tip=here)
-    _, other = solved(solid, tip=there)
+    _, one = solved(solid, order, tip=here)
+    _, other = solved(solid, order, tip=there)
     A = screw_map(there - here)
     expected = A.T @ one.stiffness @ A
     assert np.abs(scaled(other.stiffness - expected, expected)).max() < 1e-11
 
 
-def test_superlu_and_pardiso_agree():
-    mesh = curved_mesh()
+@both_orders
+def test_superlu_and_pardiso_agree(order):
+    mesh = curved_mesh(order, layers=True)
     upper = assemble(mesh, *constants(mesh))
     free = np.ones(upper.shape[0], dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])[:, None] * 3 + np.arange(3)] = False
@@ -202,7 +248,7 @@ def test_superlu_and_pardiso_agree():
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
 def test_a_singular_matrix_is_reported(name):
     """SuperLU meets an empty column, PARDISO a negative pivot."""
-    mesh = quadratic(box_solid((1, 1, 1), (1, 1, 1)))
+    mesh = isoparametric(box_solid((1, 1, 1), (1, 1, 1)))
     upper = assemble(mesh, *constants(mesh))
     wrong = 0 * upper if name == "SuperLU" else -upper
     with pytest.raises(SolverFailed, match=f"{name} gave up"):
@@ -212,27 +258,33 @@ def test_a_singular_matrix_is_reported(name):
 # --- closed forms --------------------------------------------------------------------
 
 
-def test_distributing_ends_give_saint_venants_bar_exactly():
+@pytest.mark.parametrize(
+    ("order", "rings", "layers", "rel"), [(2, 3, 8, 5e-4), (3, 3, 6, 2e-6)]
+)
+def test_distributing_ends_give_saint_venants_bar_exactly(order, rings, layers, rel):
     """Tractions linear over the face: for moments, tension and torsion of a round bar
-    the exact solution is the beam's, with no end effect; the mesh's error is 1e-4."""
-    _, solution = solved(bar_solid(3, 8, 0.04, 0.2), "distributing-both")
+    the exact solution is the beam's, with no end effect; what is left is the circle's
+    error, h^4 of quadratic elements and h^6 of cubic ones."""
+    solid = bar_solid(rings, layers, 0.04, 0.2)
+    _, solution = solved(solid, order, "distributing-both")
     C = inverted(solution.stiffness)
     beam = beam_compliance(0.2, round_section(0.04, NU), E, NU, axis=[0, 0, 1])
     for i in (0, 1, 2, 5):
-        assert C[i, i] == pytest.approx(beam[i, i], rel=5e-4)
-    assert C[0, 4] == pytest.approx(beam[0, 4], rel=5e-4)
+        assert C[i, i] == pytest.approx(beam[i, i], rel=rel)
+    assert C[0, 4] == pytest.approx(beam[0, 4], rel=rel)
 
 
-def test_a_rigid_interface_is_stiffer_than_a_mean_and_that_than_two():
-    solid = bar_solid(2, 6, 0.04, 0.2)
-    rigid, one, two = (solved(solid, kind)[1].stiffness for kind in KINDS)
+@both_orders
+def test_a_rigid_interface_is_stiffer_than_a_mean_and_that_than_two(order):
+    solid = bar_solid(2, 4, 0.04, 0.2)
+    rigid, one, two = (solved(solid, order, kind)[1].stiffness for kind in KINDS)
     assert np.linalg.eigvalsh(scaled(rigid - one, rigid))[0] > -1e-9
     assert np.linalg.eigvalsh(scaled(one - two, rigid))[0] > -1e-9
 
 
 def test_the_papers_bar_with_a_distributing_tip():
-    """Converged reference: 1 020 060 N m/rad, reached from above; this mesh 5e-4."""
-    _, solution = solved(bar_solid(4, 40, 0.04, 0.452), "distributing")
+    """Converged reference: 1 020 060 N m/rad, reached from above."""
+    _, solution = solved(bar_solid(2, 16, 0.04, 0.452), 3, "distributing")
     assert 0 < solution.stiffness[0, 0] / 1020060 - 1 < 1e-3
 
 
@@ -242,7 +294,7 @@ def test_slender_bars_become_timoshenkos():
     lengths = np.array([0.4, 0.8, 1.6])
     for length in lengths:
         count = int(8 * length / 0.4)
-        _, solution = solved(bar_solid(3, count, 0.02, length))
+        _, solution = solved(bar_solid(2, count, 0.02, length), 3)
         beam = inverted(
             beam_compliance(length, round_section(0.02, NU), E, NU, axis=[0, 0, 1])
         )
@@ -251,10 +303,10 @@ def test_slender_bars_become_timoshenkos():
     assert slope == pytest.approx(-1, abs=0.15)
 
 
-def test_an_incompressible_like_bar_without_poisson_is_stretched_exactly():
+@both_orders
+def test_a_bar_without_poisson_is_stretched_and_bent_exactly(order):
     """nu = 0: nothing shrinks, so rigid ends disturb nothing; K_TZ = E A / L."""
-    solid = box_solid((2, 2, 4), (0.03, 0.05, 0.2))
-    mesh = quadratic(solid)
+    mesh = isoparametric(box_solid((2, 2, 4), (0.03, 0.05, 0.2)), order)
     lam, mu = lame(E, 0.0)
     ones = np.ones(len(mesh.cells))
     centers = np.array([[0.015, 0.025, 0], [0.015, 0.025, 0.2]])
@@ -269,7 +321,7 @@ def test_an_incompressible_like_bar_without_poisson_is_stretched_exactly():
     assert C[1, 1] == pytest.approx(beam[1, 1], rel=1e-10)
 
 
-# --- rates and error estimates -------------------------------------------------------
+# --- rates ---------------------------------------------------------------------------
 
 
 def harmonic_slope(x):
@@ -282,15 +334,16 @@ def harmonic_slope(x):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def test_strains_converge_with_the_square_of_the_mesh():
+@pytest.mark.parametrize(("order", "counts"), [(2, (6, 12)), (3, (4, 8))])
+def test_strains_converge_with_the_power_of_the_mesh(order, counts):
     """The gradient of a harmonic function is in equilibrium without body force.
 
     It is prescribed on the surface of a cube; quadratic elements leave an error of h^2
-    in the energy norm, h^4 in the energy: slope 2 within 0.1.
+    in the energy norm, h^4 in the energy: slope 2 within 0.1; cubic ones h^3.
     """
     errors = []
-    for n in (3, 6, 12):
-        mesh = quadratic(box_solid((n, n, n), (0.5, 0.5, 0.5)))
+    for n in counts:
+        mesh = isoparametric(box_solid((n, n, n), (0.5, 0.5, 0.5)), order)
         x = mesh.nodes
         grown, px, py = np.exp(5 * x[:, 2]), 3 * x[:, 0], 4 * x[:, 1]
         exact = grown[:, None] * np.column_stack([
@@ -306,60 +359,13 @@ def test_strains_converge_with_the_square_of_the_mesh():
         force = upper @ u + upper.T @ u - upper.diagonal() * u
         u[free] = solve(upper[free][:, free], -force[free][:, None])[:, 0]
         error = 0.0
-        for part, N, G, w in integration(mesh):
+        for part, _, _, N, G, w in integration(mesh):
             nodes = mesh.cells[part]
             slope = np.einsum("tqax,tai->tqix", G, u.reshape(-1, 3)[nodes])
             gap = slope - harmonic_slope(np.einsum("qa,tax->tqx", N, x[nodes]))
             error += np.einsum("tq,tqix,tqix->", w, gap, gap)
         errors.append(np.sqrt(error))
-    slope = -np.log2(errors[2] / errors[1])
-    assert slope == pytest.approx(2, abs=0.1)
-
-
-def test_recovered_errors_are_a_matrix_of_energies(rng):
-    """Symmetric and positive: a Gram matrix, like the true K_h - K."""
-    solid = bar_solid(2, 5, 0.04, 0.2)
-    mesh, solution = solved(solid)
-    lam, mu = constants(mesh)
-    each = error_matrices(mesh, solution.fields, lam, mu, len(solid.points))
-    total = each.sum(axis=0)
-    assert np.abs(scaled(total - total.T, total)).max() < 1e-12
-    assert np.linalg.eigvalsh(scaled(total, total))[0] > 0
-    # a linear stress field is recovered exactly: rigid motions leave no error
-    still = rigid_motions(mesh.nodes, np.zeros(3))
-    none = error_matrices(mesh, still, lam, mu, len(solid.points)).sum(axis=0)
-    assert np.abs(scaled(none, solution.stiffness)).max() < 1e-15
-
-
-def test_complementary_work_is_stress_times_strain(rng):
-    """Hooke's law there and back: s_i : D^-1 : s_j = s_i : e_j."""
-    strain = rng.normal(size=(3, 3, 3))
-    strain = strain + strain.swapaxes(1, 2)
-    trace = np.trace(strain, axis1=1, axis2=2)
-    stress = LAM * trace[:, None, None] * np.eye(3) + 2 * MU * strain
-    i, j = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
-    lam, mu = np.array([LAM]), np.array([MU])
-    found = complementary_work(stress[None, None, :, i, j], lam, mu)[0, 0]
-    expected = np.einsum("axy,bxy->ab", stress, strain)
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-3)
-
-
-def test_stiffness_falls_and_the_estimate_covers_the_fall():
-    """Uniform meshes of the paper's bar; K falls to 1 032 277 N m/rad from above."""
-    history, values = [], []
-    for n in (2, 4):
-        solid = bar_solid(n, 6 * n, 0.04, 0.452)
-        mesh, solution = solved(solid)
-        lam, mu = constants(mesh)
-        each = error_matrices(mesh, solution.fields, lam, mu, len(solid.points))
-        history.append((solution.stiffness, each.sum(axis=0)))
-        values.append(solution.stiffness[0, 0])
-    assert values[0] > values[1] > 1032277
-    error, factor = estimated_error(history)
-    true = values[1] / 1032277 - 1
-    estimate = -error[0, 0] / values[1]
-    assert true < estimate < 5 * true
-    assert 1 < factor < 12
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 
 
 # --- whole links ---------------------------------------------------------------------
@@ -453,10 +459,3 @@ def test_the_center_of_a_plane_is_its_areas_and_of_a_bore_its_point():
     )
     bore = parse_interface("bore=0,0,0.1/0,0,1/0.04")
     np.testing.assert_array_equal(interface_center(surface, bore, "tip"), [0, 0, 0.1])
-
-
-def test_volume_by_integration_is_the_true_cylinders():
-    """Curved elements: the polygon of 18 edges lacks 2 %, parabolas 1e-5 of it."""
-    mesh = quadratic(bar_solid(3, 4, 0.04, 0.2))
-    volume = sum(w.sum() for *_, w in integration(mesh))
-    assert volume == pytest.approx(np.pi * 0.04**2 * 0.2, rel=1e-4)

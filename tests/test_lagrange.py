@@ -112,7 +112,7 @@ def test_elements_share_the_nodes_of_what_they_share_and_no_others(order):
             assert len(np.intersect1d(numbers[i], numbers[j])) == expected
 
 
-@pytest.mark.parametrize("order", (2, 3))
+@pytest.mark.parametrize("order", [2, 3])
 def test_a_shared_node_has_one_place(order):
     """Each element would put it there itself, wherever it stands in its row; and the
     grid of a box has as many nodes as its finer grid."""
