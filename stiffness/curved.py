@@ -59,7 +59,7 @@ def curved(solid: Solid, order: int) -> Curved:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements, 1 to 3.
+        order: of the elements, 2 or 3.
 
     Returns:
         The elements; those that would fold somewhere are straightened by halves.
@@ -85,7 +85,7 @@ def curved(solid: Solid, order: int) -> Curved:
 
     if order == 2:
         nodes = bent(straight, cells[:, 4:])
-    elif order == 3:
+    else:
         pairs = cells[:, 4:16].reshape(-1, 6, 2)
         nodes[pairs] += _cubic_edges(solid.points[corners][:, EDGES], pairs, bent)
         moved = (np.abs(nodes - straight).max(axis=1) > 0)[cells].any(axis=1)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import csr_array
 
 from stiffness.curved import curved
 from stiffness.lagrange import (
@@ -35,7 +35,7 @@ from stiffness.lagrange import (
 from stiffness.layers import Parts, uncut
 from stiffness.mesh import Solid
 
-ORDER = 3  # cubic: a tenth of the unknowns of quadratic ones at 0.1 %
+ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
 _CHUNK = 3_600_000  # numbers of the elements' matrices at a time, 30 MB
 
 
@@ -44,7 +44,7 @@ class Elements:
     """A solid's isoparametric tetrahedra.
 
     Attributes:
-        order: of the polynomials, 1 to 3.
+        order: of the polynomials, 2 or 3.
         nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
@@ -89,7 +89,7 @@ def isoparametric(
 
     Args:
         solid: the straight tetrahedra.
-        order: of the polynomials, 1 to 3.
+        order: of the polynomials, 2 or 3.
         parts: of the tetrahedra, to be elements in their stead.
 
     Returns:
@@ -128,21 +128,22 @@ def isoparametric(
     )
 
 
-def integration(mesh: Elements, degree: int | None = None) -> Iterator[Chunk]:
+def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
     """Elements in chunks, with what integrals over them need.
 
     Args:
         mesh: the tetrahedra.
-        degree: of the rule; what the elements' stiffness needs if absent.
+        some: (t,) which of them; all if absent.
 
     Yields:
         A :class:`Chunk`.
     """
-    own = 2 * (mesh.order - 1)
-    for bent, natural in ((False, own), (True, own + 2)):
-        L, weights = quadrature(degree or natural)
+    straight = 2 * (mesh.order - 1)
+    some = np.ones(len(mesh.cells), dtype=bool) if some is None else some
+    for bent, degree in ((False, straight), (True, straight + 2)):
+        L, weights = quadrature(degree)
         N, dN = shape_functions(mesh.order, L)
-        members = np.flatnonzero(mesh.curved == bent)
+        members = np.flatnonzero(some & (mesh.curved == bent))
         step = max(1, _CHUNK // (9 * N.shape[1] ** 2))
         for first in range(0, len(members), step):
             part = members[first : first + step]
@@ -263,44 +264,75 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
     Returns:
         (3n, 3n) [N/m] the upper triangle; row 3 i + k is direction k of node i.
     """
-    cells, count = mesh.cells, len(mesh.nodes)
+    cells, count = mesh.cells, np.int64(len(mesh.nodes))
     a, b = np.triu_indices(cells.shape[1])
     row, column = cells[:, a], cells[:, b]
     swapped = row > column
-    code = np.minimum(row, column) * np.int64(count) + np.maximum(row, column)
+    code = np.minimum(row, column) * count + np.maximum(row, column)
     code, position = np.unique(code.ravel(), return_inverse=True)
     position = position.reshape(row.shape)
     values = np.zeros((9, len(code)))
-    for part, _, _, _, G, w in integration(mesh):
-        block = _node_blocks(G, w, lam[part], mu[part], a, b)
-        turned = swapped[part]
-        block[turned] = block[turned].transpose(0, 2, 1)
+    for part, block in _node_blocks(mesh, lam, mu, a, b):
+        turned = block.reshape(-1, 3, 3, len(a)).swapaxes(1, 2).reshape(block.shape)
+        block = np.where(swapped[part, None], turned, block)
         place = position[part].ravel()
         low, high = place.min(), place.max() + 1
-        for k, entries in enumerate(block.reshape(-1, 9).T):
+        for k in range(9):
+            entries = block[:, k].ravel()
             values[k, low:high] += np.bincount(place - low, entries, high - low)
-    start = np.searchsorted(code // count, np.arange(count + 1))
-    blocks = (values.T.reshape(-1, 3, 3), code % count, start)
-    whole = bsr_array(blocks, shape=(3 * count, 3 * count)).tocsr()
-    # a node's own block comes first: its second row loses one entry, its third two
-    first = whole.indptr[:-1].reshape(-1, 3)
-    upper = np.ones(whole.nnz, dtype=bool)
-    upper[[first[:, 1], first[:, 2], first[:, 2] + 1]] = False
-    lost = np.r_[0, np.cumsum(np.tile([0, 1, 2], count))]
-    kept = (whole.data[upper], whole.indices[upper], whole.indptr - lost)
-    return csr_array(kept, shape=whole.shape)
+    return _upper(values, code // count, code % count, int(count))
 
 
 def _node_blocks(
-    G: NDArray, w: NDArray, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
-) -> NDArray:
-    """(c, p, 3, 3) stiffness between the pairs a, b (p,) of nodes of each element."""
-    count, points, nodes, _ = G.shape
-    flat = (G * np.sqrt(w)[:, :, None, None]).reshape(count, points, 3 * nodes)
-    S = (flat.transpose(0, 2, 1) @ flat).reshape(count, nodes, 3, nodes, 3)
-    S = S[:, a, :, b, :].swapaxes(0, 1)  # [., p, i, j] = sum w G_ai G_bj
+    mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
+) -> Iterator[tuple[NDArray, NDArray]]:
+    """Indices (c,) of elements and the stiffness (c, 9, p) of the pairs a, b (p,) of
+    their nodes, 3 by 3 directions in one.
+    """
+    L, weights = quadrature(2 * (mesh.order - 1))
+    _, dN = shape_functions(mesh.order, L)
+    # integrals of products of derivatives in a straight element's own coordinates
+    own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
+    straight = np.flatnonzero(~mesh.curved)
+    step = max(1, _CHUNK // (9 * len(a)))
+    for first in range(0, len(straight), step):
+        part = straight[first : first + step]
+        corners = mesh.nodes[mesh.cells[part, :4]]
+        J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
+        inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))
+        # [c, i, j, x, y]: what G_ai G_bj has of the derivatives along x and y
+        turn = np.einsum("c,cxi,cyj->cijxy", size, inverse, inverse)
+        yield part, _hooke(turn.reshape(-1, 3, 3, 9), lam[part], mu[part]) @ own
+    for part, _, _, _, G, w in integration(mesh, mesh.curved):
+        count, points, nodes, _ = G.shape
+        flat = (G * np.sqrt(w)[:, :, None, None]).reshape(count, points, -1)
+        S = (flat.swapaxes(1, 2) @ flat).reshape(count, nodes, 3, nodes, 3)
+        S = S[:, a, :, b, :].transpose(1, 2, 3, 0)  # sum w G_ai G_bj
+        yield part, _hooke(S, lam[part], mu[part])
+
+
+def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
+    """(c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
     m = mu[:, None, None, None]
-    block = lam[:, None, None, None] * S + m * S.swapaxes(2, 3)
-    trace = np.trace(S, axis1=2, axis2=3)
-    block[..., range(3), range(3)] += m[:, 0] * trace[..., None]
-    return np.asarray(block)
+    block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
+    block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
+    return np.asarray(block.reshape(len(S), 9, -1))
+
+
+def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
+    """The upper triangle from blocks (9, k) of nodes' pairs, row by row in order."""
+    start = np.searchsorted(row, np.arange(count + 1))
+    width = np.diff(start)
+    # a node's own block comes first: its second row lacks one entry, its third two
+    indptr = np.zeros(3 * count + 1, dtype=np.int32)
+    lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)
+    indptr[1:] = np.cumsum(lengths.ravel())
+    data, indices = np.empty(indptr[-1]), np.empty(indptr[-1], dtype=np.int32)
+    further = 3 * (np.arange(len(row)) - start[row])
+    for i in range(3):
+        first = indptr[3 * row + i] + further - i
+        for j in range(3):
+            there = slice(None) if j >= i else np.flatnonzero(further)
+            data[first[there] + j] = values[3 * i + j, there]
+            indices[first[there] + j] = 3 * column[there] + j
+    return csr_array((data, indices, indptr), shape=(3 * count, 3 * count))

@@ -16,13 +16,14 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
 
     Args:
         solid: the straight tetrahedra.
-        mesh: the same with curved edges.
+        mesh: its elements, curved and with the layers along singular edges.
 
     Returns:
         ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
         elements; ``closed``, whether every edge of the boundary has two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
-        ``largest_angle`` [rad] between two faces of a tetrahedron.
+        ``largest_angle`` [rad] between two faces of a tetrahedron.  Quality and angles
+        are those of the tetrahedra before layers are cut off them, thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(solid.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)

@@ -19,6 +19,7 @@ from stiffness.beam_stress import peak_beam_stress
 from stiffness.elements import Elements, node_gradients, triangle_areas
 from stiffness.estimate import PAIRS
 from stiffness.fea import Level, MeshedLink
+from stiffness.layers import singular_edges
 from stiffness.reading import BadInput
 
 
@@ -31,19 +32,28 @@ class StressInfluence:
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
             of the tip's wrench.
         away: [m] nothing nearer than this to an interface is here.
+        inner_edges: how many of the nodes lie on inner edges without a fillet, where
+            the elastic stress is singular too.
     """
 
     places: NDArray
     influence: NDArray
     away: float
+    inner_edges: int = 0
 
     @property
     def region(self) -> str:
         """Where the stresses are from, in words."""
-        return (
+        words = (
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
         )
+        if self.inner_edges:
+            words += (
+                f"; {self.inner_edges} of them on inner edges without a fillet, where "
+                "stress is singular too and grows with the mesh's fineness"
+            )
+        return words
 
     def stresses(self, wrench: ArrayLike) -> NDArray:
         """Stresses of a tip wrench.
@@ -183,7 +193,10 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
         )
     per_screw = _nodal_stresses(level)[far]
     influence = np.einsum("pks,kw->pws", per_screw, solved.link.compliance)
-    return StressInfluence(mesh.nodes[far], influence, float(distance))
+    inner = np.unique(singular_edges(level.solid, ()))
+    return StressInfluence(
+        mesh.nodes[far], influence, float(distance), int(far[inner].sum())
+    )
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:

@@ -253,7 +253,7 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
     count = found["mesh"].get("elements", "?")
     return (
         f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
-        f"{html.escape(name)}{alike}, {count} quadratic tetrahedra, estimated error "
+        f"{html.escape(name)}{alike}, {count} cubic tetrahedra, estimated error "
         f"{100 * found['relative_error_estimate']:.2g} %. A solid held at a "
         "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
         "shear (Euler-Bernoulli) is stiffer than one with it: a few per cent between "
