@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.condense import condense
-from stiffness.elements import lame, quadratic
-from stiffness.estimate import error_matrices
-from stiffness.fea import Level, MeshedLink
+from stiffness.fea import Material, MeshedLink, solve_level
 from stiffness.link import LinkStiffness, inverted
 from stiffness.plot import plot_stress
 from stiffness.reading import BadInput
@@ -20,15 +17,10 @@ AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
 
 @pytest.fixture(scope="module")
 def solved():
-    solid = bar_solid(3, 20, R, L)
-    mesh = quadratic(solid)
-    material = np.tile([*lame(60e9, 0.3), 2700.0], (len(mesh.cells), 1))
-    lam, mu = material[:, 0], material[:, 1]
     centers = np.array([[0, 0, 0], [0, 0, L]])
-    solution = condense(mesh, lam, mu, centers)
-    errors = error_matrices(mesh, solution.fields, lam, mu, len(solid.points))
-    level = Level(solid, mesh, material, solution, errors)
-    C = inverted(solution.stiffness)
+    steel = [Material(60e9, 0.3, 2700.0)]
+    level = solve_level(bar_solid(2, 20, R, L), steel, centers, "rigid")
+    C = inverted(level.solution.stiffness)
     link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
     return MeshedLink(link, level, centers)
 
