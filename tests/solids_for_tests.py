@@ -55,6 +55,23 @@ def box_solid(counts, size):
     return _solid(unit * size, cells, size[2], None)
 
 
+def with_plane_sides(solid):
+    """The solid with a patch, a plane, for each flat part of its side that is known."""
+    corners = solid.points[solid.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    height = np.einsum("fx,fx->f", normal, corners[:, 0])
+    code = np.round(np.column_stack([normal, height / np.ptp(solid.points)]), 9) + 0.0
+    patch, shapes = solid.patch.copy(), list(solid.shapes[:2])
+    side = np.flatnonzero(patch == 2)
+    for each in np.unique(code[side], axis=0):
+        members = side[(code[side] == each).all(axis=1)]
+        patch[members] = len(shapes)
+        first = members[0]
+        shapes.append(Plane(corners[first, 0], normal[first]))
+    return Solid(solid.points, solid.cells, solid.faces, patch, tuple(shapes))
+
+
 def masked_solid(counts, size, keep):
     """A box without the grid cells whose centres are not to be kept."""
     unit, cells = box_cells(counts)

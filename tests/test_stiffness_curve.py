@@ -191,8 +191,7 @@ def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
 
 
 def test_a_thin_boxs_constants_are_those_of_finite_elements():
-    """Bredt's wall leaves the corners out: 3.9 % of J at wall / width = 1 / 12; at
-    1 / 24 finite elements leave half of that, 2.0 %."""
+    """Bredt's wall leaves the corners out: 3.5 % of J at wall / width = 1 / 12."""
     wall = 0.06 / 12
     found = measured_section(
         lambda L: masked_solid(
@@ -205,7 +204,7 @@ def test_a_thin_boxs_constants_are_those_of_finite_elements():
     section = box_section(0.06, 0.06, wall, NU)
     assert found["area"] == pytest.approx(section.area, rel=1e-9)
     assert found["I_x"] == pytest.approx(section.I_y, rel=1e-9)
-    assert found["J"] / section.J == pytest.approx(1.039, abs=0.005)
+    assert found["J"] / section.J == pytest.approx(1.035, abs=0.002)
 
 
 def test_thin_sections_by_hand():
