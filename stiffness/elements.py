@@ -286,9 +286,7 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
 def _node_blocks(
     mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Indices (c,) of elements and the stiffness (c, 9, p) of the pairs a, b (p,) of
-    their nodes, 3 by 3 directions in one.
-    """
+    """Indices (c,) of elements and stiffness (c, 9, p) of pairs a, b (p,) of nodes."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
     # integrals of products of derivatives in a straight element's own coordinates
