@@ -295,8 +295,8 @@ def test_finite_elements_fill_a_library_too(tmp_path):
     (file,) = build_library(spec)
     entry = read_entry(spec.folder, file.stem)
     ratio = entry.stiffness[2, 2] / exact(0.2, 0.03)[2, 2]
-    assert ratio == pytest.approx(1, abs=2e-3)
-    assert entry.about["mass"] == pytest.approx(2700 * np.pi * 0.03**2 * 0.2, rel=1e-3)
+    assert ratio == pytest.approx(1, abs=1e-5)
+    assert entry.about["mass"] == pytest.approx(2700 * np.pi * 0.03**2 * 0.2, rel=1e-5)
     assert len(entry.about["geometry"]) == 64
 
 

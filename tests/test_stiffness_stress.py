@@ -41,17 +41,17 @@ def test_von_mises_by_hand():
     ],
 )
 def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expected):
-    """Four radii from both ends the ends are forgotten (e^-4 a radius): 1 %, the
-    mesh's (recovered at nodes, elements of a third of the radius)."""
+    """Four radii from both ends the ends are forgotten (e^-4 a radius): 0.3 %,
+    the mesh's (averaged at nodes, elements of half the radius)."""
     stress = stress_influence(solved, away=4 * R)
-    assert stress.peak(wrench)[0] == pytest.approx(expected, rel=0.01)
+    assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 
 
 def test_a_pulled_bar_is_pulled_along_and_free_across(solved):
     """Components, since von Mises does not see a pressure: zz = F / A, xx = yy = 0."""
     stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
-    np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=0.01)
-    assert np.abs(stress[:, :2]).max() < 0.01 * 1e3 / AREA
+    np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
+    assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA
 
 
 def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
