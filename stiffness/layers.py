@@ -21,6 +21,7 @@ from stiffness.mesh import Solid, moved_onto_shapes
 from stiffness.refine import edges_of, split_edges
 
 SHARE = 0.25  # of an element's width that its layer takes; 0.15 to 0.3 do as well
+_PASSES = 100  # of halving chords; 3 to 12 do for the links of meshes/
 _INNER = np.cos(np.radians(35.0))  # a flatter inner edge is hardly singular
 # a prism's six corners so turned that the k-th comes first (Dompierre et al. 1999)
 _TURNS = np.array([
@@ -96,10 +97,10 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
 
     Returns:
         A solid whose tetrahedra touch the singular edges in nothing, a corner or an
-        edge.
+        edge; if a part needs more than a hundred passes, most of them do.
     """
     settled = False
-    while True:
+    for _ in range(_PASSES):
         count = len(solid.points)
         singular = _code(singular_edges(solid, held), count)
         touched = np.zeros(count, dtype=bool)
@@ -129,6 +130,7 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
         first = np.bincount(of_cell[own], minlength=len(ends))
         solid, _ = split_edges(solid, ends, of_cell, chord & (around == first))
         settled = False
+    return moved_onto_shapes(solid)
 
 
 def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
@@ -146,6 +148,9 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[singular_edges(solid, held)] = True
+    # should a tetrahedron touch more than an edge after all, its corners get no layer
+    while (crowded := touched[parts.corners].sum(axis=1) > 2).any():
+        touched[parts.corners[crowded]] = False
     on = touched[parts.corners]
     # the singular corners first; a right-hand order is not needed
     order = np.argsort(~on, axis=1, kind="stable")

@@ -164,63 +164,6 @@ def test_a_layer_of_another_share_is_as_thin():
     np.testing.assert_allclose(found, [0, 0.1, 0.9, 1])
 
 
-# --- bent ----------------------------------------------------------------------------
-
-
-def layers_of_bar(rings, layers, order):
-    held = HELD["rigid"]
-    solid = without_chords(bar_solid(rings, layers, 0.04, 0.2), held)
-    return isoparametric(solid, order), isoparametric(
-        solid, order, layered(solid, held)
-    )
-
-
-def side_errors(mesh):
-    """[1] by which the side's nodes leave the cylinder, of its radius."""
-    nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
-    return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
-
-
-def test_nodes_and_layers_follow_the_cylinder():
-    """Cubic elements leave it by the fourth power of their size, cut or not."""
-    found = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
-    for k in range(2):
-        coarse, fine = (side_errors(found[rings][k]).max() for rings in (2, 4))
-        assert coarse < 1e-3
-        assert coarse / fine > 0.9 * 2**4
-    for mesh in found[4]:
-        on = np.unique(mesh.faces[mesh.patch <= 1])
-        height = mesh.nodes[on, 2]
-        np.testing.assert_allclose(height, np.where(height > 0.1, 0.2, 0), atol=1e-15)
-
-
-def volume(mesh):
-    return sum(chunk.w.sum() for chunk in integration(mesh))
-
-
-def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """What is left of an arc lies to both sides of it, for edges and faces alike; the
-    quadratic elements' error falls with the fourth."""
-    exact = np.pi * 0.04**2 * 0.2
-    for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
-        error = [
-            volume(isoparametric(bar_solid(n, 2 * n, 0.04, 0.2), order)) / exact - 1
-            for n in (2, 4)
-        ]
-        assert np.log2(error[0] / error[1]) > power - 0.2
-        assert abs(error[1]) < least
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_cutting_layers_leaves_a_bent_element_as_it_is(order):
-    """Parts are cut in its own coordinates: the same volume, the same area."""
-    whole, cut = layers_of_bar(2, 4, order)
-    assert len(cut.cells) > len(whole.cells)
-    assert volume(cut) == pytest.approx(volume(whole), rel=1e-12)
-    area = [triangle_areas(m, m.faces)[1].sum() for m in (whole, cut)]
-    assert area[1] == pytest.approx(area[0], rel=1e-6)
-
-
 # --- nested spaces -------------------------------------------------------------------
 
 
