@@ -8,6 +8,7 @@ left of the error is that of interpolating the shapes.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count as steps
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,17 +195,18 @@ def _without_folds(
     suspects = np.flatnonzero((bent != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])
     dN = shape_functions(order, places)[1]
+    corners = straight[cells[:, :4]]
+    hand = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     folded = np.zeros(len(cells), dtype=bool)
-    for _ in range(4):
+    for step in steps():
         J = np.einsum("qai,tax->tqix", dN, nodes[cells[suspects]], optimize=True)
-        size = np.linalg.det(J)
-        size *= np.sign(size.sum(axis=1))[:, None]
+        size = np.linalg.det(J) * hand[suspects, None]
         bad = suspects[size.min(axis=1) < _FOLDED * size.max(axis=1)]
         if len(bad) == 0:
             break
         folded[bad] = True
         touched = np.unique(cells[bad])
-        nodes[touched] = (nodes[touched] + straight[touched]) / 2
-    else:
-        nodes[touched] = straight[touched]
+        # straight elements do not fold: in the end no more are left to be straightened
+        kept = 0.5 if step < 4 else 0.0
+        nodes[touched] += (1 - kept) * (straight - nodes)[touched]
     return nodes, folded

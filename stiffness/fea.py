@@ -405,7 +405,7 @@ def _wanted_growth(
         then, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
         fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
         rate = min(max(fell, 1.0), 2.0)  # what was gained on coarse meshes ends
-    return float(np.clip((1.08 * excess) ** (1 / rate), 1.2, 6.0))
+    return float(np.clip((1.3 * excess) ** (1 / rate), 1.2, 6.0))
 
 
 def _affordable_mesh(
