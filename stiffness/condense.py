@@ -20,8 +20,6 @@ from stiffness.screws import screw_map, skew
 from stiffness.solver import solve
 
 KINDS = ("rigid", "distributing", "distributing-both")
-# patches that stand still or move as one, by kind: stress at their edges is singular
-HELD = {"rigid": (0, 1), "distributing": (0,), "distributing-both": ()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from stiffness.beam import check_material
 from stiffness.body import PointMass, mass_properties
-from stiffness.condense import HELD, KINDS, Condensed, condense
+from stiffness.condense import KINDS, Condensed, condense
 from stiffness.curved import without_folds
 from stiffness.elements import ORDER, Elements, isoparametric, lame
 from stiffness.estimate import error_matrices, shape_errors
@@ -37,6 +37,7 @@ from stiffness.surface import Surface, read_surface
 _LOG = logging.getLogger(__name__)
 _BLIND = 2.0  # on a first mesh; measured 0.4 to 1.9 on the six links of meshes/
 _SAFETY = 1.3
+_ENDS = (0, 1)  # patches of base and tip; where loads are spread, tractions end there
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,15 +338,14 @@ def solve_level(
     Raises:
         BadInput: no material fills the link.
     """
-    held = HELD[interface]
-    solid = without_chords(without_folds(solid, ORDER), held)
-    parts = layered(solid, held)
+    solid = without_chords(without_folds(solid, ORDER), _ENDS)
+    parts = layered(solid, _ENDS)
     mesh = isoparametric(solid, ORDER, parts)
     material = _material_of_elements(mesh, materials)
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
-    on_edge[singular_edges(solid, held)] = True
+    on_edge[singular_edges(solid, _ENDS)] = True
     singular = on_edge[mesh.cells[:, :4]].any(axis=1)
     each = error_matrices(mesh, solution.fields, lam, mu, singular, solution.stiffness)
     errors, shape = np.zeros((2, len(solid.cells), 6, 6))

@@ -63,7 +63,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
 
     Args:
         solid: any.
-        held: patches that are clamped.
+        held: patches that are clamped or loaded.
 
     Returns:
         (e, 2) corners: the clamped patches' outlines, and the inner edges between
@@ -93,7 +93,7 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
 
     Args:
         solid: any.
-        held: patches that are clamped.
+        held: patches that are clamped or loaded.
 
     Returns:
         A solid whose tetrahedra touch the singular edges in nothing, a corner or an
@@ -138,7 +138,7 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
 
     Args:
         solid: of :func:`without_chords`.
-        held: patches that are clamped.
+        held: patches that are clamped or loaded.
         share: of each edge, from the singular end, that is the layer's.
 
     Returns:
