@@ -4,7 +4,7 @@ The nodes of straight elements lie on their lattices.  Those on the boundary's e
 moved onto the shapes of the patches there; the faces inside follow their edges, and the
 boundary's faces are then moved onto their own shapes.  So neighbours agree, and what is
 left of the error is that of interpolating the shapes.  Cubic edges and faces are placed
-so that it is to both sides alike: a volume's error falls with the elements' sixth power.
+so that it is to both sides alike: a volume's error falls with the sixth power of h.
 """
 
 from collections.abc import Callable
