@@ -147,8 +147,9 @@ def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
     """Peak stress of a link given by its surface."""
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import solve_link
     from stiffness.interface import parse_interface
+    from stiffness.material import Material
     from stiffness.stress import stress_influence, von_mises
     from stiffness.surface import read_surface
 

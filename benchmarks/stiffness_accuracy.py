@@ -17,11 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffness import fea
 from stiffness.compare import entries_that_matter
 from stiffness.condense import KINDS
+from stiffness.fea import Budget, first_mesh, interface_center
 from stiffness.interface import parse_interface
+from stiffness.level import estimated_error, finer, solve_level
 from stiffness.link import scaled
+from stiffness.material import Material
 from stiffness.screws import SCREW
 from stiffness.surface import read_surface
 
@@ -42,15 +44,15 @@ def levels(name, kind, most):
     """Stiffness, both indicated errors, unknowns and seconds of each mesh."""
     surface = read_surface(MESHES / f"{name}.stl")
     faces = [parse_interface(text) for text in LINKS[name]]
-    centers = np.array([fea.interface_center(surface, f, "face") for f in faces])
-    solid = fea.first_mesh(surface, *faces, fea.Budget())
+    centers = np.array([interface_center(surface, f, "face") for f in faces])
+    solid = first_mesh(surface, *faces, Budget())
     found = []
     while True:
         start = time.perf_counter()
-        level = fea.solve_level(solid, [fea.Material(60e9, 0.3)], centers, kind)
+        level = solve_level(solid, [Material(60e9, 0.3)], centers, kind)
         unknowns, seconds = level.solution.unknowns, time.perf_counter() - start
         found.append((*level.totals(), unknowns, seconds))
-        solid = fea._finer(level, 1.15)
+        solid = finer(level, 1.15)
         if len(found) == 6 or unknowns * len(solid.cells) > most * len(
             level.solid.cells
         ):
@@ -65,12 +67,12 @@ def report(name, kind, most):
         stored = json.loads(REFERENCES.read_text())[name]
         truth, unsure = np.array(stored["stiffness"]), stored["last_step"]
     else:
-        error, _ = fea.estimated_error(history)
-        truth, unsure = history[-1][0] + 0.85 / fea._SAFETY * error, 0.0
+        error, _ = estimated_error(history)
+        truth, unsure = history[-1][0] + 0.65 * error, 0.0
         found = found[:-1]
     for count, (K, _, _, unknowns, seconds) in enumerate(found, start=1):
         gap = np.abs(scaled(K - truth, truth))
-        told = np.abs(scaled(fea.estimated_error(history[:count])[0], K))
+        told = np.abs(scaled(estimated_error(history[:count])[0], K))
         if gap.max() < 3 * unsure:
             continue
         true, estimate = gap.max(), told.max()

@@ -75,7 +75,8 @@ def given(name):
 def ours(name, accuracy):
     """From the surface to K, and the last mesh once more by itself."""
     from stiffness.condense import condense
-    from stiffness.fea import Budget, Material, solve_link
+    from stiffness.fea import Budget, solve_link
+    from stiffness.material import Material
 
     surface, faces, _ = given(name)
     with tempfile.TemporaryDirectory() as folder:
@@ -108,21 +109,23 @@ def ngsolve(name, order, layers, finer):
 
 def quadratic(name, accuracy):
     """Quadratic elements whose true error is as asked, their K and unknowns."""
-    from stiffness import fea
     from stiffness.condense import condense
     from stiffness.elements import isoparametric
+    from stiffness.fea import Budget, first_mesh
     from stiffness.layers import layered
+    from stiffness.level import finer, solve_level
+    from stiffness.material import Material
 
     surface, faces, centers = given(name)
-    solid = fea.first_mesh(surface, *faces, fea.Budget())
+    solid = first_mesh(surface, *faces, Budget())
     while True:
-        level = fea.solve_level(solid, [fea.Material(60e9, 0.3)], centers, "rigid")
+        level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
         mesh = isoparametric(level.solid, 2, layered(level.solid, (0, 1)))
         lam, mu = level.material.T[:2]
         answer = condense(mesh, lam, mu, centers)
         if true_error(name, answer.stiffness) <= accuracy:
             return mesh, answer
-        solid = fea._finer(level, 1.3)
+        solid = finer(level, 1.3)
 
 
 def ccx(name, accuracy):

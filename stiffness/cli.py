@@ -167,7 +167,8 @@ def fea(
     json: Json = None,
 ) -> None:
     """K_E of a link by finite elements, refined to the asked accuracy."""
-    from stiffness.fea import Budget, Material, solve_link
+    from stiffness.fea import Budget, solve_link
+    from stiffness.material import Material
     from stiffness.parts import parse_mass, parse_part
     from stiffness.surface import read_surface
 
@@ -320,7 +321,8 @@ def stress(
 
     With a section, the beam formula stands beside it.
     """
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import solve_link
+    from stiffness.material import Material
     from stiffness.stress import peak_stress, stress_influence
     from stiffness.surface import read_surface
 

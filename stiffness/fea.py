@@ -1,15 +1,14 @@
 """A link's stiffness from its surface, by finite elements, with its error.
 
 The surface becomes tetrahedra, the tetrahedra a stiffness and an estimate of its error
-(:mod:`stiffness.estimate`); elements that contribute most are refined until the asked
-accuracy is reached or the budget is used.  What the elements indicate is scaled by what
-the last refinement did to the stiffness, compared with what it did to the indication.
+(:mod:`stiffness.level`); elements that contribute most are refined until the asked
+accuracy is reached or the budget is used.
 """
 
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,50 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.beam import check_material
 from stiffness.body import PointMass, mass_properties
-from stiffness.condense import KINDS, Condensed, condense
-from stiffness.curved import without_folds
-from stiffness.elements import ORDER, Elements, isoparametric, lame
-from stiffness.estimate import error_matrices, shape_errors
+from stiffness.condense import KINDS
 from stiffness.interface import Interface
-from stiffness.layers import layered, singular_edges, without_chords
+from stiffness.level import Level, estimated_error, finer, solve_level
 from stiffness.link import LinkStiffness, inverted, scaled
+from stiffness.material import Material
 from stiffness.mesh import MeshFailed, Solid, mesh_solid
 from stiffness.patches import triangles_on
 from stiffness.quality import mesh_report
 from stiffness.reading import BadInput, describe, nearest
-from stiffness.refine import refine
 from stiffness.solver import expected_cost, solver_name
 from stiffness.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
-_BLIND = 2.3  # on a first mesh; measured 0.5 to 2.2 (one thin plate) on thirteen parts
-_SAFETY = 1.3
-_ENDS = (0, 1)  # patches of base and tip; where loads are spread, tractions end there
-
-
-@dataclass(frozen=True, eq=False)
-class Material:
-    """An isotropic solid, and where in the link it is.
-
-    Attributes:
-        E: [Pa] Young's modulus.
-        nu: [-] Poisson's ratio.
-        density: [kg/m^3], 0 for a link without mass.
-        where: tells of points (n, 3) [m], in the mesh's axes, which are of it; the
-            last material that claims an element's centre has it.
-    """
-
-    E: float
-    nu: float
-    density: float = 0.0
-    where: Callable[[NDArray], NDArray] | None = None
-
-    def __post_init__(self) -> None:
-        check_material("material", self.E, self.nu)
-        if not (math.isfinite(self.density) and self.density >= 0):
-            raise BadInput(f"material: density = {self.density:g} must be >= 0")
 
 
 @dataclass(frozen=True)
@@ -76,36 +45,6 @@ class Budget:
     seconds: float = 300.0
     unknowns: int = 1_000_000
     levels: int = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One mesh's answer.
-
-    Attributes:
-        solid: straight tetrahedra.
-        mesh: cubic elements, parts of the tetrahedra along singular edges.
-        material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
-        solution: condensed stiffness and fields.
-        errors: (s, 6, 6) each of the solid's tetrahedra's estimated share of K_h - K,
-            before it is compared with another mesh's.
-        shape_errors: (s, 6, 6) the same for what the elements leave of the shapes.
-    """
-
-    solid: Solid
-    mesh: Elements
-    material: NDArray
-    solution: Condensed
-    errors: NDArray
-    shape_errors: NDArray
-
-    def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """(6, 6) the stiffness, its indicated error and that of the shapes."""
-        return (
-            self.solution.stiffness,
-            self.errors.sum(axis=0),
-            self.shape_errors.sum(axis=0),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,82 +259,6 @@ def first_mesh(
     return mesh(0.2)
 
 
-def solve_level(
-    solid: Solid, materials: Sequence[Material], centers: NDArray, interface: str
-) -> Level:
-    """Stiffness, fields and error shares of one mesh.
-
-    Args:
-        solid: straight tetrahedra; those that would fold when bent, or that touch two
-            singular edges, are halved first.
-        materials: the first fills the link, later ones where they say.
-        centers: (2, 3) [m] of base and tip.
-        interface: one of ``KINDS``.
-
-    Returns:
-        The answer, on cubic elements with a layer along the singular edges.
-
-    Raises:
-        BadInput: no material fills the link.
-    """
-    solid = without_chords(without_folds(solid, ORDER), _ENDS)
-    parts = layered(solid, _ENDS)
-    mesh = isoparametric(solid, ORDER, parts)
-    material = _material_of_elements(mesh, materials)
-    lam, mu = material[:, 0], material[:, 1]
-    solution = condense(mesh, lam, mu, centers, interface)
-    on_edge = np.zeros(len(mesh.nodes), dtype=bool)
-    on_edge[singular_edges(solid, _ENDS)] = True
-    singular = on_edge[mesh.cells[:, :4]].any(axis=1)
-    each = error_matrices(mesh, solution.fields, lam, mu, singular, solution.stiffness)
-    errors, shape = np.zeros((2, len(solid.cells), 6, 6))
-    np.add.at(errors, parts.parent, each)
-    off = shape_errors(mesh, solid.shapes, solution.fields, lam, mu)
-    np.add.at(shape, parts.parent[mesh.owner], off)
-    return Level(solid, mesh, material, solution, errors, shape)
-
-
-def _material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArray:
-    """(t, 3) lambda, mu and density at the elements' centres."""
-    if not materials:
-        raise BadInput("materials: at least one is needed")
-    centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
-    table = np.zeros((len(centers), 3))
-    for material in materials:
-        lam, mu = lame(material.E, material.nu)
-        where = material.where or (lambda points: np.ones(len(points), dtype=bool))
-        table[where(centers)] = lam, mu, material.density
-    if not (table[:, 1] > 0).all():
-        raise BadInput("materials: the first must fill the whole link")
-    return table
-
-
-def estimated_error(
-    history: Sequence[tuple[NDArray, NDArray, NDArray]],
-) -> tuple[NDArray, float]:
-    """Error of the last stiffness: what the elements indicate, scaled.
-
-    Args:
-        history: of each mesh, finest last, the totals of its :class:`Level`.
-
-    Returns:
-        (6, 6) estimate of the exact stiffness minus the last one, and the factor on
-        the indicated error that it uses: what the last refinement did to the stiffness
-        over what it did to the indicated error, and some more.
-    """
-    K, indicated, shape = history[-1]
-    factor = _BLIND
-    if len(history) > 1:
-        coarse, indicated_then, _ = history[-2]
-        # the entry that matters: the one with the largest error
-        worst = int(np.argmax(np.diag(indicated) / np.diag(K)))
-        fell = (indicated_then - indicated)[worst, worst]
-        proved = (coarse - K)[worst, worst] / fell if fell > 0 else _BLIND
-        factor = float(_SAFETY * np.clip(proved, 1.0, 2 * _BLIND))
-    # what leaves the shapes outward and inward may cancel in K, not in the estimate
-    return -factor * indicated - np.abs(shape), factor
-
-
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
@@ -413,13 +276,13 @@ def _affordable_mesh(
 ) -> Solid | None:
     """A finer mesh that the budget allows, of as many times the elements as wanted."""
     part = growth**0.55 - 1  # what neighbours add is about as much again
-    solid = _finer(level, 1 + part)
+    solid = finer(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:
         part *= (growth - 1) / added
-        solid = _finer(level, 1 + part)
+        solid = finer(level, 1 + part)
     for share in (1.0, 0.4, 0.1):
-        solid = solid if share == 1 else _finer(level, 1 + share * part)
+        solid = solid if share == 1 else finer(level, 1 + share * part)
         each = level.solution.unknowns / len(level.solid.cells)
         unknowns = int(each * len(solid.cells))
         memory, seconds = expected_cost(unknowns)
@@ -430,36 +293,6 @@ def _affordable_mesh(
         if unknowns <= budget.unknowns and spent + seconds <= budget.seconds:
             return solid
     return None
-
-
-def _finer(level: Level, growth: float) -> Solid:
-    """Halve the elements with the largest shares of the error.
-
-    Args:
-        level: the mesh to refine.
-        growth: of the count of elements, before neighbours are halved too (with them
-            it is about its square).
-
-    Returns:
-        The finer mesh.
-    """
-    shares = np.einsum(
-        "tii,i->t",
-        level.errors + np.abs(level.shape_errors),
-        1 / np.diag(level.solution.stiffness),
-    )
-    shares = np.maximum(shares, 1e-12 * shares.max())
-
-    def halvings(limit: float) -> NDArray:
-        # an element's share falls with h^4 to h^7: 1.5 halvings for each factor e^..
-        return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
-
-    low, high = -200.0, 200.0
-    for _ in range(50):
-        middle = (low + high) / 2
-        grown = (2.0 ** halvings(middle)).sum()
-        low, high = (middle, high) if grown > growth * len(shares) else (low, middle)
-    return refine(level.solid, halvings(high)).solid
 
 
 def _report(

@@ -214,8 +214,9 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
     if spec.method == "beam":
         C = curve_compliance(shape_beam(spec.shape, lengths, nu), E, nu)
         return LinkStiffness("Timoshenko beam", C, tip=tip, base=np.zeros(3)), ""
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import solve_link
     from stiffness.interface import parse_interface
+    from stiffness.material import Material
 
     surface = shape_surface(spec.shape, lengths)
     solved = solve_link(

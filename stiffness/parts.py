@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.body import PointMass
-from stiffness.fea import Material
+from stiffness.material import Material
 from stiffness.options import assignments, checked
 from stiffness.reading import BadInput, comma_numbers, describe
 

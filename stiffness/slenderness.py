@@ -96,8 +96,9 @@ def sweep_slenderness(
     Raises:
         BadInput: a section of another kind, or fewer than two lengths.
     """
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import solve_link
     from stiffness.interface import parse_interface
+    from stiffness.material import Material
 
     if frozenset(section) not in _SHAPES:
         raise BadInput(

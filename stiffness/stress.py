@@ -18,8 +18,9 @@ from stiffness.beam import section_axes
 from stiffness.beam_stress import peak_beam_stress
 from stiffness.elements import Elements, node_gradients, triangle_areas
 from stiffness.estimate import PAIRS
-from stiffness.fea import Level, MeshedLink
+from stiffness.fea import MeshedLink
 from stiffness.layers import singular_edges
+from stiffness.level import Level
 from stiffness.reading import BadInput
 
 

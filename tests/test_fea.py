@@ -4,19 +4,15 @@ import numpy as np
 import pytest
 
 from stiffness.beam import beam_compliance, rectangular_section, round_section
+from stiffness.body import PointMass
 from stiffness.condense import KINDS, condense, rigid_motions
 from stiffness.elements import assemble, integration, isoparametric, lame
-from stiffness.fea import (
-    Budget,
-    Material,
-    PointMass,
-    interface_center,
-    solve_link,
-)
+from stiffness.fea import Budget, interface_center, solve_link
 from stiffness.interface import parse_interface
 from stiffness.lagrange import lattice
 from stiffness.layers import layered, without_chords
 from stiffness.link import inverted, scaled
+from stiffness.material import Material
 from stiffness.mesh import Solid
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, screw_map

@@ -9,10 +9,11 @@ from stiffness.beam import beam_compliance, round_section
 from stiffness.condense import condense, rigid_motions
 from stiffness.elements import integration, isoparametric, lame
 from stiffness.estimate import error_matrices, shape_errors
-from stiffness.fea import Material, estimated_error, solve_level
 from stiffness.lagrange import lattice, quadrature
 from stiffness.layers import without_chords
+from stiffness.level import estimated_error, solve_level
 from stiffness.link import inverted, scaled
+from stiffness.material import Material
 from stiffness.shapes import Cone
 from tests.solids_for_tests import Z, bar_solid, box_solid
 

@@ -14,7 +14,7 @@ from stiffness.beam import beam_compliance, round_section
 from stiffness.cli import app
 from stiffness.curve import curve_compliance
 from stiffness.export import stiffness_for, translations_first
-from stiffness.fea import Material, estimated_error, solve_level
+from stiffness.level import estimated_error, solve_level
 from stiffness.library import (
     Entry,
     Spec,
@@ -27,6 +27,7 @@ from stiffness.library import (
     read_spec,
 )
 from stiffness.link import inverted, scaled
+from stiffness.material import Material
 from stiffness.parametric import SHAPES, shape_beam, shape_surface
 from stiffness.reading import BadInput
 from tests.solids_for_tests import bar_solid

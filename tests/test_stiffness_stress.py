@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from stiffness.fea import Material, MeshedLink, solve_level
+from stiffness.fea import MeshedLink
+from stiffness.level import solve_level
 from stiffness.link import LinkStiffness, inverted
+from stiffness.material import Material
 from stiffness.plot import plot_stress
 from stiffness.reading import BadInput
 from stiffness.results import stress_results, stress_text

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from assembly.robot import BeamLink, Frame, Robot, beam_axis
 from stiffness.beam import section_axes
-from stiffness.fea import Material, solve_link
+from stiffness.fea import solve_link
 from stiffness.interface import parse_interface
+from stiffness.material import Material
 from stiffness.surface import Surface
 
 FACETS = 64  # of the circle; the mesh's nodes lie on the circle itself

@@ -50,8 +50,9 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 def _solid(link: MeshLink) -> Solid:
     """The finest mesh of a link, with its stiffness matrix."""
     from stiffness.elements import assemble
-    from stiffness.fea import Material, solve_link
+    from stiffness.fea import solve_link
     from stiffness.interface import parse_interface
+    from stiffness.material import Material
     from stiffness.surface import read_surface
 
     base, tip = parse_interface(link.base), parse_interface(link.tip)
