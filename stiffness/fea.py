@@ -281,7 +281,7 @@ def _affordable_mesh(
     if not 0.85 < added / (growth - 1) < 1.08:
         part *= (growth - 1) / added
         solid = finer(level, 1 + part)
-    for share in (1.0, 0.4, 0.1):
+    for share in (1.0, 0.7, 0.4, 0.1):
         solid = solid if share == 1 else finer(level, 1 + share * part)
         each = level.solution.unknowns / len(level.solid.cells)
         unknowns = int(each * len(solid.cells))
