@@ -14,7 +14,7 @@ counted apart, by :func:`shape_errors`.
 
 Sources:
     Mavriplis (1990) for the decay of an element's own coefficients as an estimate;
-    Schwab (1998), p- and hp-Finite Element Methods, section 3.3 for the rate p^-b.
+    Schwab (1998), p- and hp-Finite Element Methods, for the rate p^-b.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from stiffness.shapes import Plane, Shape
 
 PAIRS = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _CHUNK = 1024  # faces at a time
-_SINGULAR = 1.2  # e_3 / s_3 at a singular edge; measured 0.9 to 1.5
+_SINGULAR = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
 # the share still to come over s_3 / s_2, for rates from p^-0.1 to p^-40
 _RATES = np.geomspace(40.0, 0.1, 400)
 _FELL = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)

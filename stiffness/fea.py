@@ -168,12 +168,11 @@ def solve_link(
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
-        finer = _affordable_mesh(
-            level, _wanted_growth(history, sizes, worst / accuracy), budget, start
-        )
-        if finer is None:
+        growth = _wanted_growth(history, sizes, worst / accuracy)
+        solid = _affordable_mesh(level, growth, budget, start)
+        if solid is None:
             break
-        level = solve_level(finer, materials, centers, interface)
+        level = solve_level(solid, materials, centers, interface)
         history.append(level.totals())
         sizes.append(len(level.solid.cells))
     report = _report(level, surface, len(history), start) | {
