@@ -133,7 +133,8 @@ def link_text(link: LinkStiffness) -> str:
         f"the asked {mesh['accuracy']:g} was {asked}",
         f"mesh: {mesh['elements']} elements, {mesh['unknowns']} unknowns, "
         f"volume {mesh['volume']:.6g} m^3 (surface {mesh['surface_volume']:.6g}), "
-        f"{'closed' if mesh['closed'] else 'OPEN'}, {mesh['meshes']} meshes, "
+        f"{'closed' if mesh['closed'] else 'OPEN'}, "
+        f"{mesh['meshes']} mesh{'es' if mesh['meshes'] > 1 else ''}, "
         f"{mesh['solver']}, {mesh['seconds']:.1f} s",
         f"elements: quality {mesh['worst_quality']:.2f} at worst, "
         f"{mesh['mean_quality']:.2f} on average (1 is a regular one); angles between "

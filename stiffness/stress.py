@@ -33,14 +33,14 @@ class StressInfluence:
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
             of the tip's wrench.
         away: [m] nothing nearer than this to an interface is here.
-        inner_edges: how many of the nodes lie on inner edges without a fillet, where
-            the elastic stress is singular too.
+        inner_edges: whether some of the nodes lie on inner edges without a fillet,
+            where the elastic stress is singular too.
     """
 
     places: NDArray
     influence: NDArray
     away: float
-    inner_edges: int = 0
+    inner_edges: bool = False
 
     @property
     def region(self) -> str:
@@ -51,8 +51,8 @@ class StressInfluence:
         )
         if self.inner_edges:
             words += (
-                f"; {self.inner_edges} of them on inner edges without a fillet, where "
-                "stress is singular too and grows with the mesh's fineness"
+                "; some of them on inner edges without a fillet, where stress is "
+                "singular too and grows with the mesh's fineness"
             )
         return words
 
@@ -196,7 +196,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     influence = np.einsum("pks,kw->pws", per_screw, solved.link.compliance)
     inner = np.unique(singular_edges(level.solid, ()))
     return StressInfluence(
-        mesh.nodes[far], influence, float(distance), int(far[inner].sum())
+        mesh.nodes[far], influence, float(distance), bool(far[inner].any())
     )
 
 

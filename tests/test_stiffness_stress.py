@@ -11,7 +11,7 @@ from stiffness.plot import plot_stress
 from stiffness.reading import BadInput
 from stiffness.results import stress_results, stress_text
 from stiffness.stress import peak_stress, stress_influence, von_mises
-from tests.solids_for_tests import bar_solid
+from tests.solids_for_tests import bar_solid, masked_solid, with_plane_sides
 
 R, L = 0.04, 0.4
 AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
@@ -25,6 +25,27 @@ def solved():
     C = inverted(level.solution.stiffness)
     link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
     return MeshedLink(link, level, centers)
+
+
+def notched(keep):
+    """Stresses in a column of four boxes by two by two, of which some are kept."""
+    solid = with_plane_sides(masked_solid((2, 2, 4), (0.1, 0.1, 0.4), keep))
+    centers = np.array([[0.05, 0.05, 0], [0.05, 0.05, 0.4]])
+    level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
+    link = LinkStiffness("test", inverted(level.solution.stiffness),
+                         tip=centers[1], base=centers[0])  # fmt: skip
+    return stress_influence(MeshedLink(link, level, centers), away=0.05)
+
+
+def test_inner_edges_without_a_fillet_are_named():
+    """A notch in the column's middle has two; a whole column has none, and neither
+    do its clamped outlines count, which are further away than is looked."""
+    whole = notched(lambda x: np.full(len(x), True))
+    notch = notched(lambda x: (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1))
+    assert not whole.inner_edges
+    assert "inner edges" not in whole.region
+    assert notch.inner_edges
+    assert "inner edges without a fillet" in notch.region
 
 
 def test_von_mises_by_hand():
