@@ -112,7 +112,7 @@ def quadratic(name, accuracy):
     from stiffness.condense import condense
     from stiffness.elements import isoparametric
     from stiffness.fea import Budget, first_mesh
-    from stiffness.layers import layered
+    from stiffness.layers import ENDS, layered
     from stiffness.level import finer, solve_level
     from stiffness.material import Material
 
@@ -120,7 +120,7 @@ def quadratic(name, accuracy):
     solid = first_mesh(surface, *faces, Budget())
     while True:
         level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
-        mesh = isoparametric(level.solid, 2, layered(level.solid, (0, 1)))
+        mesh = isoparametric(level.solid, 2, layered(level.solid, ENDS))
         lam, mu = level.material.T[:2]
         answer = condense(mesh, lam, mu, centers)
         if true_error(name, answer.stiffness) <= accuracy:

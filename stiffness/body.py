@@ -37,7 +37,7 @@ def mass_properties(
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-    for part, _, _, N, _, w in integration(mesh):
+    for part, _, _, N, _, w in integration(mesh, density > 0):
         x = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         x, dm = x - origin, w * density[part, None]
         mass += float(dm.sum())

@@ -38,17 +38,13 @@ class Curved:
     """A solid's elements, bent.
 
     Attributes:
-        order: of the polynomials, 2 or 3.
-        corners: (t, 4) corners of the solid's tetrahedra in rising order.
-        cells: (t, m) nodes of each.
+        cells: (t, m) nodes of each tetrahedron, its corners in rising order.
         nodes: (n, 3) [m].
         patch: (t, 4) patch of each face, in the order of ``FACES``; -1 inside.
         bent: (t,) whether an element is not straight.
         folded: (t,) whether it had to be straightened so as not to fold.
     """
 
-    order: int
-    corners: NDArray
     cells: NDArray
     nodes: NDArray
     patch: NDArray
@@ -96,7 +92,7 @@ def curved(solid: Solid, order: int) -> Curved:
         nodes[members[:, 9]] += _cubic_faces(*faces, solid.shapes, reach)
     nodes, folded = _without_folds(straight, nodes, cells, order)
     off = np.abs(nodes - straight).max(axis=1) > 1e-12 * size
-    return Curved(order, corners, cells, nodes, patch, off[cells].any(axis=1), folded)
+    return Curved(cells, nodes, patch, off[cells].any(axis=1), folded)
 
 
 def patches_of_cells(solid: Solid, corners: NDArray) -> NDArray:

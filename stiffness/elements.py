@@ -144,13 +144,18 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
         L, weights = quadrature(degree)
         N, dN = shape_functions(mesh.order, L)
         members = np.flatnonzero(some & (mesh.curved == bent))
-        step = max(1, _CHUNK // (9 * N.shape[1] ** 2))
-        for first in range(0, len(members), step):
-            part = members[first : first + step]
+        for part in _chunks(members, N.shape[1]):
             J = _jacobians(dN, mesh.nodes[mesh.cells[part]])
             G = dN @ np.linalg.inv(J)
             w = weights * np.abs(np.linalg.det(J))
             yield Chunk(part, L, weights, N, G, w)
+
+
+def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
+    """Some elements of so many nodes at a time, as many as memory is meant for."""
+    step = max(1, _CHUNK // (9 * nodes**2))
+    for first in range(0, len(members), step):
+        yield members[first : first + step]
 
 
 def gradients_on_faces(
@@ -166,25 +171,22 @@ def gradients_on_faces(
         Places (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
         gradients (f, q, m, 3) [1/m] of the owners' shape functions.
     """
-    N, dN, weights = triangle_rule(mesh.order)
-    flat = mesh.nodes[mesh.faces[faces]]
-    J = np.einsum("qai,tax->tqix", dN, flat)
-    normal = np.cross(J[:, :, 0], J[:, :, 1])
-    size = np.linalg.norm(normal, axis=2)
-    places = np.einsum("qa,tax->tqx", N, flat)
+    N, area = _face_vectors(mesh, mesh.faces[faces])
+    size = np.linalg.norm(area, axis=2)
+    places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.faces[faces]])
     cells = mesh.cells[mesh.owner[faces]]
     inner = mesh.nodes[cells].mean(axis=1)[:, None]
-    outward = np.sign(np.einsum("tqx,tqx->tq", normal, places - inner))
+    outward = np.sign(np.einsum("tqx,tqx->tq", area, places - inner))
     G = np.zeros((*size.shape, cells.shape[1], 3))
     corners = mesh.faces[faces, :3]
     for side in FACES:
         members = np.flatnonzero((cells[:, side] == corners).all(axis=1))
-        L = np.zeros((len(weights), 4))
+        L = np.zeros((len(N), 4))
         L[:, side] = quadrature(2 * mesh.order, corners=3)[0]
         slope = shape_functions(mesh.order, L)[1]
         J = _jacobians(slope, mesh.nodes[cells[members]])
         G[members] = slope @ np.linalg.inv(J)
-    return places, normal * (outward / size)[..., None], weights * size, G
+    return places, area * (outward / size)[..., None], size, G
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
@@ -205,9 +207,7 @@ def node_gradients(mesh: Elements) -> Iterator[tuple[NDArray, NDArray]]:
         direction.
     """
     dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
-    step = max(1, _CHUNK // (9 * dN.shape[1] ** 2))
-    for first in range(0, len(mesh.cells), step):
-        part = np.arange(first, min(first + step, len(mesh.cells)))
+    for part in _chunks(np.arange(len(mesh.cells)), dN.shape[1]):
         yield part, dN @ np.linalg.inv(_jacobians(dN, mesh.nodes[mesh.cells[part]]))
 
 
@@ -221,9 +221,15 @@ def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
     Returns:
         Shape functions (q, k) at the quadrature points and weights (f, q) [m^2].
     """
+    N, area = _face_vectors(mesh, faces)
+    return N, np.linalg.norm(area, axis=2)
+
+
+def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
+    """Shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
     N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
-    return N, np.linalg.norm(np.cross(J[:, :, 0], J[:, :, 1]), axis=2) * weights
+    return N, np.cross(J[:, :, 0], J[:, :, 1]) * weights[:, None]
 
 
 def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -291,10 +297,7 @@ def _node_blocks(
     _, dN = shape_functions(mesh.order, L)
     # integrals of products of derivatives in a straight element's own coordinates
     own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
-    straight = np.flatnonzero(~mesh.curved)
-    step = max(1, _CHUNK // (9 * len(a)))
-    for first in range(0, len(straight), step):
-        part = straight[first : first + step]
+    for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
         corners = mesh.nodes[mesh.cells[part, :4]]
         J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
         inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))

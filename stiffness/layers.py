@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.mesh import Solid, moved_onto_shapes
-from stiffness.refine import edges_of, split_edges
+from stiffness.refine import agreed, edge_code, edges_of, ranked, split_edges
 
+ENDS = (0, 1)  # patches of base and tip; where loads are spread, tractions end there
 SHARE = 0.25  # of an element's width that its layer takes; 0.15 to 0.3 do as well
 _PASSES = 100  # of halving chords; 3 to 12 do for the links of meshes/
 _INNER = np.cos(np.radians(35.0))  # a flatter inner edge is hardly singular
@@ -69,9 +70,9 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
         (e, 2) corners: the clamped patches' outlines, and the inner edges between
         patches that meet at more than 215 degrees.
     """
-    count = np.int64(len(solid.points))
+    count = len(solid.points)
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
-    code = (pairs[..., 0] * count + pairs[..., 1]).ravel()
+    code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
     # at an edge of four faces two bodies touch: whichever pairs, the edge stays one
@@ -102,17 +103,17 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
     settled = False
     for _ in range(_PASSES):
         count = len(solid.points)
-        singular = _code(singular_edges(solid, held), count)
+        singular = edge_code(singular_edges(solid, held), count)
         touched = np.zeros(count, dtype=bool)
         touched[singular // count] = touched[singular % count] = True
         ends, of_cell = edges_of(solid.cells, count)
         chord = touched[ends].all(axis=1)
-        length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
+        rank = ranked(solid.points, ends)
         # a triangle of singular edges only: its longest has to be halved as well
         closed = chord[of_cell].sum(axis=1) > 2
-        widest = np.where(chord, length, -1.0)[of_cell].argmax(axis=1)
+        widest = np.where(chord, rank, -1)[of_cell].argmax(axis=1)
         widest = of_cell[np.arange(len(of_cell)), widest]
-        chord &= ~np.isin(_code(ends, count), singular)
+        chord &= ~np.isin(edge_code(ends, count), singular)
         closed &= ~chord[of_cell].any(axis=1)
         chord[widest[closed]] = True
         if not chord.any():
@@ -121,14 +122,11 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
             solid, settled = moved_onto_shapes(solid), True
             continue
         # the longest first: one that is the longest chord of all its tetrahedra
-        rank = np.empty(len(ends), dtype=int)
-        rank[np.lexsort((np.arange(len(ends)), length))] = np.arange(len(ends))
         rank[~chord] = -1
         longest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(longest, 0)[:, None]
-        around = np.bincount(of_cell.ravel(), minlength=len(ends))
-        first = np.bincount(of_cell[own], minlength=len(ends))
-        solid, _ = split_edges(solid, ends, of_cell, chord & (around == first))
+        split = chord & agreed(of_cell, of_cell[own], len(ends))
+        solid, _ = split_edges(solid, ends, of_cell, split)
         settled = False
     return moved_onto_shapes(solid)
 
@@ -160,14 +158,14 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
     spokes = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
     cut = np.unique(
         np.concatenate([
-            _code(corners[kinds == k][:, pairs].reshape(-1, 2), count)
+            edge_code(corners[kinds == k][:, pairs].reshape(-1, 2), count)
             for k, pairs in spokes.items()
         ])
     )
     found = [(corners[kinds == 0], places[kinds == 0], parts.parent[kinds == 0])]
     for kind, pairs in spokes.items():
         own, near = corners[kinds == kind], places[kinds == kind]
-        new = count + np.searchsorted(cut, _code(own[:, pairs], count))
+        new = count + np.searchsorted(cut, edge_code(own[:, pairs], count))
         start, end = np.array(pairs).T
         between = (1 - share) * near[:, start] + share * near[:, end]
         own, near = np.hstack([own, new]), np.concatenate([near, between], axis=1)
@@ -182,11 +180,6 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
     order = np.argsort(corners, axis=1)
     corners = np.take_along_axis(corners, order, axis=1)
     return Parts(corners, np.take_along_axis(places, order[:, :, None], axis=1), parent)
-
-
-def _code(ends: NDArray, count: int) -> NDArray:
-    """One number for each pair of corners, whose order counts."""
-    return np.asarray(ends[..., 0] * np.int64(count) + ends[..., 1])
 
 
 def _of_corner(numbers: NDArray) -> NDArray:

@@ -14,14 +14,13 @@ from stiffness.condense import Condensed, condense
 from stiffness.curved import without_folds
 from stiffness.elements import ORDER, Elements, isoparametric
 from stiffness.estimate import error_matrices, shape_errors
-from stiffness.layers import layered, singular_edges, without_chords
+from stiffness.layers import ENDS, layered, singular_edges, without_chords
 from stiffness.material import Material, material_of_elements
 from stiffness.mesh import Solid
 from stiffness.refine import refine
 
 _BLIND = 2.3  # on a first mesh; measured 0.3 to 2.2 (a thin plate) on seventeen parts
 _SAFETY = 1.3
-_ENDS = (0, 1)  # patches of base and tip; where loads are spread, tractions end there
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +71,14 @@ def solve_level(
     Raises:
         BadInput: no material fills the link.
     """
-    solid = without_chords(without_folds(solid, ORDER), _ENDS)
-    parts = layered(solid, _ENDS)
+    solid = without_chords(without_folds(solid, ORDER), ENDS)
+    parts = layered(solid, ENDS)
     mesh = isoparametric(solid, ORDER, parts)
     material = material_of_elements(mesh, materials)
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
-    on_edge[singular_edges(solid, _ENDS)] = True
+    on_edge[singular_edges(solid, ENDS)] = True
     singular = on_edge[mesh.cells[:, :4]].any(axis=1)
     each = error_matrices(mesh, solution.fields, lam, mu, singular, solution.stiffness)
     errors, shape = np.zeros((2, len(solid.cells), 6, 6))

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.elements import Elements, integration, triangle_areas
+from stiffness.lagrange import EDGES
 from stiffness.mesh import Solid
-
-_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
@@ -52,7 +51,7 @@ def element_quality(solid: Solid) -> NDArray:
         of the root mean square edge.
     """
     corners = solid.points[solid.cells]
-    i, j = _EDGES.T
+    i, j = EDGES.T
     mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
     return 6 * np.sqrt(2) * solid.volumes() / mean_square**1.5
 
@@ -68,7 +67,7 @@ def dihedral_angles(solid: Solid) -> NDArray:
     """
     corners = solid.points[solid.cells]
     found = []
-    for i, j in _EDGES:
+    for i, j in EDGES:
         k, l = (v for v in range(4) if v not in (i, j))
         along = corners[:, j] - corners[:, i]
         # what is left of the way to the other corners, across the edge

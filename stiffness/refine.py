@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.lagrange import EDGES
 from stiffness.mesh import Solid, moved_onto_shapes
 
-_TETRA = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 _TRIANGLE = np.array([[0, 1], [1, 2], [0, 2]])
 
 
@@ -69,11 +69,10 @@ def split_edges(
     middle = np.full(len(ends), -1)
     middle[split] = count + np.arange(split.sum())
     points = np.concatenate([solid.points, solid.points[ends[split]].mean(axis=1)])
-    code = ends[:, 0] * np.int64(count) + ends[:, 1]
     pairs = np.sort(solid.faces[:, _TRIANGLE], axis=2)
-    of_face = np.searchsorted(code, pairs[..., 0] * np.int64(count) + pairs[..., 1])
+    of_face = np.searchsorted(edge_code(ends, count), edge_code(pairs, count))
     faces, face_row = _halved(solid.faces, middle[of_face], _TRIANGLE)
-    cells, row = _halved(solid.cells, middle[of_cell], _TETRA)
+    cells, row = _halved(solid.cells, middle[of_cell], EDGES)
     patch = np.r_[solid.patch, solid.patch[face_row]]
     return Solid(points, cells, faces, patch, solid.shapes), row
 
@@ -88,21 +87,61 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
     Returns:
         Ends (e, 2), the smaller number first, in order; the edges (t, 6) of each cell.
     """
-    ends = np.sort(cells[:, _TETRA].reshape(-1, 2), axis=1)
-    code, index = np.unique(
-        ends[:, 0] * np.int64(points) + ends[:, 1], return_inverse=True
-    )
+    ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
+    code, index = np.unique(edge_code(ends, points), return_inverse=True)
     ends = np.column_stack([code // points, code % points])
     return ends, index.reshape(-1, 6)
+
+
+def edge_code(ends: NDArray, points: int) -> NDArray:
+    """One number for each pair of corners, whose order counts.
+
+    Args:
+        ends: (..., 2) corners.
+        points: how many corners there are.
+
+    Returns:
+        (...) ; pairs in order have rising numbers.
+    """
+    return np.asarray(ends[..., 0] * np.int64(points) + ends[..., 1])
+
+
+def ranked(points: NDArray, ends: NDArray) -> NDArray:
+    """Edges in the order of their lengths.
+
+    Args:
+        points: (n, 3) [m].
+        ends: (e, 2) corners.
+
+    Returns:
+        (e,) each edge's place, 0 the shortest; of equal ones the first is lower.
+    """
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    rank = np.empty(len(ends), dtype=int)
+    rank[np.lexsort((np.arange(len(ends)), length))] = np.arange(len(ends))
+    return rank
+
+
+def agreed(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
+    """Edges that all tetrahedra around them have chosen.
+
+    Args:
+        of_cell: (t, 6) of :func:`edges_of`.
+        chosen: one edge of each tetrahedron that chooses.
+        edges: how many there are.
+
+    Returns:
+        (e,) booleans.
+    """
+    around = np.bincount(of_cell.ravel(), minlength=edges)
+    return np.asarray(around == np.bincount(chosen, minlength=edges))
 
 
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
     """(e,) edges to split now: longest in all their cells, in a wanted one's way."""
-    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
-    rank = np.empty(len(ends), dtype=int)
-    rank[np.lexsort((np.arange(len(ends)), length))] = np.arange(len(ends))
+    rank = ranked(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
     ).ravel()
@@ -113,9 +152,7 @@ def _terminal_edges(
         if marked[reached].all():
             break
         marked[reached] = True
-    around = np.bincount(of_cell.ravel(), minlength=len(ends))
-    first = np.bincount(longest, minlength=len(ends))
-    return marked & (around == first)
+    return marked & agreed(of_cell, longest, len(ends))
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
