@@ -43,10 +43,13 @@ def follow_all(
     """
     count, n = held.shape
     ends, progress = np.empty((count, n)), np.empty(count)
+    pose = np.empty(6)
     for i in range(count):
-        ends[i], progress[i] = _follow(
-            parents, kinds, fixed, carries, pairs, platform, start,
-            poses[i] if len(poses) else np.full(6, np.nan), held[i], size, steps,
+        for k in range(6):
+            pose[k] = poses[i, k] if len(poses) else np.nan
+        progress[i] = _follow(
+            parents, kinds, fixed, carries, pairs, platform, start, pose, held[i],
+            size, steps, ends[i],
         )  # fmt: skip
     return ends, progress
 
@@ -55,14 +58,15 @@ def follow_all(
 def _follow(
     parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
     platform: int, start: NDArray, pose: NDArray, held: NDArray, size: float,
-    steps: int,
-) -> tuple[NDArray, float]:  # fmt: skip
-    """One target: steps that halve where Newton fails and double where it does not."""
-    q = start.copy()
+    steps: int, q: NDArray,
+) -> float:  # fmt: skip
+    """One target, q: steps that halve where Newton fails, double where it does not."""
+    for j in range(len(q)):
+        q[j] = start[j]
     R, p = forward(parents, kinds, fixed, q)
-    home_pose = np.empty(6)
-    home_pose[:3] = p[platform]
-    home_pose[3:] = rotation_log(R[platform])
+    home_pose, turn = np.empty(6), rotation_log(R[platform])
+    for k in range(3):
+        home_pose[k], home_pose[3 + k] = p[platform, k], turn[k]
     done, step = 0.0, 1.0 / steps
     part, part_held = np.empty(6), np.empty(len(q))
     farthest = _JUMP * max(1.0, size)
@@ -79,13 +83,18 @@ def _follow(
         tried, fine = _newton(
             parents, kinds, fixed, carries, pairs, platform, q, part, part_held, size
         )
+        for j in range(len(q)):
+            # a jump, or a coordinate that is no number: another assembly mode
+            fine = fine and (steps == 1 or abs(tried[j] - q[j]) < farthest)
+        if fine or steps == 1:
+            for j in range(len(q)):
+                q[j] = tried[j]
         if steps == 1:
-            return tried, 1.0 if fine else 0.0
-        fine = fine and np.abs(tried - q).max() < farthest
+            return 1.0 if fine else 0.0
         if fine:
-            q, done = tried, goal
+            done = goal
         step *= 2.0 if fine else 0.5
-    return q, done
+    return done
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,26 +103,29 @@ def _newton(
     platform: int, begin: NDArray, pose: NDArray, held: NDArray, size: float,
 ) -> tuple[NDArray, bool]:  # fmt: skip
     """Damped Gauss-Newton of least norm on closures and pose; whether it converged."""
-    q = begin.copy()
-    for j in range(len(q)):
-        if np.isfinite(held[j]):
-            q[j] = held[j]
-    free = np.flatnonzero((kinds > 0) & ~np.isfinite(held))
-    unit = np.where(kinds[free] == 2, size, 1.0)
+    n, count = len(begin), 0
+    q, free, unit = np.empty(n), np.empty(n, np.int64), np.empty(n)
+    for j in range(n):
+        given = np.isfinite(held[j])
+        q[j] = held[j] if given else begin[j]
+        if kinds[j] > 0 and not given:
+            free[count], unit[count] = j, size if kinds[j] == 2 else 1.0
+            count += 1
+    free, unit = free[:count], unit[:count]
     rows = 6 * len(pairs) + 6
-    r, J = np.empty(rows), np.empty((rows, len(free)))
+    r, J = np.empty(rows), np.empty((rows, count))
     fine, before = False, np.inf
     for _ in range(_NEWTON):
         R, p = forward(parents, kinds, fixed, q)
         _equations(kinds, carries, pairs, platform, R, p, pose, free, unit, size, r, J)
-        worst = np.abs(r).max()
+        worst = _largest(r)
         x = _least_step(J, r)
-        largest = np.abs(x).max() if len(x) else 0.0
+        largest = _largest(x)
         still = largest < 1e-9
         # at rest: solved, or as well as a rounded overconstrained file can be
         fine = worst < _SOLVED or (still and worst < _ROUNDED)
         limit = 0.5 / max(0.5, largest)
-        for i in range(len(free)):
+        for i in range(count):
             q[free[i]] -= x[i] * limit * unit[i]
         if worst < 1e-14 or still or not np.isfinite(worst):
             break
@@ -132,25 +144,24 @@ def forward(
     R, p = np.empty((n, 3, 3)), np.empty((n, 3))
     after_R, after_p = np.empty((n, 3, 3)), np.empty((n, 3))
     for i in range(n):
-        if parents[i] < 0:
-            R[i], p[i] = fixed[i, :3, :3], fixed[i, :3, 3]
-        else:
-            A, a = after_R[parents[i]], after_p[parents[i]]
-            for k in range(3):
-                p[i, k] = a[k]
-                for l in range(3):
-                    p[i, k] += A[k, l] * fixed[i, l, 3]
-                    R[i, k, l] = 0.0
+        j = parents[i]
+        for k in range(3):
+            p[i, k] = fixed[i, k, 3] if j < 0 else after_p[j, k]
+            for l in range(3):
+                R[i, k, l] = fixed[i, k, l] if j < 0 else 0.0
+                if j >= 0:
+                    p[i, k] += after_R[j, k, l] * fixed[i, l, 3]
                     for m in range(3):
-                        R[i, k, l] += A[k, m] * fixed[i, m, l]
-        after_R[i], after_p[i] = R[i], p[i]
-        if kinds[i] == 2:
-            after_p[i] += q[i] * R[i, :, 2]
-        elif kinds[i] == 1:
+                        R[i, k, l] += after_R[j, k, m] * fixed[i, m, l]
+        slid = q[i] if kinds[i] == 2 else 0.0
+        c, s = 1.0, 0.0
+        if kinds[i] == 1:
             c, s = math.cos(q[i]), math.sin(q[i])
-            for k in range(3):
-                after_R[i, k, 0] = c * R[i, k, 0] + s * R[i, k, 1]
-                after_R[i, k, 1] = c * R[i, k, 1] - s * R[i, k, 0]
+        for k in range(3):
+            after_p[i, k] = p[i, k] + slid * R[i, k, 2]
+            after_R[i, k, 0] = c * R[i, k, 0] + s * R[i, k, 1]
+            after_R[i, k, 1] = c * R[i, k, 1] - s * R[i, k, 0]
+            after_R[i, k, 2] = R[i, k, 2]
     return R, p
 
 
@@ -161,62 +172,74 @@ def _equations(
     J: NDArray,
 ) -> None:  # fmt: skip
     """Scaled residuals and their derivatives by the free joints."""
-    J[:] = 0.0
     for c in range(len(pairs)):
         a, b = pairs[c]
         row = 6 * c
-        r[row : row + 3] = rotation_log(_times_transposed(R[a], R[b]))
-        r[row + 3 : row + 6] = (p[a] - p[b]) / size
+        turn = rotation_log(_times_transposed(R[a], R[b]))
+        for k in range(3):
+            r[row + k], r[row + 3 + k] = turn[k], (p[a, k] - p[b, k]) / size
         for i in range(len(free)):
             j = free[i]
             sign = carries[a, j] - carries[b, j]
-            if sign != 0.0:
-                _move(kinds[j], R[j, :, 2], p[a] - p[j], sign * unit[i], size,
-                      J[row : row + 6, i])  # fmt: skip
+            _move(kinds[j], R[j], p[j], p[a], sign * unit[i], size, J, row, i)
     row = 6 * len(pairs)
-    asked = np.isfinite(pose)
-    r[row:] = 0.0
-    if not asked.any():
-        return
+    whole = True
+    for k in range(3):
+        whole = whole and np.isfinite(pose[3 + k])
     for i in range(len(free)):
         j = free[i]
-        if carries[platform, j] > 0.0:
-            _move(kinds[j], R[j, :, 2], p[platform] - p[j], unit[i], size,
-                  J[row : row + 6, i])  # fmt: skip
+        factor = carries[platform, j] * unit[i]
+        _move(kinds[j], R[j], p[j], p[platform], factor, size, J, row, i)
     turn = rotation_log(R[platform])
-    left = np.eye(3)
-    if asked[3:].all():
+    if whole:
         # no trouble near half a turn when the whole rotation is given
-        r[row : row + 3] = rotation_log(
-            _times_transposed(R[platform], _rotation_exp(pose[3:]))
-        )
+        asked = _rotation_exp(pose[3], pose[4], pose[5])
+        turn = rotation_log(_times_transposed(R[platform], asked))
     else:
-        r[row : row + 3] = turn - pose[3:]
         left = _inverse_left_jacobian(turn)
-    r[row + 3 :] = (p[platform] - pose[:3]) / size
-    for i in range(len(free)):
-        a0, a1, a2 = J[row, i], J[row + 1, i], J[row + 2, i]
+        for i in range(len(free)):
+            a0, a1, a2 = J[row, i], J[row + 1, i], J[row + 2, i]
+            for k in range(3):
+                J[row + k, i] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
         for k in range(3):
-            J[row + k, i] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
+            turn[k] -= pose[3 + k]
     for k in range(3):
-        for at, given in ((row + k, asked[3 + k]), (row + 3 + k, asked[k])):
-            if not given:
-                r[at] = 0.0
-                J[at] = 0.0
+        r[row + k], r[row + 3 + k] = turn[k], (p[platform, k] - pose[k]) / size
+    for k in range(6):
+        if not np.isfinite(pose[(k + 3) % 6]):
+            r[row + k] = 0.0
+            for i in range(len(free)):
+                J[row + k, i] = 0.0
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _move(
-    kind: int, z: NDArray, arm: NDArray, factor: float, size: float, column: NDArray
-) -> None:
-    """Screw of a unit joint motion at a point ``arm`` away, scaled, into a column."""
-    if kind == 1:
-        column[:3] = factor * z
-        column[3] = factor * (z[1] * arm[2] - z[2] * arm[1]) / size
-        column[4] = factor * (z[2] * arm[0] - z[0] * arm[2]) / size
-        column[5] = factor * (z[0] * arm[1] - z[1] * arm[0]) / size
-    else:
-        column[3:] = factor * z / size
+    kind: int, R: NDArray, origin: NDArray, point: NDArray, factor: float, size: float,
+    J: NDArray, row: int, column: int,
+) -> None:  # fmt: skip
+    """Screw of a unit joint motion at a point, scaled, into a column from a row on."""
+    for k in range(3):
+        l, m = (k + 1) % 3, (k + 2) % 3
+        if kind == 1:
+            J[row + k, column] = factor * R[k, 2]
+            moment = R[l, 2] * (point[m] - origin[m])
+            moment -= R[m, 2] * (point[l] - origin[l])
+            J[row + 3 + k, column] = factor * moment / size
+        else:
+            J[row + k, column] = 0.0
+            J[row + 3 + k, column] = factor * R[k, 2] / size
+
+
+@njit(cache=True, error_model="numpy")
+def _largest(v: NDArray) -> float:
+    """Largest absolute component; not a number if one is none."""
+    largest = 0.0
+    for value in v:
+        if not abs(value) <= largest:
+            largest = abs(value)
+            if largest != largest:
+                break
+    return largest
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,9 +247,10 @@ def _least_step(J: NDArray, r: NDArray) -> NDArray:
     """Least-squares solution of J x = r, of least norm by damping at rounding level."""
     n = J.shape[1]
     N, x = np.empty((n, n)), np.zeros(n)
-    Jt = np.ascontiguousarray(J.T)
+    Jt = np.empty((n, len(r)))
     for i in range(n):
         for l in range(len(r)):
+            Jt[i, l] = J[l, i]
             x[i] += Jt[i, l] * r[l]
         for j in range(i + 1):
             total = 0.0
@@ -290,24 +314,25 @@ def rotation_log(R: NDArray) -> NDArray:
         q[j] = R[j, i] + R[i, j]
         q[k] = R[k, i] + R[i, k]
         q[3] = R[k, j] - R[j, k]
-    if q[3] < 0.0:
-        q = -q
     sine = math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
-    if sine < 1e-300:
-        return np.zeros(3)
-    return q[:3] * (2.0 * math.atan2(sine, q[3]) / sine)
+    turn = np.zeros(3)
+    if sine >= 1e-300:
+        # q and -q are the same rotation: the one of at most half a turn
+        factor = 2.0 * math.atan2(sine, abs(q[3])) / sine
+        for k in range(3):
+            turn[k] = math.copysign(factor, q[3]) * q[k]
+    return turn
 
 
 @njit(cache=True, error_model="numpy")
-def _rotation_exp(r: NDArray) -> NDArray:
+def _rotation_exp(x: float, y: float, z: float) -> NDArray:
     """Rotation matrix of a rotation vector (Rodrigues)."""
-    angle = math.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
-    S = _cross_matrix(r)
-    if angle < 1e-8:
-        return np.eye(3) + S
-    a = math.sin(angle) / angle
-    b = 2.0 * (math.sin(angle / 2.0) / angle) ** 2
-    return np.eye(3) + a * S + b * (S @ S)
+    angle = math.sqrt(x * x + y * y + z * z)
+    a, b = 1.0, 0.0
+    if angle >= 1e-8:
+        a = math.sin(angle) / angle
+        b = 2.0 * (math.sin(angle / 2.0) / angle) ** 2
+    return _turned(x, y, z, a, b)
 
 
 @njit(cache=True, error_model="numpy")
@@ -315,16 +340,20 @@ def _inverse_left_jacobian(r: NDArray) -> NDArray:
     """Change of a rotation vector per small turn in fixed axes."""
     # Chirikjian, Stochastic Models, Information Theory, and Lie Groups 2, section 10.7
     angle = max(math.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2), 1e-6)
-    S = _cross_matrix(r)
     half = angle / 2.0
-    b = (1.0 - half / math.tan(half)) / angle**2
-    return np.eye(3) - S / 2.0 + b * (S @ S)
+    return _turned(
+        r[0], r[1], r[2], -0.5, (1.0 - half / math.tan(half)) / angle**2
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
-def _cross_matrix(r: NDArray) -> NDArray:
-    """Matrix of the cross product with r."""
-    S = np.zeros((3, 3))
-    S[0, 1], S[0, 2], S[1, 2] = -r[2], r[1], -r[0]
-    S[1, 0], S[2, 0], S[2, 1] = r[2], -r[1], r[0]
-    return S
+def _turned(x: float, y: float, z: float, a: float, b: float) -> NDArray:
+    """1 + a S + b S S with S the matrix of the cross product with (x, y, z)."""
+    A = np.empty((3, 3))
+    A[0, 0] = 1.0 - b * (y * y + z * z)
+    A[1, 1] = 1.0 - b * (x * x + z * z)
+    A[2, 2] = 1.0 - b * (x * x + y * y)
+    A[0, 1], A[1, 0] = b * x * y - a * z, b * x * y + a * z
+    A[0, 2], A[2, 0] = b * x * z + a * y, b * x * z - a * y
+    A[1, 2], A[2, 1] = b * y * z - a * x, b * y * z + a * x
+    return A
