@@ -30,6 +30,7 @@ from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
+from assembly.solvers.vectors import copy, divide, inner
 
 NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
 _RANK = 1e-10  # as in assembly.solvers.reduction, and so is the noise floor
@@ -129,10 +130,10 @@ def _assemble(
     for c in range(len(u)):
         out.clearances[point, c] = u[c]
     spring = np.zeros(Y.shape[1])
-    spring[:rank] = v
+    copy(v, spring)
     turn(Y, y_turns, rank, spring)
-    out.energy[point] = 0.5 * np.sum(v * v)
-    out.without_play[point] = 0.5 * np.sum(h * h)
+    out.energy[point] = 0.5 * inner(v, v)
+    out.without_play[point] = 0.5 * inner(h, h)
     moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
     motions = out.motions[point]
     least_motions(F, turns, diagonal, order, free, moved, motions)
@@ -229,21 +230,18 @@ def _minimise(
     """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
     nu, r = Gt.shape
     road = NEWTON
-    size = 0.0
-    for i in range(r):
-        size += h[i] * h[i]
-    size = np.sqrt(size)
+    size = np.sqrt(inner(h, h))
     if nu == 0 or size == 0.0:
-        y[:] = h
-        v[:] = h
+        copy(h, y)
+        copy(h, v)
         return road
     for c in range(nu):
-        here = 0.0
+        size = max(size, np.sqrt(inner(Gt[c], Gt[c])))
+    G, right = np.empty((nu, r)), divide(h, size)
+    for c in range(nu):
         for i in range(r):
-            here += Gt[c, i] * Gt[c, i]
-        size = max(size, np.sqrt(here))
-    G, right = Gt / size, h / size
-    absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * np.sum(right * right)
+            G[c, i] = Gt[c, i] / size
+    absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * inner(right, right)
     road = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
     for i in range(r):
         v[i] = h[i]
@@ -266,12 +264,12 @@ def small_answer(
         return NEWTON
     G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
     H = np.zeros((0, len(u)))
-    near = _NEAR_WITHOUT_PLAY * 0.5 * np.sum(h * h)
+    near = _NEAR_WITHOUT_PLAY * 0.5 * inner(h, h)
     # at a zone's edge the interior point breaks down early; Newton then takes longer
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
-        u[:] = interior_point(G, h, d, H, none, starts, most, stop)[0]
+        copy(interior_point(G, h, d, H, none, starts, most, stop)[0], u)
         _into_cones(starts, u)
         if dual_newton(
             Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y

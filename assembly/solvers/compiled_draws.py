@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assembly.solvers.compiled_assembly import small_answer
 from assembly.solvers.compiled_zone import farthest, turn_first
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.vectors import copy, fill, inner
 
 SOLVED, UNCERTIFIED = range(2)
 _STOP = 1e-2
@@ -57,12 +58,12 @@ def least_energies(
             size += h[point, i] * h[point, i]
         without = 0.5 * size
         size = max(np.sqrt(size), norm)
-        own[:] = 0.0
-        answer[:] = h[point]
+        fill(own, 0.0)
+        copy(h[point], answer)
         if nu and without > 0.0 and _within(Gt, starts, h[point], inverse, own):
-            answer[:] = 0.0
+            fill(answer, 0.0)
         elif nu and without > 0.0:
-            own[:] = 0.0
+            fill(own, 0.0)
             for i in range(r):
                 right[i] = h[point, i] / size
                 for c in range(nu):
@@ -169,15 +170,15 @@ def least_margins(
     p = len(B)
     for point in range(len(right)):
         w = right[point].copy()
-        size = np.sqrt(np.sum(w * w))
-        pulls[point] = 0.0
+        size = np.sqrt(inner(w, w))
+        fill(pulls[point], 0.0)
         if not size > 0.0:
             margin[point], bound[point] = 0.0, 0.0
             continue
         own = B.copy()
         turn_first(own, w, size)
         u, pull = farthest(own, starts)
-        reach, most = np.sum(own[0] * u), 0.0
+        reach, most = inner(own[0], u), 0.0
         for c in range(len(starts) - 1):
             part = 0.0
             for i in range(starts[c], starts[c + 1]):
@@ -185,7 +186,7 @@ def least_margins(
             most += np.sqrt(part)
         margin[point], bound[point] = size / reach, size / most
         for i in range(p):
-            pulls[point, i] = np.sum(B[i] * pull) / most
+            pulls[point, i] = inner(B[i], pull) / most
         if not (
             reach > 0.0 and margin[point] - bound[point] <= _MARGIN_GAP * margin[point]
         ):

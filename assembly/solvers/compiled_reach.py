@@ -24,6 +24,7 @@ from assembly.solvers.householder import triangulate, turn_all
 from assembly.solvers.interior import LANES
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import Body
+from assembly.solvers.vectors import copy
 
 SOLVED, HANDED_BACK = range(2)
 MOST_SUPPORTS = 400
@@ -108,11 +109,11 @@ def bound_all(
                 out.road[i] = HANDED_BACK
             out.supports[i] += search.counts[1]
             if half == 0:
-                out.rotation[i] = search.bounds
-                out.rotation_screw[i] = search.best
+                copy(search.bounds, out.rotation[i])
+                copy(search.best, out.rotation_screw[i])
             else:
-                out.translation[i] = search.bounds
-                out.translation_screw[i] = search.best
+                copy(search.bounds, out.translation[i])
+                copy(search.best, out.translation_screw[i])
 
 
 @njit(cache=True, error_model="numpy")
@@ -200,7 +201,8 @@ def body_of(
         if loaded[c]:
             continue
         for i in range(s.starts[c], s.starts[c + 1]):
-            rows[:, at] = columns[i]
+            for l in range(len(Z)):
+                rows[l, at] = columns[i, l]
             start[at] = clearances[i]
             _move_platform(s, P, follow, i, X[:, at])
             at += 1

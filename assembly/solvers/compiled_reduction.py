@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
 from assembly.solvers.interior import LANES
+from assembly.solvers.vectors import copy, divide, fill
 
 _NOISE = 1e-12  # as in assembly.solvers.reduction
 _CLEAR = 10.0  # what is within this factor of a threshold decides nothing
@@ -151,7 +152,7 @@ def largest_spring(s: Structure, P: NDArray) -> float:
     largest = 0.0
     column = np.empty(6)
     for c in range(len(s.springs)):
-        column[:] = 0.0
+        fill(column, 0.0)
         for axis in range(6):
             weight = s.springs[c, axis]
             if weight != 0.0:
@@ -194,7 +195,7 @@ def eliminate_springs(
     """Order Z like Y's triangle, and divide by it: the springs' answer first."""
     rows = Z.copy()
     for i in range(len(Z)):
-        Z[i] = rows[order[i]]
+        copy(rows[order[i]], Z[i])
         for l in range(min(i, rank)):
             for a in range(Z.shape[1]):
                 Z[i, a] -= Y[i, l] * Z[l, a]
@@ -210,7 +211,7 @@ def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
     known = np.zeros(6 * closures)
     moved = np.empty(6)
     for j in range(len(P)):
-        moved[:] = 0.0
+        fill(moved, 0.0)
         for axis in range(6):
             if errors[j, axis] != 0.0:
                 for a in range(6):
@@ -232,7 +233,8 @@ def rigid_rows(
     parts, most = np.empty((len(s.patterns), count, 6)), np.zeros(len(s.patterns))
     entering = np.zeros(len(s.patterns))
     for g in range(len(s.patterns)):
-        entering[g] = np.max(np.abs(s.patterns[g])) if s.patterns.shape[1] else 0.0
+        for k in range(s.patterns.shape[1]):
+            entering[g] = max(entering[g], abs(s.patterns[g, k]))
         for i in range(count):
             pattern_part(Z, rank + i, s.patterns[g], parts[g, i])
             for a in range(6):
@@ -332,7 +334,7 @@ def least_motions(
 ) -> None:  # fmt: skip
     """Free motions of least size that close what the rest leaves open."""
     nq = len(F)
-    right = -moved
+    right = divide(moved, -1.0)
     turn_back(F, turns, rank, right)
     answer = np.zeros(nq)
     if rank == nq:

@@ -24,6 +24,7 @@ from assembly.solvers.compiled_reduction import (
 )
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
+from assembly.solvers.vectors import divide, inner
 
 SOLVED, HANDED_BACK = range(2)
 _RANK, _ROWS_RANK, _NOISE = 1e-10, 1e-9, 1e-12  # as in assembly.solvers.reduction
@@ -71,13 +72,14 @@ def _margin(
     known = misfit_of(s, P, errors)
     columns, right = small_problem(s, P, Z, len(Z), known)
     rows = np.ascontiguousarray(columns.T)
-    decided, B, w = orthonormal_rows(rows, -right, largest_clearance(s, P))
-    size = np.sqrt(np.sum(w * w))
+    misfit = divide(right, -1.0)
+    decided, B, w = orthonormal_rows(rows, misfit, largest_clearance(s, P))
+    size = np.sqrt(inner(w, w))
     if not (decided and size > 0.0):
         return np.nan, np.nan
     turn_first(B, w, size)
     u, pull = farthest(B, s.starts)
-    reach, most = np.sum(B[0] * u), 0.0
+    reach, most = inner(B[0], u), 0.0
     for c in range(len(s.starts) - 1):
         part = 0.0
         for i in range(s.starts[c], s.starts[c + 1]):
@@ -87,7 +89,9 @@ def _margin(
         return np.nan, np.nan
     # what passive joints turn or slide must stay within their ranges
     none, screw = np.zeros((0, 6, 6)), np.empty(6)
-    moved = moved_by(s, P, none, u * (size / reach), np.zeros(0), known, screw)
+    for c in range(len(u)):
+        u[c] *= size / reach
+    moved = moved_by(s, P, none, u, np.zeros(0), known, screw)
     motions = np.empty(nq)
     least_motions(F, turns, diagonal, order, free, moved, motions)
     for c in range(nq):
@@ -102,7 +106,10 @@ def largest_clearance(s: Structure, P: NDArray) -> float:
     largest = 0.0
     for c in range(len(s.cone_frame)):
         j = s.cone_frame[c]
-        if np.any(s.patterns[s.pattern_of[j]] != 0.0):
+        enters = False
+        for k in range(s.patterns.shape[1]):
+            enters = enters or s.patterns[s.pattern_of[j], k] != 0.0
+        if enters:
             for a in range(6):
                 entry = P[j, s.cone_axis[c], a] * s.cone_size[c]
                 largest = max(largest, abs(entry))
@@ -147,10 +154,10 @@ def orthonormal_rows(
 @njit(cache=True, error_model="numpy")
 def turn_first(B: NDArray, w: NDArray, size: float) -> None:
     """Combine the rows of B so that the first is along w and the others across it."""
-    v = w / size
+    v = divide(w, size)
     sign = 1.0 if v[0] <= 0.0 else -1.0
     v[0] -= sign
-    factor = 2.0 / np.sum(v * v)
+    factor = 2.0 / inner(v, v)
     for c in range(B.shape[1]):
         dot = 0.0
         for i in range(len(v)):
@@ -175,7 +182,7 @@ def farthest(B: NDArray, starts: NDArray) -> tuple[NDArray, NDArray]:
             pull[c] -= rest[i, c] * n[i]
     # rounding may leave the rest: taken out, then back within the cones
     for i in range(len(rest)):
-        left = np.sum(rest[i] * u)
+        left = inner(rest[i], u)
         for c in range(nu):
             u[c] -= left * rest[i, c]
     worst = 1.0
@@ -184,4 +191,4 @@ def farthest(B: NDArray, starts: NDArray) -> tuple[NDArray, NDArray]:
         for i in range(starts[c], starts[c + 1]):
             size += u[i] * u[i]
         worst = max(worst, np.sqrt(size))
-    return u / worst, pull
+    return divide(u, worst), pull

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
 from assembly.solvers.support import Body, screw_at, support, symmetric, within
+from assembly.solvers.vectors import copy, divide, fill, inner
 
 DONE, NEEDED, GAVE_UP = range(3)
 _CLIMBING, _BOXING, _CUTTING = range(3)
@@ -86,9 +87,12 @@ def begin(
         size += best[part + a] ** 2
     size = np.sqrt(size)
     search = Search(
-        part, tolerance, np.array([size, np.inf]), best, np.zeros(3), np.zeros((3, 3)),
-        np.full((2, 3), np.nan), np.empty((32, 4)), np.zeros(5, np.int64), outer,
+        part, tolerance, np.empty(2), best, np.zeros(3), np.zeros((3, 3)),
+        np.empty((2, 3)), np.empty((32, 4)), np.zeros(5, np.int64), outer,
     )  # fmt: skip
+    search.bounds[0], search.bounds[1] = size, np.inf
+    fill(search.heights[0], np.nan)
+    fill(search.heights[1], np.nan)
     search.counts[4] = most
     if body.map.shape[1]:
         _first_direction(body, search)
@@ -104,13 +108,13 @@ def _first_direction(body: Body, search: Search) -> None:
     free = body.map[search.part : search.part + 3].copy()
     for i in range(p):
         for a in range(3):
-            along = np.sum(free[a] * body.rows[i])
+            along = inner(free[a], body.rows[i])
             for j in range(nv):
                 free[a, j] -= along * body.rows[i, j]
     Q = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
-            Q[a, b] = np.sum(free[a] * free[b])
+            Q[a, b] = inner(free[a], free[b])
     _, vectors = eigenvectors(Q)
     most = -1.0
     for candidate in range(4):
@@ -119,10 +123,10 @@ def _first_direction(body: Body, search: Search) -> None:
             d[a] = body.centre[search.part + a]
             if candidate < 3:
                 d[a] = vectors[a, candidate]
-        size = np.sqrt(np.sum(d * d))
+        size = np.sqrt(inner(d, d))
         if not size > 0.0:
             continue
-        d /= size
+        d = divide(d, size)
         middle, height = 0.0, 0.0
         for a in range(3):
             middle += d[a] * body.centre[search.part + a]
@@ -209,7 +213,7 @@ def _improve(search: Search, screw: NDArray) -> None:
         if size > search.bounds[0] + _GAIN * search.tolerance:
             search.counts[3] = 1
         search.bounds[0] = size
-        search.best[:] = screw
+        copy(screw, search.best)
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,7 +228,7 @@ def _add_plane(search: Search, direction: NDArray, height: float) -> None:
         return
     kept = search.counts[2]
     if kept < len(search.cuts):
-        search.cuts[kept, :3] = direction
+        copy(direction, search.cuts[kept])
         search.cuts[kept, 3] = height
         search.counts[2] += 1
 
@@ -233,9 +237,13 @@ def _add_plane(search: Search, direction: NDArray, height: float) -> None:
 def _set_side(search: Search, direction: NDArray, height: float) -> None:
     """A side of the box, if the direction is one of its axes or the opposite."""
     for axis in range(3):
-        if np.all(direction == search.axes[axis]):
+        along, against = True, True
+        for a in range(3):
+            along = along and direction[a] == search.axes[axis, a]
+            against = against and direction[a] == -search.axes[axis, a]
+        if along:
             search.heights[1, axis] = height
-        elif np.all(direction == -search.axes[axis]):
+        elif against:
             search.heights[0, axis] = -height
 
 
@@ -243,7 +251,7 @@ def _set_side(search: Search, direction: NDArray, height: float) -> None:
 def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> None:
     """What a symmetric body's support says of the other side: v turned round."""
     start = body.start
-    screw = screw_at(body, within(body, -v))
+    screw = screw_at(body, within(body, divide(v, -1.0)))
     _improve(search, screw)
     height = 0.0
     for a in range(3):
@@ -257,7 +265,7 @@ def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> N
     reached = 0.0
     for a in range(3):
         reached -= search.direction[a] * screw[search.part + a]
-    _add_plane(search, -search.direction, max(height, reached))
+    _add_plane(search, divide(search.direction, -1.0), max(height, reached))
 
 
 @njit(cache=True, error_model="numpy")
@@ -281,7 +289,7 @@ def choose(search: Search) -> None:
         for i in range(counts[2]):
             cut(search.outer, search.cuts[i, :3].copy(), search.cuts[i, 3])
     corner = farthest_corner(search.outer)
-    size = np.sqrt(np.sum(corner * corner))
+    size = np.sqrt(inner(corner, corner))
     search.bounds[1] = max(search.bounds[0], min(search.bounds[1], size))
     # where the last step gained, its point's own direction gains more, and is where
     # the second bound is sharpest; else wherever the cuts leave most room
@@ -294,7 +302,7 @@ def choose(search: Search) -> None:
 @njit(cache=True, error_model="numpy")
 def _towards(search: Search, point: NDArray) -> None:
     """Look towards a point."""
-    size = np.sqrt(np.sum(point * point))
+    size = np.sqrt(inner(point, point))
     for a in range(3):
         search.direction[a] = point[a] / size
 
@@ -304,12 +312,15 @@ def _start_boxing(search: Search) -> None:
     """A box along the best point's direction, its planes not known yet."""
     search.counts[0] = _BOXING
     own = search.direction
-    least = np.argmin(np.abs(own))
+    least = 0
+    for a in range(1, 3):
+        if abs(own[a]) < abs(own[least]):
+            least = a
     axes = search.axes
-    axes[0] = own
-    axes[1] = -own[least] * own
+    for a in range(3):
+        axes[0, a], axes[1, a] = own[a], -own[least] * own[a]
     axes[1, least] += 1.0
-    axes[1] /= np.sqrt(np.sum(axes[1] * axes[1]))
+    copy(divide(axes[1], np.sqrt(inner(axes[1], axes[1]))), axes[1])
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         axes[2, a] = own[b] * axes[1, c] - own[c] * axes[1, b]

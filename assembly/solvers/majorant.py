@@ -137,8 +137,8 @@ def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
         for a in range(3):
             along[i] += vectors[a, i] * g[a]
         length += g[i] * g[i]
-    top, length = values.max(), np.sqrt(length)
-    size = max(length, np.abs(values).max(), 1e-300)
+    top, length = max(values[0], values[1], values[2]), np.sqrt(length)
+    size = max(length, abs(values[0]), abs(values[1]), abs(values[2]), 1e-300)
     # any multiplier m > top gives an upper bound, m/2 + sum g_i^2 / (2 (m - q_i)); the
     # least of them has |g / (m - q)| = 1, or m = top
     low, high = 1e-15 * size, length + 1e-15 * size
@@ -164,7 +164,9 @@ def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
 @njit(cache=True, error_model="numpy")
 def eigenvectors(Q: NDArray) -> tuple[NDArray, NDArray]:
     """Eigenvalues (3,) of a symmetric matrix, and vectors as columns (3, 3)."""
-    D, V = Q.copy(), np.eye(3)
+    D, V, values = Q.copy(), np.zeros((3, 3)), np.empty(3)
+    for i in range(3):
+        V[i, i] = 1.0
     for _ in range(_SWEEPS):
         off = D[0, 1] ** 2 + D[0, 2] ** 2 + D[1, 2] ** 2
         if off <= 1e-34 * (D[0, 0] ** 2 + D[1, 1] ** 2 + D[2, 2] ** 2):
@@ -193,4 +195,6 @@ def eigenvectors(Q: NDArray) -> tuple[NDArray, NDArray]:
                         c * V[i, a] - s * V[i, b],
                         s * V[i, a] + c * V[i, b],
                     )
-    return np.array([D[0, 0], D[1, 1], D[2, 2]]), V
+    for i in range(3):
+        values[i] = D[i, i]
+    return values, V

@@ -48,11 +48,12 @@ def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> Non
         high: (3,) largest.
     """
     for i in range(8):
-        body.corners[i] = 0.0
         for axis in range(3):
             side = (i >> axis) & 1
             height = high[axis] if side else low[axis]
             for a in range(3):
+                if axis == 0:
+                    body.corners[i, a] = 0.0
                 body.corners[i, a] += height * axes[axis, a]
             body.planes[i, axis] = 2 * axis + side
     body.used[0], body.used[1] = 8, 6
@@ -109,7 +110,8 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
     for i in range(new):
         if i >= count or above[i] <= limit:
             if kept != i:
-                corners[kept], planes[kept] = corners[i], planes[i]
+                for a in range(3):
+                    corners[kept, a], planes[kept, a] = corners[i, a], planes[i, a]
             kept += 1
     body.used[0] = kept
     return True

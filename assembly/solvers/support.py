@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from assembly.solvers.interior import interior_point
+from assembly.solvers.vectors import divide, inner
 
 _SYMMETRIC = 1e-14  # H start counts as zero
 _ROUNDING = 1e-14  # by which a cone counts as left
@@ -75,11 +76,11 @@ def support(
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
         v, n, _ = interior_point(
-            np.zeros((0, nv)), np.zeros(0), pulls / size, body.rows, right, body.starts,
-            tolerance / size, 0.0,
+            np.zeros((0, nv)), np.zeros(0), divide(pulls, size), body.rows, right,
+            body.starts, tolerance / size, 0.0,
         )  # fmt: skip
-        n *= size
         for i in range(p):
+            n[i] *= size
             height += n[i] * right[i]
             for j in range(nv):
                 pulls[j] -= n[i] * body.rows[i, j]
@@ -98,9 +99,11 @@ def support(
 @njit(cache=True, error_model="numpy")
 def within(body: Body, v: NDArray) -> NDArray:
     """A nearby v that satisfies rows and cones to rounding."""
-    step = v - body.start
+    step = np.empty(len(v))
+    for j in range(len(v)):
+        step[j] = v[j] - body.start[j]
     for i in range(len(body.rows)):
-        left = np.sum(body.rows[i] * step)
+        left = inner(body.rows[i], step)
         for j in range(len(step)):
             step[j] -= left * body.rows[i, j]
     # the longest part of the step, from a start that is inside, that leaves no cone
@@ -114,7 +117,9 @@ def within(body: Body, v: NDArray) -> NDArray:
         if aa + 2.0 * ab + bb > 0.0:
             root = np.sqrt(max(ab * ab - aa * bb, 0.0))
             share = min(share, -bb / (ab + root) if ab > 0.0 else (root - ab) / aa)
-    return body.start + max(share, 0.0) * step
+    for j in range(len(v)):
+        step[j] = body.start[j] + max(share, 0.0) * step[j]
+    return step
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,6 +137,6 @@ def screw_at(body: Body, v: NDArray) -> NDArray:
 def symmetric(body: Body) -> bool:
     """Whether v -> -v leaves the rows satisfied."""
     for i in range(len(body.rows)):
-        if not abs(np.sum(body.rows[i] * body.start)) <= _SYMMETRIC:
+        if not abs(inner(body.rows[i], body.start)) <= _SYMMETRIC:
             return False
     return True

@@ -79,19 +79,21 @@ def push_all(
     none, nothing = np.zeros((0, nu)), np.zeros(0)
     p = len(rows)
     for i in range(len(u)):
-        ends[i] = u[i]
-        push = pushes[i] * free
-        size = np.sqrt(np.sum(push * push))
+        push, size = np.empty(nu), 0.0
+        for c in range(nu):
+            ends[i, c], push[c] = u[i, c], pushes[i, c] if free[c] else 0.0
+            size += push[c] * push[c]
+        size = np.sqrt(size)
         if not size > 0.0:
             continue
+        for c in range(nu):
+            push[c] /= size
         right = np.zeros(p)
         for l in range(p):
             for c in range(nu):
                 if free[c]:
                     right[l] += rows[l, c] * u[i, c]
-        found, _, steps = interior_point(
-            none, nothing, push / size, rows, right, starts, 1e-9
-        )
+        found, _, steps = interior_point(none, nothing, push, rows, right, starts, 1e-9)
         for c in range(nu):
             if free[c]:
                 ends[i, c] = found[c] if steps >= 0 else np.nan
