@@ -329,6 +329,7 @@ def _farthest(
     reach: Reach, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
     """Bounds of the largest size of half a screw, a screw, and the supports it took."""
+    from assembly.solvers.cone_solvers import cone_solvers
     from assembly.solvers.farthest import NEEDED, advance, begin, choose, learn
     from assembly.solvers.polytope import empty_polytope
 
@@ -336,7 +337,7 @@ def _farthest(
         return (np.inf, np.inf), reach.centre, 0
     body = reach.body
     search = begin(body, part, tolerance, _MOST_SUPPORTS, empty_polytope())
-    while advance(body, search) == NEEDED:
+    while advance(cone_solvers(), body, search) == NEEDED:
         found = reach.support(search.direction @ np.eye(6)[part : part + 3])
         learn(body, search, found.height, found.screw, found.pulls)
         choose(search)

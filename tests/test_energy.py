@@ -110,7 +110,7 @@ def spoilt(solve):
 def test_what_no_road_proves_is_not_called_an_answer(monkeypatch):
     """The edge of the zone with Newton's method taken away and the others spoilt."""
     from assembly.results import solution_of, solution_text
-    from assembly.solvers import batch, conic, dual_newton
+    from assembly.solvers import batch, cone_solvers, conic
 
     robot = irsbot2_with(NUMBERS["cases"][0])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
@@ -118,7 +118,7 @@ def test_what_no_road_proves_is_not_called_an_answer(monkeypatch):
     assert_proved(good)
     energies = minimise_energies(robot, posture.transforms[None])
     monkeypatch.setattr(conic, "_ROADS", tuple(map(spoilt, conic._ROADS)))
-    monkeypatch.setattr(dual_newton, "dual_newton", lambda *_: -1)
+    monkeypatch.setattr(cone_solvers, "newton", lambda *_: -1)
     answer = solve_assembly(posture)
     # 1e-4 of some clearances more energy than the least: far above 1e-8
     assert answer.energy > good.energy * (1 + 1e-8)

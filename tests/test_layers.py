@@ -38,6 +38,8 @@ OWNERS = {
         "assembly/solvers/compiled_zone.py",
         "assembly/statistics/hit_and_run.py",
         "assembly/solvers/householder.py",
+        "assembly/solvers/cone_solvers.py",
+        "assembly/solvers/vectors.py",
     ),
     "xarray": (
         "assembly/sweeps/dataset.py",

@@ -117,6 +117,7 @@ def minimise_energies(
         ValueError: a shape does not fit the robot, or a value is not finite.
     """
     from assembly.solvers.compiled_assembly import Answers, assemble_all
+    from assembly.solvers.cone_solvers import cone_solvers
 
     # writable and in C order, whatever comes: the kernels are compiled for one kind
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
@@ -139,7 +140,7 @@ def minimise_energies(
         np.zeros((count, nu)), np.zeros((count, nq)),
         np.zeros((count, 6 * len(robot.closures))), np.zeros(count),
     )  # fmt: skip
-    assemble_all(structure, T, all_errors, off, out)
+    assemble_all(cone_solvers(), structure, T, all_errors, off, out)
     answers = Energies(
         out.energy, out.bound, out.without_play, out.platform_screw, out.open,
         _excess(out.clearances, structure.starts), out.clearances, out.multipliers,
@@ -232,6 +233,7 @@ def zone_margins(
         ValueError: ``compliant`` is something else.
     """
     from assembly.solvers.compiled_zone import all_margins
+    from assembly.solvers.cone_solvers import cone_solvers
 
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
@@ -243,13 +245,17 @@ def zone_margins(
     road, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
     own = None if errors is None else np.array(errors, dtype=float)
     if joints.scaled.all() and len(joints.scaled):
+        solvers = cone_solvers()
         if own is None:
-            all_margins(structure, T, robot.errors.copy(), off, margin, bound, road)
+            same = robot.errors.copy()
+            all_margins(solvers, structure, T, same, off, margin, bound, road)
         else:
             for i in range(count):
                 one = slice(i, i + 1)
-                all_margins(structure, T[one], own[i], off[one], margin[one],
-                            bound[one], road[one])  # fmt: skip
+                all_margins(
+                    solvers, structure, T[one], own[i], off[one], margin[one],
+                    bound[one], road[one],
+                )  # fmt: skip
     for i in np.flatnonzero(road).tolist():
         here = robot if own is None else robot.with_errors(own[i])
         posture = Posture(here, np.full(n, np.nan), T[i], float(off[i]))

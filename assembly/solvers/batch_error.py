@@ -86,6 +86,7 @@ def bound_pose_errors(
         ValueError: the reading is unknown, or a shape does not fit the robot.
     """
     from assembly.solvers.compiled_reach import Bounds, bound_all
+    from assembly.solvers.cone_solvers import cone_solvers
 
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
@@ -115,7 +116,7 @@ def bound_pose_errors(
             robot, T, reading, errors, off, energies, bounds.road
         )
         bound_all(
-            structure, T, off, energies.platform_screw.copy(),
+            cone_solvers(), structure, T, off, energies.platform_screw.copy(),
             np.ascontiguousarray(energies.clearances[:, column_of]), loads,
             np.asarray(offset, dtype=float).copy(), tolerance, bounds,
         )  # fmt: skip

@@ -26,10 +26,9 @@ from assembly.solvers.compiled_reduction import (
     small_problem,
     spring_rows,
 )
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
-from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
-from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import copy, divide, inner
 
 NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
@@ -71,73 +70,70 @@ class Answers(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def assemble_all(
-    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray, out: Answers
-) -> None:
+    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: Answers,
+) -> None:  # fmt: skip
     """Solve every point; see :class:`Answers`.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot.
         T: (k, n, 4, 4) frames.
         errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         out: arrays to fill.
     """
-    for i in range(len(T)):
-        own = errors[i if len(errors) > 1 else 0]
-        out.road[i] = _assemble(i, s, T[i], own, mismatch[i], out)
-
-
-@njit(cache=True, error_model="numpy")
-def _assemble(
-    point: int, s: Structure, T: NDArray, errors: NDArray, mismatch: float, out: Answers
-) -> int:
-    """One point: the code of the road that solved it, or of why none did."""
-    tolerance = _RANK + 30.0 * mismatch
-    P = paths_of(T, s)
-    closures = s.patterns.shape[1]
-    m, nq = 6 * closures, len(s.free_frame)
-    # free motions: their columns are the rows of F
-    F = free_columns(s, P, m)
-    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
-    free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    if free < 0:
-        return RANK
-    Z = orthogonal_rows(F, turns, free, m)
-    # springs
-    L = grouped_springs(s, P)
-    Y = spring_rows(s, Z, L)
-    count = len(Z)
-    y_turns, y_diagonal = np.empty(count), np.empty(count)
-    y_order = np.empty(count, np.int64)
-    noise = _NOISE * largest_spring(s, P)
-    rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
-    if rank < 0:
-        return RANK
-    eliminate_springs(Z, Y, y_diagonal, y_order, rank)
-    known = misfit_of(s, P, errors)
-    if rigid_rows(s, P, Z, rank, known, errors, tolerance):
-        return RIGID
-    # the small problem in the clearances
-    Gt, h = small_problem(s, P, Z, rank, known)
-    u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
-    road = _minimise(s, Gt, h, u, v, y)
-    # the way back
-    multipliers = out.multipliers[point]
-    for a in range(m):
-        multipliers[a] = 0.0
-        for i in range(rank):
-            multipliers[a] += Z[i, a] * y[i]
-    for c in range(len(u)):
-        out.clearances[point, c] = u[c]
-    spring = np.zeros(Y.shape[1])
-    copy(v, spring)
-    turn(Y, y_turns, rank, spring)
-    out.energy[point] = 0.5 * inner(v, v)
-    out.without_play[point] = 0.5 * inner(h, h)
-    moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
-    motions = out.motions[point]
-    least_motions(F, turns, diagonal, order, free, moved, motions)
-    return _certify(point, s, P, errors, moved, road, out)
+    for point in range(len(T)):
+        own = errors[point if len(errors) > 1 else 0]
+        tolerance = _RANK + 30.0 * mismatch[point]
+        P = paths_of(T[point], s)
+        closures = s.patterns.shape[1]
+        m, nq = 6 * closures, len(s.free_frame)
+        # free motions: their columns are the rows of F
+        F = free_columns(s, P, m)
+        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+        if free < 0:
+            out.road[point] = RANK
+            continue
+        Z = orthogonal_rows(F, turns, free, m)
+        # springs
+        L = grouped_springs(s, P)
+        Y = spring_rows(s, Z, L)
+        count = len(Z)
+        y_turns, y_diagonal = np.empty(count), np.empty(count)
+        y_order = np.empty(count, np.int64)
+        noise = _NOISE * largest_spring(s, P)
+        rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
+        if rank < 0:
+            out.road[point] = RANK
+            continue
+        eliminate_springs(Z, Y, y_diagonal, y_order, rank)
+        known = misfit_of(s, P, own)
+        if rigid_rows(s, P, Z, rank, known, own, tolerance):
+            out.road[point] = RIGID
+            continue
+        # the small problem in the clearances
+        Gt, h = small_problem(s, P, Z, rank, known)
+        u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
+        road = _minimise(solvers, s, Gt, h, u, v, y)
+        # the way back
+        multipliers = out.multipliers[point]
+        for a in range(m):
+            multipliers[a] = 0.0
+            for i in range(rank):
+                multipliers[a] += Z[i, a] * y[i]
+        for c in range(len(u)):
+            out.clearances[point, c] = u[c]
+        spring = np.zeros(Y.shape[1])
+        copy(v, spring)
+        turn(Y, y_turns, rank, spring)
+        out.energy[point] = 0.5 * inner(v, v)
+        out.without_play[point] = 0.5 * inner(h, h)
+        moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
+        motions = out.motions[point]
+        least_motions(F, turns, diagonal, order, free, moved, motions)
+        out.road[point] = _certify(point, s, P, own, moved, road, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -225,8 +221,9 @@ def _complementary(
 
 @njit(cache=True, error_model="numpy")
 def _minimise(
-    s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray, y: NDArray
-) -> int:
+    solvers: ConeSolvers, s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray,
+    y: NDArray,
+) -> int:  # fmt: skip
     """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
     nu, r = Gt.shape
     road = NEWTON
@@ -242,7 +239,7 @@ def _minimise(
         for i in range(r):
             G[c, i] = Gt[c, i] / size
     absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * inner(right, right)
-    road = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
+    road = small_answer(solvers, G, right, s.starts, _STOP * GAP, absolute, u, y)
     for i in range(r):
         v[i] = h[i]
         y[i] *= size
@@ -253,12 +250,12 @@ def _minimise(
 
 @njit(cache=True, error_model="numpy")
 def small_answer(
-    Gt: NDArray, h: NDArray, starts: NDArray, relative: float, absolute: float,
-    u: NDArray, y: NDArray,
+    solvers: ConeSolvers, Gt: NDArray, h: NDArray, starts: NDArray, relative: float,
+    absolute: float, u: NDArray, y: NDArray,
 ) -> int:  # fmt: skip
     """Newton alone where all play is used up, else after an interior point."""
     r, d = len(h), np.zeros(len(u))
-    if dual_newton(
+    if solvers.dual_newton(
         Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
     ) >= 0:  # fmt: skip
         return NEWTON
@@ -269,9 +266,10 @@ def small_answer(
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
-        copy(interior_point(G, h, d, H, none, starts, most, stop)[0], u)
+        inside, _, _ = solvers.interior_point(G, h, d, H, none, starts, most, stop)
+        copy(inside, u)
         _into_cones(starts, u)
-        if dual_newton(
+        if solvers.dual_newton(
             Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
         ) >= 0:  # fmt: skip
             break

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.compiled_assembly import small_answer
 from assembly.solvers.compiled_zone import farthest, turn_first
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 from assembly.solvers.vectors import copy, fill, inner
 
@@ -22,13 +23,14 @@ _MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def least_energies(
-    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, cones: NDArray,
-    gram: NDArray, slip: float, u: NDArray, y: NDArray, energy: NDArray,
-    bound: NDArray, road: NDArray,
+    solvers: ConeSolvers, Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
+    cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
+    energy: NDArray, bound: NDArray, road: NDArray,
 ) -> None:  # fmt: skip
     """Minimise |G u + h|^2 / 2 for every row of h.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         Gt: (nu, r) columns of G as rows [sqrt(2 J)].
         starts: (cones + 1,) first clearance of each cone, and nu.
         h: (k, r) [sqrt(2 J)].
@@ -69,7 +71,7 @@ def least_energies(
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
             absolute = _STOP * GAP_WITHOUT_PLAY * without / (size * size)
-            small_answer(G, right, starts, _STOP * GAP, absolute, own, answer)
+            small_answer(solvers, G, right, starts, _STOP * GAP, absolute, own, answer)
             for i in range(r):
                 answer[i] *= size
         total = 0.0
@@ -154,12 +156,13 @@ def _within(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def least_margins(
-    B: NDArray, starts: NDArray, right: NDArray, margin: NDArray, bound: NDArray,
-    pulls: NDArray,
+    solvers: ConeSolvers, B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
+    bound: NDArray, pulls: NDArray,
 ) -> None:  # fmt: skip
     """Least t with B u = right, |u_k| <= t, for every row of right.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         B: (p, nu) orthonormal rows.
         starts: (cones + 1,) first clearance of each cone, and nu.
         right: (k, p).
@@ -177,7 +180,7 @@ def least_margins(
             continue
         own = B.copy()
         turn_first(own, w, size)
-        u, pull = farthest(own, starts)
+        u, pull = farthest(solvers, own, starts)
         reach, most = inner(own[0], u), 0.0
         for c in range(len(starts) - 1):
             part = 0.0

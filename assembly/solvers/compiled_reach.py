@@ -19,6 +19,7 @@ from assembly.solvers.compiled_reduction import (
     small_problem,
 )
 from assembly.solvers.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.farthest import DONE, advance, begin
 from assembly.solvers.householder import triangulate, turn_all
 from assembly.solvers.interior import LANES
@@ -76,12 +77,13 @@ class Bounds(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def bound_all(
-    s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray, clearances: NDArray,
-    loads: Loads, offset: NDArray, tolerance: NDArray, out: Bounds,
+    solvers: ConeSolvers, s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
+    clearances: NDArray, loads: Loads, offset: NDArray, tolerance: NDArray, out: Bounds,
 ) -> None:  # fmt: skip
     """Bracket the largest pose errors of all points that are not handed back yet.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
@@ -105,7 +107,7 @@ def bound_all(
             continue
         for half in range(2):
             search = begin(body, 3 * half, tolerance[half], MOST_SUPPORTS, outer)
-            if advance(body, search) != DONE:
+            if advance(solvers, body, search) != DONE:
                 out.road[i] = HANDED_BACK
             out.supports[i] += search.counts[1]
             if half == 0:

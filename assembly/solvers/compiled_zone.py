@@ -22,8 +22,8 @@ from assembly.solvers.compiled_reduction import (
     paths_of,
     small_problem,
 )
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.householder import triangulate, turn
-from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import divide, inner
 
 SOLVED, HANDED_BACK = range(2)
@@ -34,12 +34,13 @@ _STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
 
 @njit(cache=True, error_model="numpy")
 def all_margins(
-    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray, margin: NDArray,
-    bound: NDArray, road: NDArray,
+    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    margin: NDArray, bound: NDArray, road: NDArray,
 ) -> None:  # fmt: skip
     """Margins of all points, with their lower bounds.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
         errors: (n, 6) [rad, m].
@@ -49,55 +50,49 @@ def all_margins(
         road: (k,) to fill: SOLVED, or HANDED_BACK to the slower road.
     """
     for i in range(len(T)):
-        margin[i], bound[i] = _margin(s, T[i], errors, mismatch[i])
-        # a bound that is not a number fails
-        solved = margin[i] - bound[i] <= _GAP * margin[i]
-        road[i] = SOLVED if solved else HANDED_BACK
-
-
-@njit(cache=True, error_model="numpy")
-def _margin(
-    s: Structure, T: NDArray, errors: NDArray, mismatch: float
-) -> tuple[float, float]:
-    """Margin and bound of one point; not a number where this road does not lead."""
-    tolerance = _RANK + 30.0 * mismatch
-    P = paths_of(T, s)
-    m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
-    F = free_columns(s, P, m)
-    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
-    free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    if free < 0:
-        return np.nan, np.nan
-    Z = orthogonal_rows(F, turns, free, m)
-    known = misfit_of(s, P, errors)
-    columns, right = small_problem(s, P, Z, len(Z), known)
-    rows = np.ascontiguousarray(columns.T)
-    misfit = divide(right, -1.0)
-    decided, B, w = orthonormal_rows(rows, misfit, largest_clearance(s, P))
-    size = np.sqrt(inner(w, w))
-    if not (decided and size > 0.0):
-        return np.nan, np.nan
-    turn_first(B, w, size)
-    u, pull = farthest(B, s.starts)
-    reach, most = inner(B[0], u), 0.0
-    for c in range(len(s.starts) - 1):
-        part = 0.0
-        for i in range(s.starts[c], s.starts[c + 1]):
-            part += pull[i] * pull[i]
-        most += np.sqrt(part)
-    if not reach > 0.0:
-        return np.nan, np.nan
-    # what passive joints turn or slide must stay within their ranges
-    none, screw = np.zeros((0, 6, 6)), np.empty(6)
-    for c in range(len(u)):
-        u[c] *= size / reach
-    moved = moved_by(s, P, none, u, np.zeros(0), known, screw)
-    motions = np.empty(nq)
-    least_motions(F, turns, diagonal, order, free, moved, motions)
-    for c in range(nq):
-        if abs(motions[c]) > s.free_bound[c]:
-            return np.nan, np.nan
-    return size / reach, size / most
+        margin[i], bound[i], road[i] = np.nan, np.nan, HANDED_BACK
+        tolerance = _RANK + 30.0 * mismatch[i]
+        P = paths_of(T[i], s)
+        m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
+        F = free_columns(s, P, m)
+        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+        if free < 0:
+            continue
+        Z = orthogonal_rows(F, turns, free, m)
+        known = misfit_of(s, P, errors)
+        columns, right = small_problem(s, P, Z, len(Z), known)
+        rows = np.ascontiguousarray(columns.T)
+        misfit = divide(right, -1.0)
+        decided, B, w = orthonormal_rows(rows, misfit, largest_clearance(s, P))
+        size = np.sqrt(inner(w, w))
+        if not (decided and size > 0.0):
+            continue
+        turn_first(B, w, size)
+        u, pull = farthest(solvers, B, s.starts)
+        reach, most = inner(B[0], u), 0.0
+        for c in range(len(s.starts) - 1):
+            part = 0.0
+            for k in range(s.starts[c], s.starts[c + 1]):
+                part += pull[k] * pull[k]
+            most += np.sqrt(part)
+        if not reach > 0.0:
+            continue
+        # what passive joints turn or slide must stay within their ranges
+        none, screw = np.zeros((0, 6, 6)), np.empty(6)
+        for c in range(len(u)):
+            u[c] *= size / reach
+        moved = moved_by(s, P, none, u, np.zeros(0), known, screw)
+        motions = np.empty(nq)
+        least_motions(F, turns, diagonal, order, free, moved, motions)
+        within = True
+        for c in range(nq):
+            within = within and abs(motions[c]) <= s.free_bound[c]
+        if within:
+            margin[i], bound[i] = size / reach, size / most
+            # a bound that is not a number fails
+            if margin[i] - bound[i] <= _GAP * margin[i]:
+                road[i] = SOLVED
 
 
 @njit(cache=True, error_model="numpy")
@@ -168,11 +163,13 @@ def turn_first(B: NDArray, w: NDArray, size: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def farthest(B: NDArray, starts: NDArray) -> tuple[NDArray, NDArray]:
+def farthest(
+    solvers: ConeSolvers, B: NDArray, starts: NDArray
+) -> tuple[NDArray, NDArray]:
     """Find u within the cones with the most B[0].u and no B[1:] u; the pull on each."""
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])
-    u, n, _ = interior_point(
+    u, n, _ = solvers.interior_point(
         np.zeros((0, nu)), np.zeros(0), B[0].copy(), rest, np.zeros(len(rest)), starts,
         _STOP, 0.0,
     )  # fmt: skip

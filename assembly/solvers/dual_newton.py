@@ -24,18 +24,20 @@ from numpy.typing import NDArray
 
 from assembly.solvers.interior import LANES, add, dot, layers_of
 
+FAST = {"contract", "reassoc"}
 _HALVINGS = 12
 _SHARPER = 10.0  # growth of sigma each time u_old moves
 _SETTLED = 0.1  # part of the gap that may be the inner problem's
 _OPEN = 1e-13  # most that a row without springs may stay open
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
 def dual_newton(
     Gt: NDArray, h: NDArray, d: NDArray, springs: int, starts: NDArray,
     relative: float, absolute: float, steps: int, sharp: float, u: NDArray, y: NDArray,
 ) -> int:  # fmt: skip
     """Maximise the dual; ``u`` and ``y`` leave holding the answer.
+
+    Compiled in :mod:`assembly.solvers.cone_solvers`.
 
     Args:
         Gt: (nu, r) columns of G, of order 1, and of H.
@@ -116,7 +118,7 @@ def dual_newton(
     return taken
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _slopes(
     M: NDArray, h: NDArray, push: NDArray, springs: int, layers: NDArray, old: NDArray,
     sigma: float, u: NDArray, y: NDArray, g: NDArray, z: NDArray, B: NDArray,
@@ -190,7 +192,7 @@ def _slopes(
     return smooth, 0.5 * residual, kink, 0.5 * primal
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
     """Lower half of S = B B^T + diag(1 .. 1, 0 .. 0)."""
     for i in range(len(S)):
@@ -201,7 +203,7 @@ def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
             S[i, i] += 1.0
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _solve(S: NDArray, g: NDArray, x: NDArray) -> bool:
     """S x = g by Cholesky, in the lower half of S."""
     r = len(g)

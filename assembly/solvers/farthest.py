@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
 from assembly.solvers.support import Body, screw_at, support, symmetric, within
@@ -145,10 +146,11 @@ def _first_direction(body: Body, search: Search) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def advance(body: Body, search: Search) -> int:
+def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
     """Look on until the bounds are as close as asked.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         body: what is searched.
         search: leaves holding the bounds.
 
@@ -162,7 +164,7 @@ def advance(body: Body, search: Search) -> int:
         if search.counts[1] >= search.counts[4]:
             return GAVE_UP
         height, v, pulls, n = support(
-            body, search.part, search.direction, _SHARE * search.tolerance
+            solvers, body, search.part, search.direction, _SHARE * search.tolerance
         )
         screw = screw_at(body, v)
         reached = 0.0

@@ -30,12 +30,13 @@ LANES = 16
 FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
-@njit(cache=True, fastmath=FAST, error_model="numpy")
 def interior_point(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, starts: NDArray,
-    tolerance: float, relative: float = 0.0,
+    tolerance: float, relative: float,
 ) -> tuple[NDArray, NDArray, int]:  # fmt: skip
     """Minimise; all arguments of order 1 (scale before).
+
+    Compiled in :mod:`assembly.solvers.cone_solvers`.
 
     Args:
         G: (r, nu).

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from assembly.solvers.interior import interior_point
+from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.vectors import divide, inner
 
 _SYMMETRIC = 1e-14  # H start counts as zero
@@ -42,11 +42,12 @@ class Body(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def support(
-    body: Body, part: int, direction: NDArray, tolerance: float
+    solvers: ConeSolvers, body: Body, part: int, direction: NDArray, tolerance: float
 ) -> tuple[float, NDArray, NDArray, NDArray]:
     """Largest component of the body's screws along a direction.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         body: what is searched.
         part: first of the three components.
         direction: (3,) unit vector.
@@ -75,7 +76,7 @@ def support(
         for i in range(p):
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
-        v, n, _ = interior_point(
+        v, n, _ = solvers.interior_point(
             np.zeros((0, nv)), np.zeros(0), divide(pulls, size), body.rows, right,
             body.starts, tolerance / size, 0.0,
         )  # fmt: skip

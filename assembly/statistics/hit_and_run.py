@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from assembly.solvers.interior import interior_point
+from assembly.solvers.cone_solvers import ConeSolvers
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -61,12 +61,13 @@ def hit_and_run(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def push_all(
-    rows: NDArray, starts: NDArray, free: NDArray, u: NDArray, pushes: NDArray,
-    ends: NDArray,
+    solvers: ConeSolvers, rows: NDArray, starts: NDArray, free: NDArray, u: NDArray,
+    pushes: NDArray, ends: NDArray,
 ) -> None:  # fmt: skip
     """Go from every row of u (k, nu) as far as a push leads: play is then taken up.
 
     Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         rows: (p, nu) orthonormal, zero where not ``free``.
         starts: (cones + 1,) first column of each cone, and nu.
         free: (nu,) bool, which may move; whole cones.
@@ -93,7 +94,9 @@ def push_all(
             for c in range(nu):
                 if free[c]:
                     right[l] += rows[l, c] * u[i, c]
-        found, _, steps = interior_point(none, nothing, push, rows, right, starts, 1e-9)
+        found, _, steps = solvers.interior_point(
+            none, nothing, push, rows, right, starts, 1e-9, 0.0
+        )
         for c in range(nu):
             if free[c]:
                 ends[i, c] = found[c] if steps >= 0 else np.nan

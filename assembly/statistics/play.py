@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.nominal import size_of
+from assembly.solvers.cone_solvers import cone_solvers
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.one_posture import Draws, OnePosture
 
@@ -67,7 +68,7 @@ def settle_play(
             scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
             wrench = [generators[k].normal(size=6) * scale for k in some.tolist()]
             pushes, ends = np.array(wrench) @ to_platform, np.empty_like(here)
-            push_all(rows, one.starts, free, here, pushes, ends)
+            push_all(cone_solvers(), rows, one.starts, free, here, pushes, ends)
             for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
                 ends[k] = _push_slowly(one, rows, free, here[k], pushes[k])
             here = ends

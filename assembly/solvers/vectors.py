@@ -1,0 +1,41 @@
+"""Short loops over rows, compiled: numpy's own forms of them compile far longer.
+
+An assignment to a slice, an array expression or ``np.sum`` brings numba's broadcasting
+and its error messages into every kernel that calls it: ten times the code to compile.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+@njit(cache=True, error_model="numpy")
+def inner(a: NDArray, b: NDArray) -> float:
+    """a.b, summed in order; :func:`assembly.solvers.interior.dot` is the quick one."""
+    total = 0.0
+    for j in range(len(a)):
+        total += a[j] * b[j]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def fill(to: NDArray, value: float) -> None:
+    """Set all of a row to a value."""
+    for j in range(len(to)):
+        to[j] = value
+
+
+@njit(cache=True, error_model="numpy")
+def copy(source: NDArray, to: NDArray) -> None:
+    """Copy a row into the first components of another."""
+    for j in range(len(source)):
+        to[j] = source[j]
+
+
+@njit(cache=True, error_model="numpy")
+def divide(v: NDArray, divisor: float) -> NDArray:
+    """(n,) a new row: v / divisor."""
+    quotient = np.empty(len(v))
+    for j in range(len(v)):
+        quotient[j] = v[j] / divisor
+    return quotient
