@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.nominal import size_of
-from assembly.solvers.cone_solvers import cone_solvers
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.one_posture import Draws, OnePosture
 
@@ -48,6 +47,7 @@ def settle_play(
         raise ValueError(f"play is {play!r}, expected one of {PLAY}")
     if play == "least" or not len(one.G.T):
         return found.platform_screw
+    from assembly.solvers.cone_solvers import cone_solvers
     from assembly.statistics.hit_and_run import hit_and_run, push_all
 
     u = found.clearances.copy()
