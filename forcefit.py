@@ -11,7 +11,7 @@ import assembly.statistics.cli  # noqa: F401  adds its commands
 import assembly.sweeps.cli  # noqa: F401  likewise
 import stiffness.cli
 import validation.cli
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import write_json
 
 app = typer.Typer(
@@ -19,7 +19,8 @@ app = typer.Typer(
     "and the proof of each number. SI units; screws [R T], wrenches [M F].",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(stiffness.cli.app, name="stiffness", help="How stiff is a link?")
 app.add_typer(assembly.cli.app, name="assembly", help="What pose, energy, error?")

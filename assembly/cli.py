@@ -10,9 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from assembly.posture import parse_assignments
-from stiffness.reading import BadInput, nearest
-from stiffness.screws import SCREW, WRENCH
+from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
@@ -63,6 +61,8 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from stiffness.screws import WRENCH
+
     names = [name.lower() for name in WRENCH]
     given = _components(texts, "--load", names)
     return [given.get(name, 0.0) for name in names]
@@ -72,6 +72,8 @@ def _components(
     texts: list[str], option: str, names: Sequence[str]
 ) -> dict[str, float]:
     """Numbers given by component, of a known few."""
+    from assembly.posture import parse_assignments
+
     given = parse_assignments(texts, option)
     for name in given:
         if name not in names:
@@ -100,6 +102,8 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     """
     if not texts:
         return None
+    from assembly.posture import parse_assignments
+
     given = parse_assignments(texts, option)
     for name in given:
         if name not in {"x", "y", "z"}:
@@ -121,6 +125,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from stiffness.screws import SCREW
+
     names = [name.lower() for name in SCREW]
     given = _components(texts, "--direction", names)
     length = sum(value**2 for value in given.values()) ** 0.5
@@ -161,7 +167,7 @@ def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
     """The posture asked for, of the robot without the effects of its file."""
-    from assembly.posture import place_robot
+    from assembly.posture import parse_assignments, place_robot
     from assembly.robots import load_robot
 
     return place_robot(
@@ -183,7 +189,11 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float]:
     Raises:
         BadInput: not of that form.
     """
-    return parse_assignments(texts, "--under") if texts else {}
+    if not texts:
+        return {}
+    from assembly.posture import parse_assignments
+
+    return parse_assignments(texts, "--under")
 
 
 @contextmanager

@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from stiffness.arguments import Json
-from stiffness.options import checked
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import write_json
 
 library = typer.Typer(no_args_is_help=True)
@@ -25,6 +24,7 @@ def build(
     from rich.progress import Progress
 
     from stiffness.library import build_library, read_spec
+    from stiffness.options import checked
 
     wanted = read_spec(spec)
     count = int(checked("--workers", workers, "1", least=1))

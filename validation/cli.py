@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,12 +21,14 @@ from assembly.cli import (
     posture_of,
     progress_bars,
 )
-from assembly.posture import Posture
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import write_json
 from validation.campaign.cli import inspect
-from validation.diagnosis.cli import diagnose
+from validation.diagnosis_cli import diagnose
 from validation.synthetic.cli import generate
+
+if TYPE_CHECKING:
+    from assembly.posture import Posture
 
 app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
@@ -113,7 +115,7 @@ def crosscheck(
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare(posture: Posture) -> Crosscheck | PlayCheck:
+    def compare(posture: "Posture") -> Crosscheck | PlayCheck:
         acting = act(posture, wrench, g, covariates)
         at, pushes = acting.posture, acting.load.tolist()
         weight = None if acting.gravity is None else acting.gravity.tolist()
@@ -141,7 +143,7 @@ def crosscheck(
 
 
 def _crosscheck_grid(
-    robot: str, grid: str, compare: Callable[[Posture], Any], json: str | None
+    robot: str, grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
     """Every pose of a grid, with a progress bar."""
     from assembly.robots import load_robot

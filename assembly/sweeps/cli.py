@@ -22,7 +22,7 @@ from assembly.cli import (
     progress_bars,
     save_figure,
 )
-from stiffness.reading import BadInput, nearest
+from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
 
