@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +14,10 @@ import validation.cli
 from stiffness.message import BadInput
 from stiffness.writing import write_json
 
+if TYPE_CHECKING:
+    __version__: str
+
 app = typer.Typer(
-    help="Forced assembly of parallel manipulators: stiffness, energy, pose error, "
-    "and the proof of each number. SI units; screws [R T], wrenches [M F].",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -27,6 +28,41 @@ app.add_typer(assembly.cli.app, name="assembly", help="What pose, energy, error?
 app.add_typer(validation.cli.app, name="validation", help="Is it true?")
 
 
+def __getattr__(name: str) -> str:
+    """``__version__``: of the installed package, whose one source is pyproject.toml."""
+    if name != "__version__":
+        raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("forcefit")
+    except PackageNotFoundError:
+        return "0+not.installed"
+
+
+def _print_version(asked: bool) -> None:
+    """What ``--version`` does."""
+    if asked:
+        print(f"forcefit {__getattr__('__version__')}")
+        raise typer.Exit
+
+
+@app.callback()
+def forcefit(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version,
+            help="Show the version and exit.",
+        ),
+    ] = False,
+) -> None:
+    """Forced assembly of parallel manipulators, and the proof of each number.
+
+    Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
+    """
+
+
 @app.command()
 def study(
     file: Annotated[Path, typer.Argument(help="Study file (TOML).")],
@@ -35,7 +71,7 @@ def study(
     ] = None,
     json: assembly.cli.JsonOption = None,
 ) -> None:
-    """Run the main job: one robot, every check the file names, to one report.
+    """Run the main job: every check of a study file, one report.
 
     Writes report.html (self-contained), results.json and results.nc into the folder
     the study file names.  Exit status 1 if a check fails.

@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -196,6 +196,16 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float]:
     return parse_assignments(texts, "--under")
 
 
+def one_thread() -> AbstractContextManager:
+    """Linear algebra on one thread: a posture's matrices are too small for more.
+
+    The others would spin while they wait for work, at the cost of this one's time.
+    """
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
+
+
 @contextmanager
 def progress_bars() -> Generator[Any, None, None]:
     """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each."""
@@ -240,7 +250,7 @@ def solve(
     under: UnderOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Close the robot at least energy: pose error, energy, wrenches, zone margin."""
+    """Close at least energy: pose error, energy, wrenches, margin."""
     from assembly.effects.acting import act
     from assembly.results import solution_of, solution_text
 
@@ -248,7 +258,8 @@ def solve(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
-    results = solution_of(acting.posture, acting.load, acting.gravity)
+    with one_thread():
+        results = solution_of(acting.posture, acting.load, acting.gravity)
     if results["status"] == "ok" and acting.conditions.reads_otherwise:
         results["reading"] = acting.reading(results["platform_screw"])
     write_json(results, json)
@@ -265,7 +276,7 @@ def zone(
     joint: JointOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Say whether the rigid robot goes together by its play alone, and the margin."""
+    """Whether the robot goes together by play alone; the margin."""
     from assembly.results import zone_of, zone_text
 
     found = zone_of(posture_of(robot, pose, joint))
@@ -294,7 +305,8 @@ def exact(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under), finite=True,
     )  # fmt: skip
-    results = exact_of(acting.posture, acting.load, acting.gravity)
+    with one_thread():
+        results = exact_of(acting.posture, acting.load, acting.gravity)
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -329,7 +341,7 @@ def error(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Certified bounds of the platform's largest pose error, problem (27)."""
+    """Certified bounds of the largest pose error, problem (27)."""
     from assembly.pose_error import READINGS
     from assembly.results import pose_error_of, pose_error_text
 
@@ -346,11 +358,13 @@ def error(
         if not 0 < value < float("inf"):
             option = "--" + key.replace("_", "-")
             raise BadInput(f"{option}: found {value}, expected a finite number > 0")
-    results = pose_error_of(
-        posture_of(robot, pose, joint), reading or READINGS,
-        point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
-        direction=parse_direction(direction), **options,
-    )  # fmt: skip
+    posture = posture_of(robot, pose, joint)
+    at = parse_vector(point, "--point") or (0.0, 0.0, 0.0)
+    along = parse_direction(direction)
+    with one_thread():
+        results = pose_error_of(
+            posture, reading or READINGS, point=at, direction=along, **options
+        )
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
@@ -387,7 +401,7 @@ def show(
         str, typer.Option(help="Of the errors: frozen | free | budget.")
     ] = "budget",
 ) -> None:
-    """Draw the nominal and the forced robot, and the errors its platform can have."""
+    """Draw the nominal and the forced robot, and its errors."""
     from assembly.energy import solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly
