@@ -11,7 +11,7 @@ import assembly.statistics.cli  # noqa: F401  adds its commands
 import assembly.sweeps.cli  # noqa: F401  likewise
 import stiffness.cli
 import validation.cli
-from stiffness.message import BadInput
+from stiffness.message import BadInput, one_line
 from stiffness.writing import write_json
 
 if TYPE_CHECKING:
@@ -52,7 +52,9 @@ def forcefit(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", is_eager=True, callback=_print_version,
+            "--version",
+            is_eager=True,
+            callback=_print_version,
             help="Show the version and exit.",
         ),
     ] = False,
@@ -122,7 +124,7 @@ def main() -> None:
 def _complain(message: str, status: int) -> int:
     """A message on stderr, if there is one: help without a command has none."""
     if message:
-        print(f"forcefit: {message}", file=sys.stderr)
+        print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
     return status
 
 

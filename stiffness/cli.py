@@ -167,7 +167,7 @@ def fea(
     seconds: Seconds = 300.0,
     json: Json = None,
 ) -> None:
-    """K_E of a link by finite elements, refined to the asked accuracy."""
+    """K_E by finite elements, refined to the asked accuracy."""
     from stiffness.fea import Budget, solve_link
     from stiffness.material import Material
     from stiffness.options import BeamOptions, checked
@@ -215,7 +215,10 @@ def compare(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """K_E by finite elements beside a beam, straight or --curve, entry by entry."""
+    """K_E by finite elements beside a beam, entry by entry.
+
+    The beam is straight, of the section given, or along a curve.
+    """
     from stiffness.compare import compare_link
     from stiffness.fea import mesh_link
     from stiffness.options import BeamOptions
@@ -267,7 +270,7 @@ def slenderness(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """Beam beside finite elements over L / r: the end effect, fitted and drawn.
+    """Beam beside finite elements over L / r: the end effect.
 
     r is twice the section's larger radius of gyration, a round bar's radius.
     """
@@ -324,7 +327,7 @@ def stress(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """Peak von Mises stress of a tip wrench, away from the clamped edges.
+    """Peak von Mises stress, away from the clamped edges.
 
     With a section, the beam formula stands beside it.
     """

@@ -98,10 +98,11 @@ def crosscheck(
         float, typer.Option(min=0.0, help="[s] for each simulation.")
     ] = 600.0,
 ) -> None:
-    """Compare with a multibody simulation at several scales of the imperfections.
+    """Compare with a multibody simulation, at several scales.
 
-    Joint clearances are left out on both sides unless asked for; energies and springs
-    are then compared instead of poses.  Exit status 1 when a check fails.
+    The scales are of errors and loads.  Joint clearances are left out on both sides
+    unless asked for; energies and springs are then compared instead of poses.  Exit
+    status 1 when a check fails.
     """
     from assembly.effects.acting import act
     from validation.crosscheck import Crosscheck, attempt
@@ -175,10 +176,11 @@ def validity(
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """What the model's assumptions cost a robot at a pose: position, rotation, energy.
+    """What the model's assumptions cost a robot at a pose.
 
-    Linear closures, beams instead of solids, weight at the links' ends, disc and cone
-    instead of pins in two bushes; what exceeds 20 um or 1 % is marked.
+    In position, rotation and energy: linear closures, beams instead of solids, weight
+    at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
+    or 1 % is marked.
     """
     from validation.assumptions import assumption_costs, costs_table, costs_text
 

@@ -27,7 +27,7 @@ def diagnose(
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
 ) -> None:
-    """Trace measured deviations to the effect that the declared model lacks.
+    """Trace measured deviations to the effect the model lacks.
 
     The verdict is explained, none_needed, ambiguous or outside_library; errors before
     and after are on rows that played no part in choosing or fitting.

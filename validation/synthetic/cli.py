@@ -109,7 +109,7 @@ def generate(
     seed: Annotated[int, typer.Option(help="Of all draws.")] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Measure a simulated machine that has effects which its robot file lacks.
+    """Measure a simulated machine with effects its file lacks.
 
     Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints are tight
     unless their play is hidden.
