@@ -177,7 +177,7 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
          "/nowhere/x.nc: no folder /nowhere"),
         (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
          "--pose"),
-        (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\nze"),
+        (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),
         (["assembly", "solve"], "Missing argument 'ROBOT'"),
         (["assembly", "solev", "irsbot2"], "'solve'"),
         (["asembly"], "'assembly'"),

@@ -44,8 +44,10 @@ OWNERS = {
         "assembly/statistics/monte_carlo.py",
         "assembly/statistics/importance.py",
         "assembly/statistics/tolerances.py",
+        "assembly/tables.py",
         "stiffness/library.py",
     ),
+    "pandas": ("assembly/tables.py",),
     "h5netcdf": ("assembly/sweeps/dataset.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
 }
