@@ -42,7 +42,8 @@ def shown(answer, link):
     posture = answer.posture
     return [
         posture.robot, posture.robot.frames[0], posture, answer, solve_exact(posture),
-        bound_pose_error(answer), zone_margin(posture), reachable_screws(answer, "free"),
+        bound_pose_error(answer), zone_margin(posture),
+        reachable_screws(answer, "free"),
         answer.linearisation, answer.joints, link,
         find_singularities(posture.robot, posture.transforms[None]),
         read_campaign(CAMPAIGNS / "self_weight"),

@@ -122,6 +122,11 @@ def test_every_folder_was_looked_at():
         assert any(m.startswith(("numpy", "stiffness")) for m in modules), folder
 
 
+@pytest.mark.parametrize("folder", BELOW)
+def test_every_package_tells_type_checkers_that_it_has_types(folder):
+    assert (ROOT / folder / "py.typed").is_file()
+
+
 @pytest.mark.parametrize("module", [*BELOW, "forcefit"])
 def test_nothing_heavy_is_imported_before_it_is_needed(module):
     assert loaded(module, ROOT) == []
