@@ -15,8 +15,21 @@ from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
 
+
+def _built_in_names(incomplete: str) -> list[str]:
+    """What a shell offers beside files."""
+    from assembly.robots import BUILT_IN
+
+    return [name for name in BUILT_IN if name.startswith(incomplete)]
+
+
 RobotArgument = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="A robot file, or a built-in name.")
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A robot file, or a built-in name.",
+        autocompletion=_built_in_names,
+    ),
 ]
 PoseOption = Annotated[
     list[str] | None,

@@ -253,9 +253,10 @@ def test_the_version_is_that_of_the_package(run):
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [("forcefit asse", "assembly"), ("forcefit assembly so", "solve"),
-     ("forcefit validation crosscheck --clear", "--clearances")],
+     ("forcefit validation crosscheck --clear", "--clearances"),
+     ("forcefit assembly zone arm", "arm6")],
 )  # fmt: skip
-def test_a_shell_completes_commands_and_options(typed, offered):
+def test_a_shell_completes_commands_options_and_robots(typed, offered):
     asked = {"_FORCEFIT_COMPLETE": "complete_bash", "COMP_WORDS": typed,
              "COMP_CWORD": str(len(typed.split()) - 1)}  # fmt: skip
     done = subprocess.run([sys.executable, "-m", "forcefit"], env=os.environ | asked,
