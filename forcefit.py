@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,19 +11,58 @@ import assembly.statistics.cli  # noqa: F401  adds its commands
 import assembly.sweeps.cli  # noqa: F401  likewise
 import stiffness.cli
 import validation.cli
-from stiffness.reading import BadInput
+from stiffness.message import BadInput, one_line
 from stiffness.writing import write_json
 
+if TYPE_CHECKING:
+    __version__: str
+
 app = typer.Typer(
-    help="Forced assembly of parallel manipulators: stiffness, energy, pose error, "
-    "and the proof of each number. SI units; screws [R T], wrenches [M F].",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(stiffness.cli.app, name="stiffness", help="How stiff is a link?")
 app.add_typer(assembly.cli.app, name="assembly", help="What pose, energy, error?")
 app.add_typer(validation.cli.app, name="validation", help="Is it true?")
+
+
+def __getattr__(name: str) -> str:
+    """``__version__``: of the installed package, whose one source is pyproject.toml."""
+    if name != "__version__":
+        raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("forcefit")
+    except PackageNotFoundError:
+        return "0+not.installed"
+
+
+def _print_version(asked: bool) -> None:
+    """What ``--version`` does."""
+    if asked:
+        print(f"forcefit {__getattr__('__version__')}")
+        raise typer.Exit
+
+
+@app.callback()
+def forcefit(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=_print_version,
+            help="Show the version and exit.",
+        ),
+    ] = False,
+) -> None:
+    """Forced assembly of parallel manipulators, and the proof of each number.
+
+    Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
+    """
 
 
 @app.command()
@@ -34,7 +73,7 @@ def study(
     ] = None,
     json: assembly.cli.JsonOption = None,
 ) -> None:
-    """Run the main job: one robot, every check the file names, to one report.
+    """Run the main job: every check of a study file, one report.
 
     Writes report.html (self-contained), results.json and results.nc into the folder
     the study file names.  Exit status 1 if a check fails.
@@ -85,7 +124,7 @@ def main() -> None:
 def _complain(message: str, status: int) -> int:
     """A message on stderr, if there is one: help without a command has none."""
     if message:
-        print(f"forcefit: {message}", file=sys.stderr)
+        print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
     return status
 
 

@@ -4,21 +4,32 @@ import os
 import sys
 import time
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from assembly.posture import parse_assignments
-from stiffness.reading import BadInput, nearest
-from stiffness.screws import SCREW, WRENCH
+from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
 app = typer.Typer(no_args_is_help=True)
 
+
+def _built_in_names(incomplete: str) -> list[str]:
+    """What a shell offers beside files."""
+    from assembly.robots import BUILT_IN
+
+    return [name for name in BUILT_IN if name.startswith(incomplete)]
+
+
 RobotArgument = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="A robot file, or a built-in name.")
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A robot file, or a built-in name.",
+        autocompletion=_built_in_names,
+    ),
 ]
 PoseOption = Annotated[
     list[str] | None,
@@ -63,6 +74,8 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from stiffness.screws import WRENCH
+
     names = [name.lower() for name in WRENCH]
     given = _components(texts, "--load", names)
     return [given.get(name, 0.0) for name in names]
@@ -72,6 +85,8 @@ def _components(
     texts: list[str], option: str, names: Sequence[str]
 ) -> dict[str, float]:
     """Numbers given by component, of a known few."""
+    from assembly.posture import parse_assignments
+
     given = parse_assignments(texts, option)
     for name in given:
         if name not in names:
@@ -100,6 +115,8 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     """
     if not texts:
         return None
+    from assembly.posture import parse_assignments
+
     given = parse_assignments(texts, option)
     for name in given:
         if name not in {"x", "y", "z"}:
@@ -121,6 +138,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from stiffness.screws import SCREW
+
     names = [name.lower() for name in SCREW]
     given = _components(texts, "--direction", names)
     length = sum(value**2 for value in given.values()) ** 0.5
@@ -161,7 +180,7 @@ def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
     """The posture asked for, of the robot without the effects of its file."""
-    from assembly.posture import place_robot
+    from assembly.posture import parse_assignments, place_robot
     from assembly.robots import load_robot
 
     return place_robot(
@@ -183,7 +202,21 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float]:
     Raises:
         BadInput: not of that form.
     """
-    return parse_assignments(texts, "--under") if texts else {}
+    if not texts:
+        return {}
+    from assembly.posture import parse_assignments
+
+    return parse_assignments(texts, "--under")
+
+
+def one_thread() -> AbstractContextManager:
+    """Linear algebra on one thread: a posture's matrices are too small for more.
+
+    The others would spin while they wait for work, at the cost of this one's time.
+    """
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
 
 
 @contextmanager
@@ -230,7 +263,7 @@ def solve(
     under: UnderOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Close the robot at least energy: pose error, energy, wrenches, zone margin."""
+    """Close at least energy: pose error, energy, wrenches, margin."""
     from assembly.effects.acting import act
     from assembly.results import solution_of, solution_text
 
@@ -238,7 +271,8 @@ def solve(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
-    results = solution_of(acting.posture, acting.load, acting.gravity)
+    with one_thread():
+        results = solution_of(acting.posture, acting.load, acting.gravity)
     if results["status"] == "ok" and acting.conditions.reads_otherwise:
         results["reading"] = acting.reading(results["platform_screw"])
     write_json(results, json)
@@ -255,7 +289,7 @@ def zone(
     joint: JointOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Say whether the rigid robot goes together by its play alone, and the margin."""
+    """Whether the robot goes together by play alone; the margin."""
     from assembly.results import zone_of, zone_text
 
     found = zone_of(posture_of(robot, pose, joint))
@@ -284,7 +318,8 @@ def exact(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under), finite=True,
     )  # fmt: skip
-    results = exact_of(acting.posture, acting.load, acting.gravity)
+    with one_thread():
+        results = exact_of(acting.posture, acting.load, acting.gravity)
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -319,7 +354,7 @@ def error(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Certified bounds of the platform's largest pose error, problem (27)."""
+    """Certified bounds of the largest pose error, problem (27)."""
     from assembly.pose_error import READINGS
     from assembly.results import pose_error_of, pose_error_text
 
@@ -336,11 +371,13 @@ def error(
         if not 0 < value < float("inf"):
             option = "--" + key.replace("_", "-")
             raise BadInput(f"{option}: found {value}, expected a finite number > 0")
-    results = pose_error_of(
-        posture_of(robot, pose, joint), reading or READINGS,
-        point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
-        direction=parse_direction(direction), **options,
-    )  # fmt: skip
+    posture = posture_of(robot, pose, joint)
+    at = parse_vector(point, "--point") or (0.0, 0.0, 0.0)
+    along = parse_direction(direction)
+    with one_thread():
+        results = pose_error_of(
+            posture, reading or READINGS, point=at, direction=along, **options
+        )
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
@@ -377,7 +414,7 @@ def show(
         str, typer.Option(help="Of the errors: frozen | free | budget.")
     ] = "budget",
 ) -> None:
-    """Draw the nominal and the forced robot, and the errors its platform can have."""
+    """Draw the nominal and the forced robot, and its errors."""
     from assembly.energy import solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly

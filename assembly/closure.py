@@ -29,6 +29,7 @@ from assembly.links import compliance_factor, joint_compliances, link_compliance
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,8 @@ class VirtualJoints:
     scaled: NDArray
     free: NDArray
     bounded_motion: bool
+
+    __repr__, _repr_html_ = short_repr, html_table
 
 
 def virtual_joints(
@@ -178,6 +181,8 @@ class Linearisation:
     rows: NDArray
     platform: NDArray
     size: float
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @cached_property
     def misfit(self) -> NDArray:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.posture import Posture
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,8 @@ class Conditions:
     base: NDArray = field(default_factory=lambda: np.zeros(6))
     tool: NDArray = field(default_factory=lambda: np.zeros(3))
     reading: NDArray | float = 0.0
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def __len__(self) -> int:
         return len(self.transforms)

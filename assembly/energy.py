@@ -17,6 +17,7 @@ alone, (24)-(26), sum to zero on an unloaded platform.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,6 +44,12 @@ from assembly.solvers.conic import (
     minimise_energy,
 )
 from assembly.solvers.reduction import FreeMotion, Reduction, reduce_problem
+from stiffness.display import Figures, html_table, numbers, screw_text, short_repr
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
 
 LEFT_OPEN, EXCESS = 1e-9, 1e-9  # accepted: [rad, lengths] of a closure, [-] of play
 
@@ -81,6 +88,35 @@ class Assembly:
     multipliers: NDArray
     energy_without_play: float
     ranks: dict[str, int]
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly solve`` prints of it."""
+        forces = np.linalg.norm(self.wrenches[:, 3:], axis=1)
+        most = int(forces.argmax())
+        return {
+            "pose": f"{numbers(self.posture.pose().values())} m, rad",
+            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
+            "energy": f"{self.energy:.6g} J",
+            "platform error": screw_text(self.platform_screw),
+            "largest force": f"{forces[most]:.4g} N, in "
+            f"{self.posture.robot.frames[most].name}",
+            "certificate": f"closure residual {self.closure_residual():.1e}, clearance "
+            f"excess {self.clearance_excess():.1e}, gap {self.duality_gap():.1e} J",
+        }
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Frames, closures and platform; see :mod:`assembly.tables`."""
+        from assembly.tables import assembly_dataset
+
+        return assembly_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each frame, columns (variable, component)."""
+        from assembly.tables import frame_table
+
+        return frame_table(self.to_xarray(), "frame")
 
     @property
     def posture(self) -> Posture:

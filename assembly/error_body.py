@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from assembly.pose_error import Reach
+from stiffness.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -32,6 +33,8 @@ class ErrorBody:
     faces: NDArray
     directions: NDArray
     heights: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def slack(self) -> float:

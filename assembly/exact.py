@@ -25,6 +25,7 @@ what that means.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +55,13 @@ from assembly.energy import Assembly, solve_assembly
 from assembly.finite import LINK, PLAY, SPRING, FiniteRobot, Placement
 from assembly.posture import Posture
 from assembly.solvers.conic import into_cones
+from stiffness.display import Figures, html_table, numbers, screw_text, short_repr
 from stiffness.screws import screw_map
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
 
 _STEPS = 80  # at most; 3 to 5 are usual
 _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
@@ -99,6 +106,31 @@ class ExactAssembly:
     expansion: Expansion
     stationarity: float
     iterations: int
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly exact`` prints of it."""
+        return {
+            "pose": f"{numbers(self.posture.pose().values())} m, rad",
+            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
+            "energy": f"{self.energy:.6g} J with finite motions",
+            "platform error": screw_text(self.platform_screw),
+            "certificate": f"closures hold to {self.closure_residual():.1e}, balance "
+            f"to {self.stationarity:.1e}; {self.iterations} steps",
+        }
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Frames, closures and platform; see :mod:`assembly.tables`."""
+        from assembly.tables import assembly_dataset
+
+        return assembly_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each frame, columns (variable, component)."""
+        from assembly.tables import frame_table
+
+        return frame_table(self.to_xarray(), "frame")
 
     @property
     def placement(self) -> Placement:

@@ -29,6 +29,7 @@ from assembly.closure import VirtualJoints, virtual_joints
 from assembly.energy import Assembly, without_own_springs
 from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
 from assembly.solvers.reduction import NOISE, complement
+from stiffness.display import Figures, bracket, html_table, short_repr
 from stiffness.screws import skew
 
 if TYPE_CHECKING:
@@ -76,6 +77,8 @@ class Reach:
     start: NDArray
     group: NDArray
     unbounded: bool = False
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def at_point(self, offset: ArrayLike) -> "Reach":
         """The same set for another point of the platform.
@@ -155,6 +158,17 @@ class PoseError:
     translation_screw: NDArray
     cuts: int
     unproved: str = ""
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly error`` prints of it."""
+        found = {
+            "reading": self.reading,
+            "rotation": f"{bracket(self.rotation_error)} mrad",
+            "translation": f"{bracket(self.translation_error)} mm",
+        }
+        return found | ({"not proved": self.unproved} if self.unproved else {})
 
 
 def bound_pose_error(

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.nominal import NOT_CLOSED, Target, Track, follow
 from assembly.robot import Robot
+from stiffness.display import Figures, brief, html_table, numbers, short_repr
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
@@ -44,6 +45,24 @@ class Posture:
     coordinates: NDArray
     transforms: NDArray
     mismatch: float
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """Where the platform stands, and what drives it there."""
+        if self.transforms.ndim > 3:
+            return {"postures": str(self.transforms.shape[:-3])}
+        frames = self.robot.frames
+        drives = [
+            f"{f.name} {x:.6g}" for f, x in zip(frames, self.coordinates, strict=True)
+            if f.actuated
+        ]  # fmt: skip
+        return {
+            "pose": f"{numbers(self.pose().values())} m, rad",
+            "drives": f"{brief(', '.join(drives)) or 'none'} [rad, m]",
+            "frames": str(len(frames)),
+            "nominal mismatch": f"{self.mismatch:.2g} rad, m",
+        }
 
     @cached_property
     def platform(self) -> NDArray:

@@ -14,6 +14,7 @@ from assembly.posture import Posture
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
 from assembly.zone import zone_margin
+from stiffness.display import bracket, numbers, rounded, screw_text
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
@@ -198,26 +199,18 @@ def failure_status(error: Exception) -> str:
 
 def exact_text(results: dict[str, Any]) -> str:
     """An exact solution for people: a few lines."""
-    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    screw, certificate = results["platform_screw"], results["certificate"]
+    certificate = results["certificate"]
     return "\n".join([
         *lines,
         f"energy: {results['energy']:.6g} J with finite motions",
-        _screw_text(screw),
+        f"platform error: {screw_text(results['platform_screw'])}",
         _linearisation_text(results["linearisation_error"]),
         f"closures hold to {certificate['closure_residual']:.1e}, balance to "
         f"{certificate['stationarity']:.1e}; {certificate['iterations']} steps",
     ])  # fmt: skip
-
-
-def _screw_text(screw: NDArray) -> str:
-    """The platform's error."""
-    return (
-        f"platform error: {_numbers(screw[:3] * 1e3)} mrad, "
-        f"{_numbers(screw[3:] * 1e3)} mm"
-    )
 
 
 def _linearisation_text(found: dict[str, Any]) -> str:
@@ -225,12 +218,12 @@ def _linearisation_text(found: dict[str, Any]) -> str:
     if found.get("status", "ok") != "ok":
         return f"linearisation error: unknown, {found['status']}"
     rotation, translation = (
-        _rounded(scale * float(np.linalg.norm(found[part])))
+        rounded(scale * float(np.linalg.norm(found[part])))
         for part, scale in (("rotation", 1e3), ("translation", 1e6))
     )
     return (
         f"linearisation error: {rotation:.3g} mrad, {translation:.3g} um, energy "
-        f"{_rounded(100 * found['relative_energy']):+.3g} %"
+        f"{rounded(100 * found['relative_energy']):+.3g} %"
     )
 
 
@@ -309,22 +302,25 @@ def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
+def _bracket_text(found: dict[str, Any]) -> str:
+    """Both bounds in mrad or mm."""
+    return bracket((found["lower"], found["upper"]))
+
+
 def pose_error_text(results: dict[str, Any]) -> str:
     """Bounds for people: a line for each reading."""
-    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
         lines.append(f"{results['status']}: {results['reason']}")
     for reading, found in (results["error"] or {}).items():
         rotation, translation = found["rotation"], found["translation"]
         lines.append(
-            f"{reading:7s} rotation {1e3 * rotation['lower']:.6g} to "
-            f"{1e3 * rotation['upper']:.6g} mrad, translation "
-            f"{1e3 * translation['lower']:.6g} to {1e3 * translation['upper']:.6g} mm"
+            f"{reading:7s} rotation {_bracket_text(rotation)} mrad, "
+            f"translation {_bracket_text(translation)} mm"
         )
         if "along" in found:
-            low, high = found["along"]["lower"], found["along"]["upper"]
             unit = "mm" if np.any(results["direction"][3:]) else "mrad"
-            lines.append(f"        along it {1e3 * low:.6g} to {1e3 * high:.6g} {unit}")
+            lines.append(f"        along it {_bracket_text(found['along'])} {unit}")
     return "\n".join(lines)
 
 
@@ -337,17 +333,17 @@ def solution_text(results: dict[str, Any]) -> str:
     Returns:
         Text without colours.
     """
-    lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
         lines.append(f"{results['status']}: {results['reason']}")
     if results["energy"] is None:
         return "\n".join(lines)
-    screw, certificate = results["platform_screw"], results["certificate"]
+    certificate = results["certificate"]
     lines += [
         f"energy: {results['energy']:.6g} J",
-        _screw_text(screw),
+        f"platform error: {screw_text(results['platform_screw'])}",
         _linearisation_text(results["linearisation_error"]),
         f"certificate: closure residual {certificate['closure_residual']:.1e}, "
         f"clearance excess {certificate['clearance_excess']:.1e}, "
@@ -360,13 +356,3 @@ def solution_text(results: dict[str, Any]) -> str:
 def _factor(value: float | None) -> str:
     """A margin, or that there is none."""
     return "none" if value is None else f"{value:.4g}"
-
-
-def _numbers(values: Any) -> str:
-    """Numbers in brackets."""
-    return "[" + " ".join(f"{_rounded(v):.4g}" for v in values) + "]"
-
-
-def _rounded(value: float) -> float:
-    """A number for people: rounding errors, below 1e-9 in any unit here, are zero."""
-    return 0.0 if abs(value) < 1e-9 else float(value)

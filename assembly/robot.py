@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffness.display import Figures, html_table, largest, short_repr
 from stiffness.reading import BadInput, nearest, quoted
 from stiffness.screws import rotation_matrix, transform
 
@@ -157,6 +158,8 @@ class Frame:
     mass: float = 0.0
     centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
 
+    __repr__, _repr_html_ = short_repr, html_table
+
     def __post_init__(self) -> None:
         for name, shape in _SHAPES.items():
             value = getattr(self, name)
@@ -211,6 +214,22 @@ class Robot:
     closures: tuple[tuple[str, str], ...] = ()
     description: str = ""
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What one asks for first."""
+        kinds = ("actuated", "passive")
+        count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
+        return {
+            "frames": f"{len(self.frames)}, joints {' and '.join(count)}",
+            "closures": str(len(self.closures)),
+            "platform": self.platform,
+            "links": f"{sum(f.link is not None for f in self.frames)} elastic",
+            "play": f"in {sum(f.clearance is not None for f in self.frames)} joints",
+            "largest error": largest(self.errors),
+            **({"effects": ", ".join(self.effects)} if self.effects else {}),
+        }
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", parents_first(self.frames))

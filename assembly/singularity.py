@@ -33,6 +33,7 @@ from assembly.closure import closure_signs
 from assembly.nominal import Target, follow, mobile, motion_screws, size_of
 from assembly.posture import home_posture
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
@@ -61,6 +62,8 @@ class Singularities:
     parallel_joints: NDArray
     parallel_screws: NDArray
     closure_joints: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def condition(self) -> NDArray:

@@ -2,11 +2,9 @@
 
 import logging
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from stiffness.arguments import (
     Accuracy,
@@ -31,31 +29,16 @@ from stiffness.arguments import (
     Width,
     Young,
 )
-from stiffness.interface import Interface, parse_interface
 from stiffness.library_cli import library
-from stiffness.link import LinkStiffness
-from stiffness.options import (
-    BeamOptions,
-    beam_name,
-    checked,
-    direction,
-    numbers,
-)
-from stiffness.options import (
-    wrench as parse_wrench,
-)
-from stiffness.reading import BadInput
-from stiffness.results import (
-    comparison_results,
-    comparison_text,
-    link_results,
-    link_text,
-    stress_results,
-    stress_text,
-    sweep_results,
-    sweep_text,
-)
+from stiffness.message import BadInput
 from stiffness.writing import check_writable, write_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from stiffness.interface import Interface
+    from stiffness.link import LinkStiffness
+    from stiffness.options import BeamOptions
 
 app = typer.Typer(no_args_is_help=True)
 app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
@@ -79,25 +62,35 @@ def _check_outputs(json: str | None, figure: Path | None = None) -> None:
             check_writable(path)
 
 
-def _interfaces(base: str, tip: str) -> tuple[Interface, Interface]:
+def _interfaces(base: str, tip: str) -> "tuple[Interface, Interface]":
     """Both interfaces of the options."""
+    from stiffness.interface import parse_interface
+
     return parse_interface(base, "--base"), parse_interface(tip, "--tip")
 
 
-def _up(text: str | None) -> NDArray | None:
+def _up(text: str | None) -> "NDArray | None":
     """The section's z, if it was given."""
+    from stiffness.options import direction
+
     return None if text is None else direction("--up", text)
 
 
 def _accuracy(value: float) -> float:
     """An accuracy that can be asked for."""
+    from stiffness.options import checked
+
     return checked("--accuracy", value, "1", least=1e-5, below=0.5)
 
 
-def _curve_link(path: Path, options: BeamOptions) -> tuple[LinkStiffness, float, float]:
+def _curve_link(
+    path: Path, options: "BeamOptions"
+) -> "tuple[LinkStiffness, float, float]":
     """A beam along a curve, its section's size and its length [m]."""
     from stiffness.curve import curve_compliance, curve_length
     from stiffness.curve_file import read_curve
+    from stiffness.link import LinkStiffness
+    from stiffness.options import beam_name
 
     E, nu = options.material()
     theory = options.checked_theory()
@@ -124,6 +117,11 @@ def beam(
     json: Json = None,
 ) -> None:
     """K_E of a straight beam of constant section, in closed form."""
+    import numpy as np
+
+    from stiffness.options import BeamOptions, checked, direction
+    from stiffness.results import link_results, link_text
+
     options = BeamOptions(
         young, poisson, radius, inner_radius, width, height, theory, section
     )
@@ -144,6 +142,9 @@ def curve(
     json: Json = None,
 ) -> None:
     """K_E of a beam along a curve: tapered, bent, L-shaped."""
+    from stiffness.options import BeamOptions
+    from stiffness.results import link_results, link_text
+
     link, _, _ = _curve_link(file, BeamOptions(young, poisson, theory=theory))
     write_json(link_results(link), json)
     if json != "-":
@@ -166,10 +167,12 @@ def fea(
     seconds: Seconds = 300.0,
     json: Json = None,
 ) -> None:
-    """K_E of a link by finite elements, refined to the asked accuracy."""
+    """K_E by finite elements, refined to the asked accuracy."""
     from stiffness.fea import Budget, solve_link
     from stiffness.material import Material
+    from stiffness.options import BeamOptions, checked
     from stiffness.parts import parse_mass, parse_part
+    from stiffness.results import link_results, link_text
     from stiffness.surface import read_surface
 
     E, nu = BeamOptions(young, poisson).material()
@@ -212,9 +215,14 @@ def compare(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """K_E by finite elements beside a beam, straight or --curve, entry by entry."""
+    """K_E by finite elements beside a beam, entry by entry.
+
+    The beam is straight, of the section given, or along a curve.
+    """
     from stiffness.compare import compare_link
     from stiffness.fea import mesh_link
+    from stiffness.options import BeamOptions
+    from stiffness.results import comparison_results, comparison_text
 
     options = BeamOptions(
         young, poisson, radius, inner_radius, width, height, theory, section
@@ -262,13 +270,15 @@ def slenderness(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """Beam beside finite elements over L / r: the end effect, fitted and drawn.
+    """Beam beside finite elements over L / r: the end effect.
 
     r is twice the section's larger radius of gyration, a round bar's radius.
     """
     from rich.console import Console
     from rich.progress import Progress
 
+    from stiffness.options import BeamOptions, numbers
+    from stiffness.results import sweep_results, sweep_text
     from stiffness.slenderness import sweep_slenderness
 
     options = BeamOptions(
@@ -317,12 +327,15 @@ def stress(
     figure: Figure = None,
     json: Json = None,
 ) -> None:
-    """Peak von Mises stress of a tip wrench, away from the clamped edges.
+    """Peak von Mises stress, away from the clamped edges.
 
     With a section, the beam formula stands beside it.
     """
     from stiffness.fea import solve_link
     from stiffness.material import Material
+    from stiffness.options import BeamOptions, checked
+    from stiffness.options import wrench as parse_wrench
+    from stiffness.results import stress_results, stress_text
     from stiffness.stress import peak_stress, stress_influence
     from stiffness.surface import read_surface
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.display import html_table, short_repr
 from stiffness.link import LinkStiffness, scaled
 from stiffness.reading import BadInput
 
@@ -33,6 +34,8 @@ class Comparison:
     difference: NDArray
     length: float
     size: float
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def slenderness(self) -> float:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from stiffness.body import PointMass, mass_properties
 from stiffness.condense import KINDS
+from stiffness.display import html_table, short_repr
 from stiffness.interface import Interface
 from stiffness.level import Level, estimated_error, finer, solve_level
 from stiffness.link import LinkStiffness, inverted, scaled
@@ -60,6 +61,8 @@ class MeshedLink:
     link: LinkStiffness
     level: Level
     centers: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
 
 
 def mesh_link(

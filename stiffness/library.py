@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.curve import curve_compliance
+from stiffness.display import html_table, short_repr
 from stiffness.link import LinkStiffness, check_definite, inverted, scaled
 from stiffness.parametric import check_shape, shape_beam, shape_surface
 from stiffness.reading import BadInput, nearest, read_text, read_toml
@@ -52,6 +53,8 @@ class Entry:
     tip: NDArray
     parameters: dict[str, float]
     about: dict[str, Any]
+
+    __repr__, _repr_html_ = short_repr, html_table
 
 
 @dataclass(frozen=True)

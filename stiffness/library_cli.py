@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from stiffness.arguments import Json
-from stiffness.options import checked
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import write_json
 
 library = typer.Typer(no_args_is_help=True)
@@ -20,11 +19,12 @@ def build(
     workers: Annotated[int, typer.Option(help="Processes.")] = 1,
     json: Json = None,
 ) -> None:
-    """Compute the entries a build file asks for; those already there are kept."""
+    """Compute the entries of a build file that are not there yet."""
     from rich.console import Console
     from rich.progress import Progress
 
     from stiffness.library import build_library, read_spec
+    from stiffness.options import checked
 
     wanted = read_spec(spec)
     count = int(checked("--workers", workers, "1", least=1))
@@ -59,7 +59,7 @@ def look_up_entry(
     at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
     json: Json = None,
 ) -> None:
-    """K_E at parameters inside the library's grid, interpolated, with its error."""
+    """K_E between a library's entries, interpolated, with its error."""
     from stiffness.library import look_up, read_library
     from stiffness.link import scaled
     from stiffness.options import assignments
@@ -81,7 +81,7 @@ def export(
     to: Annotated[str, typer.Option(help="csv, json, exudyn, adams or mapdl.")] = "csv",
     key: Annotated[str | None, typer.Option(help="One entry; all for csv.")] = None,
 ) -> None:
-    """Print a library as CSV or JSON, or one entry's K_E for another program."""
+    """Print a library, or one entry's K_E for another program."""
     from stiffness.export import library_csv, stiffness_for
     from stiffness.library import read_entry, read_library
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiffness.display import Figures, html_table, numbers, short_repr
 from stiffness.reading import BadInput
 
 
@@ -42,6 +43,23 @@ class LinkStiffness:
     center_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
     inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
     stiffness: NDArray = field(init=False)
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """How stiff, and how well that is known."""
+        K = np.diag(self.stiffness)
+        error = self.relative_error_estimate
+        found = {
+            "method": self.method,
+            "tip": f"{numbers(self.tip)} m",
+            "base": f"{numbers(self.base)} m",
+            "diagonal of K": f"{numbers(K[:3])} N m/rad, {numbers(K[3:])} N/m",
+            "largest relative error": f"{error:.2g}" if error else "closed form",
+        }
+        if self.mesh:
+            found["mesh"] = f"{self.mesh['elements']} elements"
+        return found | ({"mass": f"{self.mass:.5g} kg"} if self.mass > 0 else {})
 
     def __post_init__(self) -> None:
         shapes = {

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.coarser import coarser_surface, euler_characteristic
+from stiffness.display import html_table, short_repr
 from stiffness.interface import Interface, parse_interface
 from stiffness.patches import Patches, find_patches
 from stiffness.reading import BadInput
@@ -57,6 +58,8 @@ class Solid:
     faces: NDArray
     patch: NDArray
     shapes: tuple[Shape | None, ...]
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def volumes(self) -> NDArray:
         """(t,) [m^3] of the straight tetrahedra."""

@@ -1,7 +1,7 @@
 """A link's stiffness as plain values for a file, and as text for a reader."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from stiffness.compare import Comparison, entries_that_matter
 from stiffness.link import LinkStiffness
 from stiffness.screws import SCREW, WRENCH
-from stiffness.slenderness import SlendernessSweep
-from stiffness.stress import PeakStress
+
+if TYPE_CHECKING:
+    from stiffness.slenderness import SlendernessSweep
+    from stiffness.stress import PeakStress
 
 
 def link_results(link: LinkStiffness) -> dict[str, Any]:
@@ -61,7 +63,7 @@ def comparison_results(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def sweep_results(sweep: SlendernessSweep) -> dict[str, Any]:
+def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
     """The object that ``--json`` writes for a sweep over slenderness.
 
     Args:
@@ -87,7 +89,7 @@ def sweep_results(sweep: SlendernessSweep) -> dict[str, Any]:
     }
 
 
-def stress_results(peak: PeakStress) -> dict[str, Any]:
+def stress_results(peak: "PeakStress") -> dict[str, Any]:
     """The object that ``--json`` writes for the peak stress of a wrench.
 
     Args:
@@ -171,7 +173,7 @@ def comparison_text(comparison: Comparison) -> str:
     return "\n".join(lines)
 
 
-def sweep_text(sweep: SlendernessSweep) -> str:
+def sweep_text(sweep: "SlendernessSweep") -> str:
     """A sweep over slenderness for a reader.
 
     Args:
@@ -196,7 +198,7 @@ def sweep_text(sweep: SlendernessSweep) -> str:
     return "\n".join(lines)
 
 
-def stress_text(peak: PeakStress) -> str:
+def stress_text(peak: "PeakStress") -> str:
     """The peak stress of a wrench, for a reader.
 
     Args:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from stiffness.beam import beam_compliance, declared_section
 from stiffness.compare import Comparison, compare_link
+from stiffness.display import html_table, short_repr
 from stiffness.link import LinkStiffness
 from stiffness.parametric import shape_surface
 from stiffness.reading import BadInput
@@ -47,6 +48,8 @@ class SlendernessSweep:
     end_effect_error: NDArray
     second: NDArray
     residual: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def slenderness(self) -> NDArray:

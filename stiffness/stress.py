@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffness.beam import section_axes
 from stiffness.beam_stress import peak_beam_stress
+from stiffness.display import html_table, short_repr
 from stiffness.elements import Elements, node_gradients, triangle_areas
 from stiffness.estimate import PAIRS
 from stiffness.fea import MeshedLink
@@ -41,6 +42,8 @@ class StressInfluence:
     influence: NDArray
     away: float
     inner_edges: bool = False
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def region(self) -> str:

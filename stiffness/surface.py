@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput, describe, nearest
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -31,6 +32,8 @@ class Surface:
     triangles: NDArray
     name: str
     repairs: tuple[str, ...] = ()
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
         """(m, 3) [m^2] outward, as long as the triangle's area."""

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 
 
 def check_writable(path: Path) -> None:

@@ -1,15 +1,23 @@
 """The command: what it writes, and how it refuses."""
 
 import json
+import os
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 import xarray
 
+import forcefit
 from assembly.robot_file import write_robot
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture
@@ -167,8 +175,21 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
          "grid tx: step 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
          "/nowhere/x.nc: no folder /nowhere"),
-        (["assembly", "solve", "irsbot2", "--poze", "tx=0"], "--poze"),
-        (["assembly", "solve"], "ROBOT"),
+        (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
+         "--pose"),
+        (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),
+        (["assembly", "solve"], "Missing argument 'ROBOT'"),
+        (["assembly", "solev", "irsbot2"], "'solve'"),
+        (["asembly"], "'assembly'"),
+        (["assembly", "solve", "irsbot2", "more"], "unexpected extra argument"),
+        (["assembly", "solve", "irsbot2", "--pose"], "--pose"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0"], "Missing option '-o'"),
+        (["assembly", "error", "irsbot2", "--energy-budget", "x"],
+         "Invalid value for '--energy-budget': "),
+        (["assembly", "sweep", "irsbot2", "-o", "x.nc", "--draws", "0"],
+         "Invalid value for '--draws': "),
+        (["stiffness", "beam", "--length", "1", "--young", "1", "--poisson", "a"],
+         "Invalid value for '--poisson': "),
         (["study", "no.toml"], "no.toml: cannot be read: No such file or directory"),
         (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
     ],
@@ -185,13 +206,62 @@ def test_bad_input_is_one_message_and_exit_status_2(run, tmp_path, monkeypatch, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_command_explains_itself(run):
-    for words in ([], ["study"], ["assembly"], ["assembly", "solve"], ["stiffness"],
-                  ["stiffness", "fea"], ["validation", "crosscheck"]):  # fmt: skip
-        status, out, err = run(*words, "--help")
-        assert status == 0
-        assert "Usage: forcefit" in out
-        assert err == ""
+def commands(command, words=()):
+    """Every command and group of commands with the words that call it."""
+    yield words, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, (*words, name))
+
+
+EVERY_COMMAND = dict(commands(typer.main.get_command(forcefit.app)))
+
+
+@pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
+def test_every_command_explains_itself(run, words):
+    status, out, err = run(*words, "--help")
+    assert (status, err) == (0, "")
+    assert out.startswith(" ".join(("Usage: forcefit", *words)))
+    assert run(*words, "-h") == (status, out, err)
+
+
+@pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
+def test_help_prints_every_unit_in_brackets_and_cuts_nothing_short(run, words):
+    """No part of a text is markup, and a list of commands has whole sentences."""
+    _, out, _ = run(*words, "--help")
+    printed = " ".join(out.split())
+    command = EVERY_COMMAND[words]
+    for text in [command.help or "", *(p.help or "" for p in command.params)]:
+        for part in re.findall(r"\[[^]]*\]", text):
+            assert " ".join(part.split()) in printed
+    assert "..." not in out.partition("Commands:")[2]
+
+
+def test_there_are_units_to_print():
+    assert len(EVERY_COMMAND) > 25
+    helps = [p.help or "" for c in EVERY_COMMAND.values() for p in c.params]
+    assert sum("[" in text for text in helps) > 40
+
+
+def test_the_version_is_that_of_the_package(run):
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert run("--version") == (0, f"forcefit {declared['version']}\n", "")
+    assert forcefit.__version__ == declared["version"]
+    with pytest.raises(AttributeError, match="no attribute 'version'"):
+        forcefit.version  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [("forcefit asse", "assembly"), ("forcefit assembly so", "solve"),
+     ("forcefit validation crosscheck --clear", "--clearances"),
+     ("forcefit assembly zone arm", "arm6")],
+)  # fmt: skip
+def test_a_shell_completes_commands_options_and_robots(typed, offered):
+    asked = {"_FORCEFIT_COMPLETE": "complete_bash", "COMP_WORDS": typed,
+             "COMP_CWORD": str(len(typed.split()) - 1)}  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "forcefit"], env=os.environ | asked,
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert done.stdout.split() == [offered]
 
 
 def test_the_installed_command_refuses_without_a_traceback():

@@ -176,6 +176,14 @@ def test_results_are_in_the_public_format(name, diagnosed):
         assert len(decide["load"]) == 6
 
 
+def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
+    found = diagnosed("one")
+    assert len(repr(found)) < 600
+    for said in (found.verdict, *found.claimed, f"{found.after.normalised:.3g} after"):
+        assert said in repr(found)
+    assert found.summary() == text(found)
+
+
 def test_no_row_kept_aside_was_fitted(diagnosed):
     """Readings kept aside can be anything: what is found stays the same."""
     found = diagnosed("one")

@@ -46,12 +46,19 @@ OWNERS = {
         "assembly/statistics/monte_carlo.py",
         "assembly/statistics/importance.py",
         "assembly/statistics/tolerances.py",
+        "assembly/tables.py",
         "stiffness/library.py",
     ),
+    "pandas": ("assembly/tables.py",),
     "h5netcdf": ("assembly/sweeps/dataset.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
+# of use to sweeps, statistics, files and drawings, not to one posture
+FOR_MANY = (
+    "dask", "h5py", "pandas", "rich", "scipy.interpolate", "scipy.ndimage",
+    "scipy.optimize", "scipy.spatial", "scipy.stats", "vtkmodules",
+)  # fmt: skip
 # the second opinion must not share the first one's mechanics
 INDEPENDENT = (
     "validation/multibody/",
@@ -93,12 +100,17 @@ def wrong_imports(tree):
                     yield f"{file} imports {module}"
 
 
-def loaded(modules, tree):
-    """Heavy packages in memory after modules were imported in a fresh Python."""
-    code = f"import sys, {modules}; print(*sys.modules)"
+def in_memory(code, tree):
+    """Modules in memory after a fresh Python ran some code."""
+    code = f"{code}\nimport sys; print(*sys.modules, file=sys.stderr)"
     run = [sys.executable, "-c", code]
     answer = subprocess.run(run, cwd=tree, capture_output=True, text=True, check=True)
-    return sorted(set(HEAVY) & set(answer.stdout.split()))
+    return set(answer.stderr.split())
+
+
+def loaded(modules, tree):
+    """Heavy packages in memory after modules were imported in a fresh Python."""
+    return sorted(set(HEAVY) & in_memory(f"import {modules}", tree))
 
 
 def test_every_import_of_the_project_is_allowed():
@@ -110,6 +122,11 @@ def test_every_folder_was_looked_at():
     for folder in BELOW:
         modules = {m for p in (ROOT / folder).rglob("*.py") for m in imports(p)}
         assert any(m.startswith(("numpy", "stiffness")) for m in modules), folder
+
+
+@pytest.mark.parametrize("folder", BELOW)
+def test_every_package_tells_type_checkers_that_it_has_types(folder):
+    assert (ROOT / folder / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("module", [*BELOW, "forcefit"])
@@ -124,6 +141,34 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
     modules = sorted(name.removesuffix(".__init__") for name in names)
     assert loaded(", ".join(modules), ROOT) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "left_out"),
+    [
+        ("--help", ("numpy", "scipy", "rich")),
+        ("--version", ("numpy", "scipy", "rich")),
+        ("assembly solve --help", ("numpy", "scipy", "rich")),
+        ("validation diagnose --help", ("numpy", "scipy", "rich")),
+        ("stiffness beam --length 1 --radius 0.1 --young 1e9 --poisson 0.3",
+         ("numba", "scipy")),
+        ("assembly zone irsbot2", FOR_MANY),
+        ("assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
+        ("assembly error irsbot2", FOR_MANY),
+    ],
+)  # fmt: skip
+def test_a_command_imports_only_what_it_uses(words, left_out):
+    """What makes a command wait; benchmarks/startup.py has the times."""
+    code = f"""
+import sys, forcefit
+sys.argv = ["forcefit", *{words.split()}]
+try:
+    forcefit.main()
+except SystemExit as done:
+    assert not done.code
+"""
+    unwanted = {*HEAVY} - {"numba", "clarabel"} | {*left_out}
+    assert sorted(unwanted & in_memory(code, ROOT)) == []
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,13 @@ def test_every_link_of_the_readme_leads_somewhere():
         assert (ROOT / target).exists(), target
 
 
+def test_the_command_is_also_a_module():
+    assert "`python -m forcefit`" in README
+    run = [sys.executable, "-m", "forcefit", "--version"]
+    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("forcefit ")
+
+
 @pytest.mark.parametrize("command", ["make study", "make test"])
 def test_the_two_commands_are_targets(command):
     assert command in README

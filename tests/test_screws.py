@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from stiffness.screws import (
     rotation_matrix,
@@ -66,6 +67,32 @@ def test_rotation_vectors_return(rng):
     matrices = rotation_matrix(vectors)
     assert matrices.shape == (2, 5, 3, 3)
     np.testing.assert_allclose(rotation_vector(matrices), vectors, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", [1e-14, 1e-7, 1e-3, 0.5, 2.1, 3.1, np.pi - 1e-9])
+def test_rotations_are_those_of_scipy(rng, angle):
+    """To rounding, in the matrix and relative to the angle."""
+    axes = rng.normal(size=(200, 3))
+    vectors = angle * axes / np.linalg.norm(axes, axis=-1)[:, None]
+    matrices, theirs = rotation_matrix(vectors), Rotation.from_rotvec(vectors)
+    np.testing.assert_allclose(matrices, theirs.as_matrix(), rtol=0, atol=5e-15)
+    found = rotation_vector(theirs.as_matrix())
+    np.testing.assert_allclose(found, vectors, rtol=0, atol=2e-14 * angle)
+
+
+def test_half_turns_and_no_turn_have_a_rotation_vector():
+    """Where the quaternion's scalar part is 0, and where its vector part is."""
+    for axis in (*np.eye(3), np.array([3, 0, -4]) / 5, np.array([1, 2, 2]) / 3):
+        turn = 2 * np.outer(axis, axis) - np.eye(3)
+        np.testing.assert_allclose(abs(rotation_vector(turn)), np.pi * abs(axis))
+    assert not rotation_vector(np.eye(3)).any()
+
+
+@pytest.mark.parametrize("shape", [(), (0,), (2, 5)])
+def test_rotations_keep_leading_axes(shape):
+    matrices = rotation_matrix(np.zeros((*shape, 3)))
+    assert matrices.shape == (*shape, 3, 3)
+    assert rotation_vector(matrices).shape == (*shape, 3)
 
 
 def test_transforms_chain(rng):

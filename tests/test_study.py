@@ -63,6 +63,12 @@ def test_a_study_answers_as_the_reference_does(results):
 
 
 @pytest.mark.exudyn
+def test_results_show_themselves_on_a_few_lines(results):
+    found, _, _ = results
+    assert all(len(repr(thing)) < 1500 for thing in (found, found.crosscheck))
+
+
+@pytest.mark.exudyn
 def test_the_folder_holds_a_self_contained_report_and_results(results):
     found, folder, _ = results
     names = {p.name for p in folder.iterdir()}

@@ -267,6 +267,14 @@ def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
     assert found.verification["verdict"] != "contradicted"
 
 
+def test_an_allocation_is_a_data_set_and_a_few_lines(several):
+    _, plan, found = several
+    data = found.to_xarray()
+    np.testing.assert_array_equal(data["tolerance"], found.tolerances)
+    assert list(data["class"].values) == list(plan.names)
+    assert all(len(repr(thing)) < 1000 for thing in (found, plan, plan.sources))
+
+
 def test_fresh_draws_solved_one_by_one_meet_the_limits_as_often(several):
     """Another seed, each draw by itself through :func:`solve_assembly`, slowly."""
     postures, plan, found = several

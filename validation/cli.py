@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,12 +21,14 @@ from assembly.cli import (
     posture_of,
     progress_bars,
 )
-from assembly.posture import Posture
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import write_json
 from validation.campaign.cli import inspect
-from validation.diagnosis.cli import diagnose
+from validation.diagnosis_cli import diagnose
 from validation.synthetic.cli import generate
+
+if TYPE_CHECKING:
+    from assembly.posture import Posture
 
 app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
@@ -96,10 +98,11 @@ def crosscheck(
         float, typer.Option(min=0.0, help="[s] for each simulation.")
     ] = 600.0,
 ) -> None:
-    """Compare with a multibody simulation at several scales of the imperfections.
+    """Compare with a multibody simulation, at several scales.
 
-    Joint clearances are left out on both sides unless asked for; energies and springs
-    are then compared instead of poses.  Exit status 1 when a check fails.
+    The scales are of errors and loads.  Joint clearances are left out on both sides
+    unless asked for; energies and springs are then compared instead of poses.  Exit
+    status 1 when a check fails.
     """
     from assembly.effects.acting import act
     from validation.crosscheck import Crosscheck, attempt
@@ -113,7 +116,7 @@ def crosscheck(
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare(posture: Posture) -> Crosscheck | PlayCheck:
+    def compare(posture: "Posture") -> Crosscheck | PlayCheck:
         acting = act(posture, wrench, g, covariates)
         at, pushes = acting.posture, acting.load.tolist()
         weight = None if acting.gravity is None else acting.gravity.tolist()
@@ -141,7 +144,7 @@ def crosscheck(
 
 
 def _crosscheck_grid(
-    robot: str, grid: str, compare: Callable[[Posture], Any], json: str | None
+    robot: str, grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
     """Every pose of a grid, with a progress bar."""
     from assembly.robots import load_robot
@@ -173,10 +176,11 @@ def validity(
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """What the model's assumptions cost a robot at a pose: position, rotation, energy.
+    """What the model's assumptions cost a robot at a pose.
 
-    Linear closures, beams instead of solids, weight at the links' ends, disc and cone
-    instead of pins in two bushes; what exceeds 20 um or 1 % is marked.
+    In position, rotation and energy: linear closures, beams instead of solids, weight
+    at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
+    or 1 % is marked.
     """
     from validation.assumptions import assumption_costs, costs_table, costs_text
 

@@ -31,6 +31,7 @@ from assembly.energy import CannotAssemble, solve_assembly
 from assembly.posture import Posture
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
+from stiffness.display import html_table, short_repr
 from validation.limits import (
     FLOOR,
     HALVES,
@@ -82,6 +83,8 @@ class Crosscheck:
     gravity: NDArray
     pairs: tuple[Pair, ...]
     asked: int
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def scales(self) -> NDArray:

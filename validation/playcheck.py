@@ -24,6 +24,7 @@ from assembly.links import link_compliance
 from assembly.posture import Posture
 from assembly.solvers.conic import into_cones
 from assembly.solvers.reduction import reduce_problem
+from stiffness.display import html_table, short_repr
 from validation.crosscheck import ELEMENTS
 from validation.limits import extrapolate, limit_difference, limit_of
 from validation.link_models import link_models
@@ -62,6 +63,8 @@ class PlayCheck:
     gravity: NDArray
     pairs: tuple[Pair, ...]
     asked: int
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def scales(self) -> NDArray:

@@ -23,6 +23,7 @@ from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.sweep import sweep_poses
 from assembly.sweeps.targets import parse_grid
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput, Table, read_toml
 from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
@@ -67,6 +68,8 @@ class Study:
     checks: tuple[str, ...]
     folder: Path
 
+    __repr__, _repr_html_ = short_repr, html_table
+
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
@@ -99,6 +102,8 @@ class StudyResults:
     crosscheck: Crosscheck | None
     crosscheck_failure: str
     closing: NDArray | None
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def passed(self) -> bool:

@@ -11,6 +11,7 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.posture import Posture
 from assembly.predict import assemble_row, read
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput, nearest
 
 COVARIATES = ("temperature", "time", "approach")
@@ -32,6 +33,8 @@ class Acting:
     load: NDArray
     gravity: NDArray | None
     conditions: Conditions
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def reading(self, platform_screw: ArrayLike) -> NDArray:
         """(6,) [rad, m] what a device reads of a platform screw."""

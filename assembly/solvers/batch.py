@@ -25,8 +25,12 @@ from assembly.posture import Posture
 from assembly.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
 from assembly.zone import zone_margin
+from stiffness.display import html_table, short_repr
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from assembly.solvers.compiled_reduction import Structure
 
 # which road answered, by the codes of assembly.solvers.compiled_assembly; those after
@@ -71,6 +75,29 @@ class Energies:
     status: NDArray
     reason: NDArray
     joints: VirtualJoints
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Over ``point``; see :mod:`assembly.tables`."""
+        from assembly.tables import points_dataset
+
+        return points_dataset({
+            "energy": self.energy,
+            "duality_gap": self.gap,
+            "energy_without_play": self.energy_without_play,
+            "platform_screw": self.platform_screw,
+            "closure_residual": self.closure_residual,
+            "clearance_excess": self.clearance_excess,
+            "status": self.status,
+            "reason": self.reason,
+        })
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each point, columns (variable, component)."""
+        from assembly.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
     @cached_property
     def gap(self) -> NDArray:
@@ -211,6 +238,24 @@ class Margins:
     bound: NDArray
     slower: NDArray
     reason: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Over ``point``; see :mod:`assembly.tables`."""
+        from assembly.tables import points_dataset
+
+        return points_dataset({
+            "margin": self.margin,
+            "margin_bound": self.bound,
+            "reason": self.reason,
+        })
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each point, columns (variable, component)."""
+        from assembly.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
 
 def zone_margins(

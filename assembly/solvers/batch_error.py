@@ -19,8 +19,12 @@ from assembly.posture import Posture
 from assembly.robot import Robot
 from assembly.solvers.batch import Energies, minimise_energies, structure_of
 from assembly.solvers.conic import SolverFailed
+from stiffness.display import html_table, short_repr
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from assembly.solvers.compiled_reach import Loads
     from assembly.solvers.compiled_reduction import Structure
 
@@ -49,6 +53,27 @@ class PoseErrors:
     slower: NDArray
     status: NDArray
     reason: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Over ``point``; see :mod:`assembly.tables`."""
+        from assembly.tables import points_dataset
+
+        return points_dataset({
+            "rotation_error": self.rotation_error,
+            "translation_error": self.translation_error,
+            "rotation_screw": self.rotation_screw,
+            "translation_screw": self.translation_screw,
+            "status": self.status,
+            "reason": self.reason,
+        })
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each point, columns (variable, component)."""
+        from assembly.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
 
 def bound_pose_errors(

@@ -27,6 +27,7 @@ from scipy.linalg import qr, svd
 
 from assembly.closure import Linearisation, VirtualJoints
 from assembly.load import Forces, forces_on
+from stiffness.display import html_table, short_repr
 
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 # what a projection leaves of columns that it removes whole is rounding of their size
@@ -74,6 +75,8 @@ class Reduction:
     elastic_inverse: NDArray
     spread: NDArray
     ranks: dict[str, int]
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def springs(self, u: NDArray) -> NDArray:
         """(ny,) [sqrt(2 J)] all springs' scaled deformation at given clearances."""

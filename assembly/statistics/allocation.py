@@ -10,7 +10,7 @@ shaped nothing, or the worst corners, just meet every limit, and fresh ones veri
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,11 @@ from assembly.statistics.scaling import (
     with_worst_corners,
 )
 from assembly.statistics.verification import prove_worst, verify_yield
+from stiffness.display import html_table, short_repr
+
+if TYPE_CHECKING:
+    import xarray
+
 
 _MORE_TO_SCALE = 4  # times the draws that shape the tolerances: one number costs little
 _MOST_VERIFICATIONS = 4
@@ -68,6 +73,14 @@ class Allocation:
     worst: dict[str, tuple[float, float]] = field(default_factory=dict)
     proven_scale: float = float("nan")
     verification: dict[str, Any] = field(default_factory=dict)
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Tolerances over ``class``, as ``--output`` writes them."""
+        from assembly.statistics.tolerances import tolerance_dataset
+
+        return tolerance_dataset(self)
 
 
 def allocate(

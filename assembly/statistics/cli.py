@@ -23,7 +23,7 @@ from assembly.cli import (
     progress_bars,
     save_figure,
 )
-from stiffness.reading import BadInput, nearest
+from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
 
@@ -67,7 +67,7 @@ def statistics(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Draw errors many times: yields, limits exceeded, pose errors, what matters.
+    """Draw errors many times: yields, pose errors, what matters.
 
     With OUTPUT, finished draws are kept in OUTPUT.journal: the same command goes on
     from there after a kill and ends in the same file.
@@ -152,7 +152,7 @@ def tolerances(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Say how much tighter errors must be; with a plan, how loose they may be.
+    """How tight errors must be; with a plan, how loose they may be.
 
     Without --plan the robot's own errors are judged: the factor on all of them at which
     it goes together everywhere, and which errors it owes its margin to.

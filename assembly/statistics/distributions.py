@@ -26,6 +26,7 @@ from scipy.special import ndtr, ndtri
 
 from assembly.draw import SIGNS, frames_named
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
@@ -59,6 +60,8 @@ class ErrorSources:
     limit: NDArray
     signed: NDArray
     labels: tuple[str, ...] = field(init=False)
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
         names = [

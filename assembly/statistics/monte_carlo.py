@@ -28,6 +28,7 @@ from assembly.statistics.play import PLAY, settle_play
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.sweep import journal_path, robot_hash
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import SCREW
 
@@ -81,6 +82,8 @@ class Experiment:
     stress: bool = True
     load: tuple[float, ...] | None = None
     gravity: tuple[float, ...] | None = None
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
         if self.play not in PLAY:

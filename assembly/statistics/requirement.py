@@ -12,6 +12,7 @@ from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.distributions import ErrorSources
 from assembly.statistics.monte_carlo import Experiment
 from assembly.statistics.responses import respond
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
@@ -51,6 +52,8 @@ class Plan:
     draws: int = 1000
     seed: int = 1
 
+    __repr__, _repr_html_ = short_repr, html_table
+
     def spread(self, tolerances: NDArray) -> NDArray:
         """(m,) the tolerance of every source."""
         return tolerances[self.group]
@@ -81,6 +84,8 @@ class Requirement:
 
     postures: Sequence[Posture]
     plan: Plan
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @cached_property
     def experiments(self) -> list[Experiment]:

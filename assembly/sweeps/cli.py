@@ -22,7 +22,7 @@ from assembly.cli import (
     progress_bars,
     save_figure,
 )
-from stiffness.reading import BadInput, nearest
+from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
 
@@ -88,7 +88,7 @@ def sweep(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Margins, energy, errors, singularities over postures, designs and draws.
+    """Margins, energy, errors over postures, designs and draws.
 
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
@@ -155,7 +155,7 @@ def plot(
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
 ) -> None:
-    """Draw a saved file: maps or lines of a sweep, histograms, tornado, tolerances."""
+    """Draw a saved file: maps, lines, histograms, tolerances."""
     from assembly.statistics.plot import KINDS, figure_of_draws
     from assembly.sweeps.dataset import open_dataset
     from assembly.sweeps.maps import figure_of

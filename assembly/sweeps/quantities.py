@@ -10,6 +10,7 @@ from assembly.link_stress import stressed_names
 from assembly.robot import Robot
 from assembly.singularity import KINDS
 from assembly.sweeps.parameters import Design
+from stiffness.display import html_table, short_repr
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class Question:
     load: tuple[float, ...] = (0.0,) * 6
     gravity: tuple[float, ...] = (0.0,) * 3
     under: Mapping[str, float] = field(default_factory=dict)
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def reads_otherwise(self) -> bool:

@@ -30,6 +30,7 @@ from assembly.sweeps.points import Found, Points, solve_points
 from assembly.sweeps.quantities import TEXTS, Question, record_type
 from assembly.sweeps.targets import LARGEST_GRID, Targets, grid_targets, unit_of_target
 from assembly.zone import ASSEMBLABLE
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class Sweep:
     draws: int = 0
     command: str = ""
     block_size: int = 128
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
         if self.size > LARGEST_GRID:

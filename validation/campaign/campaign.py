@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import Robot
+from stiffness.display import Figures, html_table, short_repr
 
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, as in a screw
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -55,6 +56,27 @@ class Campaign:
     registration: str
     configuration: NDArray
     repeat: NDArray
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What was measured, how often, and how well."""
+        cells, sizes = self.cells, []
+        for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
+            sigma = self.sigma[:, part][cells[:, part]]
+            if sigma.size:
+                sizes.append(f"{1e6 * np.sqrt(np.mean(sigma**2)):.3g} {unit}")
+        return {
+            "robot": self.robot.name,
+            "rows": f"{len(self)}, of {len(set(self.configuration.tolist()))} "
+            f"configurations; {len(self) - len(set(self.repeat.tolist()))} repeats",
+            "commanded": self.commanded,
+            "cells": f"{int(cells.sum())} of {cells.size} measured",
+            "sigma": ", ".join(sizes) or "none",
+            "loaded": f"{int(self.loads.any(axis=1).sum())} rows",
+            "covariates": ", ".join(self.covariates) or "none",
+            "registration": self.registration,
+        }
 
     def __post_init__(self) -> None:
         R, n = len(self.ids), len(self.robot.frames)

@@ -14,7 +14,7 @@ CampaignArgument = Annotated[
 
 
 def inspect(campaign: CampaignArgument, json: JsonOption = None) -> None:
-    """Say what measured data can and cannot tell, before any diagnosis.
+    """What measured data can and cannot tell, before diagnosis.
 
     Rows, loads and covariates; noise from repeats against the stated sigma; which
     effects would show, and which this design cannot tell apart.

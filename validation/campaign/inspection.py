@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from stiffness.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.campaign.counts import (
     covariate_counts,
@@ -43,6 +44,8 @@ class Inspection:
     signatures: DesignSignatures
     separability: Separability
     remarks: tuple[Remark, ...]
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     def table(self) -> dict:
         """Everything, in plain values for JSON."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from assembly.conditions import Conditions
 from assembly.effects import apply_effects
 from assembly.predict import predict, with_finite_motions, with_second_order
+from stiffness.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis
@@ -98,6 +99,27 @@ class Diagnosis:
     best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def summary(self) -> str:
+        """The text that ``forcefit validation diagnose`` prints."""
+        from validation.diagnosis.results import text
+
+        return text(self)
+
+    def _figures(self) -> Figures:
+        """The verdict, and what it rests on."""
+        likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
+        return {
+            "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",
+            "verdict": self.verdict,
+            "claimed": ", ".join(self.claimed) or "none",
+            "likeliest": ", ".join(f"{name} {p:.3f}" for name, p in likely) or "none",
+            "kept aside": f"{self.before.normalised:.3g} sigma before, "
+            f"{self.after.normalised:.3g} after (1 is noise)",
+            "outliers": f"{int(self.outliers.sum())} rows",
+        }
 
 
 def diagnose(

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import Robot
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
 from validation.multibody.exudyn_model import HELD, Model, Stiffness
 from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
@@ -100,6 +101,8 @@ class MultibodyAssembly:
     contact_energy: float
     held: bool
     seconds: float
+
+    __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def rigid_energy(self) -> float:

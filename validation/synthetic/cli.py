@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from assembly.cli import JsonOption, RobotArgument, progress_bars
-from assembly.posture import parse_assignments
-from stiffness.reading import BadInput
+from stiffness.message import BadInput
 from stiffness.writing import check_writable, write_json
 
 DEFAULT_STRENGTH = 5.0  # [-] sigmas
@@ -25,6 +24,8 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
     Raises:
         BadInput: a strength that is not a number > 0, or an effect given twice.
     """
+    from assembly.posture import parse_assignments
+
     wanted: dict[str, float] = {}
     for text in texts or []:
         name, equals, strength = (part.strip() for part in text.partition("="))
@@ -108,7 +109,7 @@ def generate(
     seed: Annotated[int, typer.Option(help="Of all draws.")] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Measure a simulated machine that has effects which its robot file lacks.
+    """Measure a simulated machine with effects its file lacks.
 
     Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints are tight
     unless their play is hidden.

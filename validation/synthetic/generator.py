@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.robot import Robot
 from assembly.robot_file import write_robot
+from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
 from stiffness.writing import check_writable
 from validation.synthetic.design import Design, Plan, plan_campaign
@@ -67,6 +68,8 @@ class Synthetic:
     strength: Mapping[str, float]
     outliers: tuple[int, ...] = ()
     hidden_base: NDArray | None = None
+
+    __repr__, _repr_html_ = short_repr, html_table
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from assembly.cli import JsonOption, progress_bars
-from assembly.robot_file import write_robot
 from stiffness.writing import check_writable, write_json
 from validation.campaign.cli import CampaignArgument
 
@@ -28,7 +27,7 @@ def diagnose(
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
 ) -> None:
-    """Trace measured deviations to the effect that the declared model lacks.
+    """Trace measured deviations to the effect the model lacks.
 
     The verdict is explained, none_needed, ambiguous or outside_library; errors before
     and after are on rows that played no part in choosing or fitting.
@@ -63,4 +62,6 @@ def diagnose(
         if found.verdict != "explained":
             typer.echo(f"{save}: not written, the verdict is {found.verdict}", err=True)
             raise typer.Exit(1)
+        from assembly.robot_file import write_robot
+
         write_robot(results.corrected(found), save)

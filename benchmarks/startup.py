@@ -1,0 +1,60 @@
+"""What a command costs before it computes: a table of processor times as ratios.
+
+Run as ``python benchmarks/startup.py [RUNS]``.  User and system time of each command,
+summed over its threads, divided by that of ``import numpy, scipy.linalg``; medians of
+RUNS (7) runs each, taken in turn, so that a machine that is busy for a while slows all
+of them alike.  Every command runs once before, so that compiled code is on disk.
+Exit status 1 where a ratio exceeds what is wanted.
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+
+BASE = ["-c", "import numpy, scipy.linalg"]
+AT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
+WANTED = {  # largest ratio
+    "--help": 2.5,
+    "--version": 2.5,
+    "assembly solve": 5.0,
+    "assembly zone": 5.0,
+    "assembly error": 5.0,
+}
+
+
+def processor_time(arguments):
+    """[s] user and system, of a Python with these arguments and its threads."""
+    child = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise SystemExit(f"{arguments}: exit status {child.returncode}")
+    return used.ru_utime + used.ru_stime
+
+
+def main(runs=7):
+    """Run, print, and say whether all ratios are as wanted."""
+    commands = {"import numpy, scipy.linalg": BASE}
+    for words in WANTED:
+        place = AT if words.startswith("assembly") else []
+        commands[f"forcefit {words}"] = ["-m", "forcefit", *words.split(), *place]
+    for arguments in commands.values():
+        processor_time(arguments)
+    times = {name: [] for name in commands}
+    for _ in range(runs):
+        for name, arguments in commands.items():
+            times[name].append(processor_time(arguments))
+    medians = {name: statistics.median(found) for name, found in times.items()}
+    base, *_ = medians.values()
+    print(f"{'':28} processor s   ratio   wanted")
+    for (name, median), wanted in zip(
+        medians.items(), [1.0, *WANTED.values()], strict=True
+    ):
+        print(f"{name:28} {median:11.3f} {median / base:7.2f} {wanted:8.1f}")
+    ratios = [median / base for median in medians.values()][1:]
+    return int(any(r > w for r, w in zip(ratios, WANTED.values(), strict=True)))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:])))

@@ -1,0 +1,130 @@
+"""How an object shows itself: a title and a few figures with their units.
+
+A dataclass takes part with one line in its body::
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+It may say which figures by a method ``_figures``; else they are its fields, shortened.
+The text is for a console, the table for a notebook; both are a few lines however large
+the object is.
+"""
+
+import html
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Figures = dict[str, str]
+
+_LONGEST = 72  # characters of a value
+_FEW = 6  # numbers that are shown rather than counted
+
+
+def short_repr(self: Any) -> str:
+    """A title and one line for each figure.
+
+    Args:
+        self: a dataclass, perhaps with a method ``_figures``.
+
+    Returns:
+        Lines of text.
+    """
+    figures = _figures(self)
+    width = max(map(len, figures), default=0)
+    lines = [f"  {name:{width}}  {value}" for name, value in figures.items()]
+    return "\n".join([title(self), *lines])
+
+
+def html_table(self: Any) -> str:
+    """The same as a plain table, for notebooks.
+
+    Args:
+        self: a dataclass, perhaps with a method ``_figures``.
+
+    Returns:
+        HTML; names from files are escaped.
+    """
+    rows = "".join(
+        f'<tr><th style="text-align:left">{html.escape(name)}</th>'
+        f'<td style="text-align:left">{html.escape(value)}</td></tr>'
+        for name, value in _figures(self).items()
+    )
+    caption = f'<caption style="text-align:left">{html.escape(title(self))}</caption>'
+    return f"<table>{caption}{rows}</table>"
+
+
+def title(thing: object) -> str:
+    """Kind of an object, and its own name or its robot's, if it has one."""
+    kind = type(thing).__name__
+    posture = getattr(thing, "posture", None)
+    owner = getattr(thing, "robot", None) or getattr(posture, "robot", None)
+    name = getattr(thing, "name", None)
+    if isinstance(name, str):
+        return f"{kind} {_cut(name)}"
+    name = getattr(owner, "name", None)
+    return f"{kind} of {_cut(name)}" if isinstance(name, str) else kind
+
+
+def brief(value: object) -> str:
+    """One short line for any value: what it is, if it does not fit."""
+    if isinstance(value, np.ndarray):
+        if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
+            return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
+        return f"{value.dtype} array {value.shape}"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if is_dataclass(value) and not isinstance(value, type):
+        return title(value)
+    if isinstance(value, Mapping | list | tuple | set | frozenset):
+        parts = value.values() if isinstance(value, Mapping) else value
+        if not value:
+            return "none"
+        plain = all(isinstance(v, int | float | str) for v in parts)
+        if len(value) > _FEW or not plain:
+            return f"{type(value).__name__} of {len(value)}"
+    return _cut(value if isinstance(value, str) else repr(value))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers in brackets; below 1e-9, rounding in any unit here, they are zero."""
+    return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
+
+
+def rounded(value: float) -> float:
+    """A number for people: rounding errors, below 1e-9 in any unit here, are zero."""
+    return 0.0 if abs(value) < 1e-9 else float(value)
+
+
+def screw_text(screw: ArrayLike) -> str:
+    """A platform screw (6,) [rad, m] for people."""
+    s = 1e3 * np.asarray(screw, dtype=float)
+    return f"{numbers(s[:3])} mrad, {numbers(s[3:])} mm"
+
+
+def largest(screws: ArrayLike) -> str:
+    """Largest rotation and translation of screws (..., 6) [rad, m], by length."""
+    parts = np.asarray(screws, dtype=float).reshape(-1, 2, 3)
+    turn, shift = 1e3 * np.linalg.norm(parts, axis=-1).max(axis=0, initial=0.0)
+    return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
+
+
+def bracket(bounds: tuple[float, float]) -> str:
+    """Two bounds [rad or m] in thousandths."""
+    return f"{1e3 * bounds[0]:.6g} to {1e3 * bounds[1]:.6g}"
+
+
+def _figures(thing: Any) -> Figures:
+    """What an object says of itself, or its fields."""
+    if hasattr(thing, "_figures"):
+        return thing._figures()
+    shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]
+    return {name: brief(getattr(thing, name)) for name in shown}
+
+
+def _cut(text: str) -> str:
+    """At most one line of text."""
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
