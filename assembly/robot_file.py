@@ -119,6 +119,8 @@ def _frame(table: Table) -> Frame:
         message = 'found one on a fixed joint; expected joint = "revolute" | '
         raise table.bad(key, message + '"prismatic", or no such key')
     translation, rotation = _placement(table)
+    passive = joint != "fixed" and not actuated
+    own = (5 if joint == "prismatic" else 2) if passive else None
     frame = Frame(
         name=name,
         parent=table.text("parent", expected='the name of a frame, or "base"'),
@@ -129,7 +131,7 @@ def _frame(table: Table) -> Frame:
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         clearance=read_clearance(table),
-        joint_stiffness=read_joint_stiffness(table),
+        joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),

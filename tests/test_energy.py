@@ -8,12 +8,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from assembly.energy import CannotAssemble, solve_assembly
-from assembly.posture import home_posture, place_many, place_robot
+from assembly.flexibility import flexibility
+from assembly.load import row_forces
+from assembly.posture import Posture, home_posture, place_many, place_robot
 from assembly.reference import reference_energy
+from assembly.resting_play import without_play
 from assembly.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.reduction import FreeMotion
+from assembly.zone import zone_margin
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -279,6 +283,78 @@ def test_play_bound_of_a_passive_joint_holds_where_it_matters():
     unbounded = replace(robot, frames=(frames[0], replace(frames[1], clearance=None),
                                        *frames[2:]))  # fmt: skip
     assert solve_assembly(home_posture(unbounded)).energy == pytest.approx(0, abs=1e-20)
+
+
+def as_bearings(robot):
+    """The robot with compliant joints free along their own motion; the same with each
+    of them as two frames: the springs, rigid along it, then a bare free joint.
+    """
+    bearings, split, after = [], [], {}
+    for f in robot.frames:
+        parent = after.get(f.parent, f.parent)
+        if not f.compliant:
+            bearings.append(f)
+            split.append(replace(f, parent=parent))
+            continue
+        K, rigid = f.joint_stiffness.copy(), f.joint_stiffness.copy()
+        K[f.own_axis, f.own_axis], rigid[f.own_axis, f.own_axis] = 0.0, np.inf
+        bearings.append(replace(f, joint_stiffness=K))
+        spring = replace(f, parent=parent, joint="fixed", joint_stiffness=rigid)
+        axis = replace(Frame(f"{f.name}.axis", f.name), joint=f.joint)
+        if f.clearance is not None:
+            key = "axial" if f.joint == "prismatic" else "spin"
+            bound = getattr(f.clearance, key)
+            spring = replace(spring, clearance=replace(f.clearance, **{key: None}))
+            axis = replace(axis, clearance=Clearance(**{key: bound}))
+        split += [spring, axis]
+        after[f.name] = axis.name
+    return replace(robot, frames=tuple(bearings)), replace(robot, frames=tuple(split))
+
+
+def test_a_bearing_is_its_springs_and_then_a_free_joint():
+    """In every solver; energies to 1e-8 of those without play, 1e-12 where linear."""
+    compared = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        one, two = as_bearings(random_robot(rng, 2, 3))
+        if len(one.frames) == len(two.frames):
+            continue
+        first, second = home_posture(one), home_posture(two)
+        load = rng.normal(size=6) if seed % 2 else None
+        try:
+            answer = solve_assembly(first, load)
+        except (CannotAssemble, FreeMotion) as error:
+            with pytest.raises(type(error)):
+                solve_assembly(second, load)
+            continue
+        other = solve_assembly(second, load)
+        scale = 1e-8 * answer.energy_without_play + 1e-20
+        assert answer.potential == pytest.approx(other.potential, rel=1e-8, abs=scale)
+        assert not answer.unproved
+        zones = [zone_margin(p, "free").margin for p in (first, second)]
+        if zones[0] is not None:
+            assert zones[0] == pytest.approx(zones[1], rel=1e-7)
+        batch = minimise_energies(one, first.transforms[None])
+        assert batch.energy[0] == pytest.approx(
+            solve_assembly(second).energy, rel=1e-7, abs=scale
+        )
+        tight = without_play(one), without_play(two)
+        rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
+                for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
+        found = [
+            flexibility(p).solve(
+                np.zeros(1, int), p.robot.errors.reshape(1, -1), row_forces(
+                    p, np.zeros((1, 6)), np.zeros((1, 3))
+                ),
+            )
+            for p in rows
+        ]  # fmt: skip
+        if all(f.solved[0] for f in found):
+            np.testing.assert_allclose(
+                found[0].platform_screw, found[1].platform_screw, rtol=1e-7, atol=1e-12
+            )
+        compared += 1
+    assert compared > 10
 
 
 def test_frames_in_another_order_give_the_same_answer():
