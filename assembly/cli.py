@@ -320,7 +320,7 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the platform's largest pose error, problem (27)."""
-    from assembly.pose_error import READINGS
+    from assembly.reach import READINGS
     from assembly.results import pose_error_of, pose_error_text
 
     for name in reading or ():
@@ -381,7 +381,7 @@ def show(
     from assembly.energy import solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly
-    from assembly.pose_error import READINGS
+    from assembly.reach import READINGS
 
     if output is not None:
         check_writable(output)

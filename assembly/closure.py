@@ -43,7 +43,7 @@ class VirtualJoints:
         group: (nu,) which cone a column belongs to: two columns for a disc.
         scaled: (nu,) bool, whether the margin's factor scales the cone.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: whether bounds of passive joints' own motion are kept.
+        bounded_motion: frames whose bound of the passive joint's own motion is kept.
     """
 
     robot: Robot
@@ -53,12 +53,13 @@ class VirtualJoints:
     group: NDArray
     scaled: NDArray
     free: NDArray
-    bounded_motion: bool
+    bounded_motion: frozenset[int]
 
 
 def virtual_joints(
-    robot: Robot, compliant: str = "elastic", bounded_motion: bool = False
-) -> VirtualJoints:
+    robot: Robot, compliant: str = "elastic",
+    bounded_motion: bool | frozenset[int] = False,
+) -> VirtualJoints:  # fmt: skip
     """Columns of everything that may move.
 
     Args:
@@ -67,12 +68,15 @@ def virtual_joints(
             act; ``"hinged"``, they do but for the one about (or along) the joint's own
             z, which is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and
             the own z is locked or free: the two readings of problem (21).
-        bounded_motion: keep the bounds of passive joints' own motion.  They are large
-            and almost never reached, so they are left out first and checked after.
+        bounded_motion: keep the bounds of passive joints' own motion, of all or of
+            these frames.  They are large and almost never reached, so they are left
+            out first and checked after.
 
     Returns:
         The columns.
     """
+    if isinstance(bounded_motion, bool):
+        bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
     return _virtual_joints(_Parts(_parts(robot), robot), compliant, bounded_motion)
 
 
@@ -98,15 +102,17 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    case: _Parts, compliant: str, bounded_motion: bool
+    case: _Parts, compliant: str, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
     """The columns, once for all robots of the same parts."""
     robot = case.robot
     turns = compliant in {"free", "hinged"}
     bounds = clearance_bounds(robot, "free" if turns else "elastic")
     play = scales_with_margin(robot)
-    if not bounded_motion:
-        bounds = np.where(~play & (bounds > 0), np.inf, bounds)
+    left_out = [i not in bounded_motion for i in range(len(bounds))]
+    bounds = np.where(
+        np.array(left_out)[:, None] & ~play & (bounds > 0), np.inf, bounds
+    )
     links = hinges = np.zeros((0, 6, 6))
     if compliant in {"elastic", "hinged"}:
         links, hinges = link_compliances(robot), joint_compliances(robot)

@@ -201,9 +201,10 @@ class Assembly:
         left = self.linearisation.rows @ self.screws.ravel()
         return float(np.abs(left).max(initial=0.0))
 
-    def clearance_excess(self) -> float:
+    def clearance_excess(self, compliant: str = "elastic") -> float:
         """[-] by how much the worst clearance leaves its cone, relative to its size."""
-        bounds = clearance_bounds(self.posture.robot)
+        turns = compliant in {"free", "hinged"}
+        bounds = clearance_bounds(self.posture.robot, "free" if turns else "elastic")
         return clearance_excess(self.clearance_screws, bounds)
 
     def duality_gap(self) -> float:
@@ -271,21 +272,27 @@ def solve_assembly(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
     """
-    lin = linearise(posture)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     forces = _all_forces(posture, wrench, bodies, gravity)
-    robot = posture.robot
+    return _solve_within(linearise(posture), "elastic", wrench, forces)
+
+
+def _solve_within(
+    lin: Linearisation, compliant: str, load: NDArray, forces: Forces
+) -> Assembly:
+    """Close a manipulator; bounds of passive joints' motion count where they matter."""
+    robot = lin.posture.robot
     try:
-        answer = solve_with(lin, virtual_joints(robot), wrench, forces)
+        answer = solve_with(lin, virtual_joints(robot, compliant), load, forces)
     except FreeMotion:
         if not has_bounded_motion(robot):
             raise
     else:
-        if answer.clearance_excess() <= 1e-9:
+        if answer.clearance_excess(compliant) <= 1e-9:
             return answer
     # the bound of a passive joint's own motion was left out, but it matters
-    joints = virtual_joints(robot, bounded_motion=True)
-    return solve_with(lin, joints, wrench, forces)
+    joints = virtual_joints(robot, compliant, bounded_motion=True)
+    return solve_with(lin, joints, load, forces)
 
 
 def _all_forces(
@@ -335,8 +342,7 @@ def solve_with(
 
 def without_own_springs(answer: Assembly) -> Assembly:
     """The least energy when compliant joints turn freely about their own axis."""
-    joints = virtual_joints(answer.posture.robot, "hinged")
-    return solve_with(answer.linearisation, joints, answer.load, answer.forces)
+    return _solve_within(answer.linearisation, "hinged", answer.load, answer.forces)
 
 
 def _minimise(small: Reduction) -> LeastEnergy:

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.mobility import mobility
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture
+from assembly.reach import reachable_screws
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
 from assembly.zone import zone_margin
@@ -297,9 +298,9 @@ def _support(
 ) -> dict[str, Any]:  # fmt: skip
     """Largest error along a direction: certified, attained, and the screw there."""
     reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
-    if reach.unbounded:
-        return _bracket((np.inf, np.inf), reach.centre)
     found = reach.support(direction)
+    if found.height == np.inf:
+        return _bracket((np.inf, np.inf), reach.centre)
     attained = float(np.asarray(direction) @ found.screw)
     return _bracket((attained, found.height), found.screw)
 

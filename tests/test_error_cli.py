@@ -7,8 +7,9 @@ import pytest
 
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture, place_robot
+from assembly.reach import reachable_screws
 from assembly.robots import load_robot
 
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]

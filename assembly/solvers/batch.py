@@ -51,6 +51,7 @@ class Energies:
         clearance_excess: (k,) [-] by how much the worst clearance leaves its cone.
         clearances: (k, nu) in units of the cones of :attr:`joints`; NaN where the
             bound of a passive joint's own motion mattered.
+        motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         road: (k,) index into :data:`ROADS`.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
@@ -66,6 +67,7 @@ class Energies:
     closure_residual: NDArray
     clearance_excess: NDArray
     clearances: NDArray
+    motions: NDArray
     multipliers: NDArray
     road: NDArray
     status: NDArray
@@ -142,8 +144,8 @@ def minimise_energies(
     assemble_all(structure, T, all_errors, off, out)
     answers = Energies(
         out.energy, out.bound, out.without_play, out.platform_screw, out.open,
-        _excess(out.clearances, structure.starts), out.clearances, out.multipliers,
-        out.road,
+        _excess(out.clearances, structure.starts), out.clearances, out.motions,
+        out.multipliers, out.road,
         np.full(count, "ok", dtype=object), np.full(count, "", dtype=object), joints,
     )  # fmt: skip
     for i in np.flatnonzero(out.road >= _COMPILED).tolist():
@@ -167,7 +169,7 @@ def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -
     """Row i of the answers by the slower road."""
     a = answers
     for values in (a.energy, a.bound, a.energy_without_play, a.platform_screw,
-                   a.closure_residual, a.clearance_excess, a.clearances,
+                   a.closure_residual, a.clearance_excess, a.clearances, a.motions,
                    a.multipliers):  # fmt: skip
         values[i] = np.nan
     try:
@@ -186,7 +188,7 @@ def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -
     a.closure_residual[i] = one.closure_residual()
     a.clearance_excess[i] = one.clearance_excess()
     if one.clearances.shape == a.clearances[i].shape:
-        a.clearances[i] = one.clearances
+        a.clearances[i], a.motions[i] = one.clearances, one.motions
     a.bound[i], a.multipliers[i] = one.bound, one.multipliers
     if one.unproved:
         a.status[i], a.reason[i] = "solver failed", one.unproved
