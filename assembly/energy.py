@@ -15,8 +15,9 @@ series carry the same wrench, which (23) adds to itself, and the paths to the pl
 alone, (24)-(26), sum to zero on an unloaded platform.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,7 +45,15 @@ from assembly.solvers.conic import (
 )
 from assembly.solvers.reduction import FreeMotion, Reduction, reduce_problem
 
+if TYPE_CHECKING:
+    from assembly.screw_bound import ScrewBound
+
 LEFT_OPEN, EXCESS = 1e-9, 1e-9  # accepted: [rad, lengths] of a closure, [-] of play
+_ROUNDING = 8 * float(np.finfo(float).eps)  # of sums of some tens of terms
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m], and of its size: accepted of the screw
+_AMPLIFIED = 10.0  # by closures, of what springs move; beyond it, it is looked at
+SPREAD = 1e13  # of stiffnesses: rounding of the stiffest is 1e-3 of the softest
+_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest are taken for rigid
 
 
 class CannotAssemble(Exception):
@@ -87,16 +96,25 @@ class Assembly:
         """Where the robot stands nominally."""
         return self.linearisation.posture
 
-    @property
+    @cached_property
     def energy(self) -> float:
-        """[J] elastic energy stored."""
+        """[J] elastic energy stored; 0 where the certificate cannot tell it from 0."""
+        told = told_from_zero(
+            self.stored, self.duality_gap(), self.multipliers,
+            self.closure_residual() + self.rounding,
+        )  # fmt: skip
+        return self.stored if told else 0.0
+
+    @property
+    def stored(self) -> float:
+        """[J] in the springs as they were found."""
         return float(self.elastic @ self.elastic) / 2
 
     @property
     def potential(self) -> float:
         """[J] energy minus the work of the loads."""
         on_errors = self.forces.body @ self.posture.robot.errors.ravel()
-        return self.energy - self._work - float(on_errors)
+        return self.stored - self._work - float(on_errors)
 
     @property
     def _work(self) -> float:
@@ -207,6 +225,43 @@ class Assembly:
         bounds = clearance_bounds(self.posture.robot, "free" if turns else "elastic")
         return clearance_excess(self.clearance_screws, bounds)
 
+    @cached_property
+    def rounding(self) -> float:
+        """[rad, lengths] what rounding may leave open in a closure."""
+        lin = self.linearisation
+        return float(closure_rounding(self.posture.robot.errors, self.joints, lin.size))
+
+    @cached_property
+    def uncertainty(self) -> float:
+        """[J] the duality gap without cancellation, and with rounding counted in.
+
+        Energy minus its bound is |y - s|^2 / 2, with s the springs as the wrenches
+        would have them, plus for each cone what its wrench could still gain, plus the
+        work of the multipliers on what the closures leave open.
+        """
+        body, joint = self.wrenches.ravel(), self.joint_wrenches.ravel()
+        pull = self.joints.elastic.T
+        springs = self.elastic - np.where(self.joints.links, pull @ body, pull @ joint)
+        pulls = self.joints.cones.T @ joint
+        sizes = cone_sizes(pulls, self.joints.group)
+        gains = sizes - np.bincount(
+            self.joints.group, weights=pulls * self.clearances, minlength=len(sizes)
+        )
+        slip = np.abs(self.joints.free.T @ joint) @ np.abs(self.motions)
+        left = np.abs(self.linearisation.rows @ self.screws.ravel()) + self.rounding
+        still_open = float(np.abs(self.multipliers) @ left)
+        return float(
+            springs @ springs / 2 + np.maximum(gains, 0.0).sum() + 2 * slip
+            + still_open + _ROUNDING * (sizes.sum() + abs(self._work))
+        )  # fmt: skip
+
+    @cached_property
+    def screw_bound(self) -> "ScrewBound":
+        """How far any platform screw of least energy may be from this one's."""
+        from assembly.screw_bound import bound_screw
+
+        return bound_screw(self)
+
     def duality_gap(self) -> float:
         """[J] certified: the energy is at most this above the least possible."""
         # in this order a gap that is not a number stays one
@@ -223,7 +278,7 @@ class Assembly:
         left, excess, gap = (
             self.closure_residual(), self.clearance_excess(), self.duality_gap()
         )  # fmt: skip
-        allowed = GAP * (self.energy + abs(self._work))
+        allowed = GAP * (self.stored + abs(self._work))
         allowed += GAP_WITHOUT_PLAY * self.energy_without_play
         said = []
         # written so that a value that is not a number is not proved
@@ -236,12 +291,49 @@ class Assembly:
             said.append(f"a closure stays open by {left:.1e} (rad, or m per length)")
         if not excess <= EXCESS:
             said.append(f"a clearance is exceeded by {excess:.1e} of its size")
+        if not said and not self._springs_settled:
+            said += self.unproved_screw
         return "; ".join(said)
+
+    @property
+    def unproved_screw(self) -> list[str]:
+        """What of the platform screw the gap leaves unproved, beside what play leaves.
+
+        Proved is what is within 1e-5 rad and m, plus 1e-3 of its size.
+        """
+        bound, allowed = self.screw_bound, self._allowed
+        softest = stiffness_spread(self.joints, self.linearisation.size)
+        why = f"; stiffnesses differ {softest:.0e} times" if softest > SPREAD else ""
+        return [
+            f"the platform's {part} is proved to {error:.1e} {unit} only, expected "
+            f"{most:.1e}{why}"
+            for part, error, unit, most in (
+                ("rotation", bound.rotation_error, "rad", allowed[0]),
+                ("translation", bound.translation_error, "m", allowed[1]),
+            )
+            if not error <= most
+        ]
+
+    @property
+    def _allowed(self) -> NDArray:
+        """(2,) [rad, m] most that the platform screw may be wrong by."""
+        halves = self.platform_screw.reshape(2, 3)
+        return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
+
+    @property
+    def _springs_settled(self) -> bool:
+        """Whether springs, as far as the gap leaves them open, hardly move a frame."""
+        blocks = self.joints.elastic.reshape(-1, 6, self.joints.elastic.shape[1])
+        moved = np.linalg.norm(self.posture.paths @ blocks, axis=(0, 2))
+        far = np.sqrt(2 * self.uncertainty) * np.linalg.norm(
+            moved.reshape(2, 3), axis=1
+        )
+        return bool(np.all(_AMPLIFIED * far <= self._allowed))
 
     def relative_gap(self) -> float:
         """[-] duality gap relative to energy, or to 1e-4 of that without play."""
         # inside an assembly zone the least energy is zero, and no gap relative to it
-        scale = max(self.energy, 1e-4 * self.energy_without_play, 1e-300)
+        scale = max(self.stored, 1e-4 * self.energy_without_play, 1e-300)
         return self.duality_gap() / scale
 
 
@@ -334,10 +426,79 @@ def solve_with(
     y = small.springs(u)
     q = small.motions(u, y)
     multipliers = small.multipliers(least.springs, least.rigid_multipliers)
-    return Assembly(
+    answer = Assembly(
         lin, joints, load, forces, y, u, q, multipliers, small.energy_without_play,
         small.ranks,
     )  # fmt: skip
+    left = answer.closure_residual() + answer.rounding
+    if forces or told_from_zero(answer.stored, 0.0, multipliers, left):
+        return answer
+    # nothing is forced: springs and wrenches are rounding of zero
+    nothing = np.zeros_like(y), np.zeros_like(multipliers)
+    return replace(answer, elastic=nothing[0], multipliers=nothing[1])
+
+
+def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
+    """(...,) [rad, lengths] what rounding may leave open in a closure.
+
+    Args:
+        errors: (..., n, 6) [rad, m] geometric errors.
+        joints: what may move.
+        size: [m] reference length.
+
+    Returns:
+        8 units in the last place of the sum of errors and clearances.
+    """
+    weights = np.repeat([1.0, 1.0 / size], 3)
+    play = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
+    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((play @ weights).sum())
+    return _ROUNDING * sums
+
+
+def told_from_zero(
+    energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, left: ArrayLike
+) -> NDArray:
+    """Whether least energies differ from zero by more than their certificate can tell.
+
+    Springs are known to sqrt(2 gap), so an energy up to the gap may be none; and the
+    wrenches' work on what rounding leaves open in the closures is worth nothing.
+
+    Args:
+        energy: (...,) [J].
+        gap: (...,) [J] energy minus its certified bound.
+        multipliers: (..., 6 closures) of the scaled closures.
+        left: (...,) [rad, lengths] open in the closures, rounding included.
+
+    Returns:
+        (...,) bool; also where the energy is not a number.
+    """
+    worth = np.asarray(gap) + left * np.abs(multipliers).sum(axis=-1)
+    return ~(np.asarray(energy) <= worth)
+
+
+def drop_zeros(
+    energy: NDArray, bound: NDArray, multipliers: NDArray, left: NDArray
+) -> None:
+    """Make zero, in place, the energies of unloaded robots that cannot be told from it.
+
+    Args:
+        energy: (k,) [J].
+        bound: (k,) [J] certified lower bound.
+        multipliers: (k, 6 closures) of the scaled closures; zero where they are no more
+            than rounding.
+        left: (k,) [rad, lengths] open in the closures, rounding included.
+    """
+    rounding = ~told_from_zero(energy, 0.0, multipliers, left)
+    zero = ~told_from_zero(energy, energy - bound, multipliers, left)
+    energy[zero], multipliers[rounding] = 0.0, 0.0
+    bound[zero] = np.minimum(bound[zero], 0.0)
+
+
+def stiffness_spread(joints: VirtualJoints, size: float) -> float:
+    """[-] stiffest over softest spring, turns counted at the reference length."""
+    weights = np.tile(np.repeat([1.0, 1.0 / size], 3), len(joints.elastic) // 6)
+    compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
+    return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))
 
 
 def without_own_springs(answer: Assembly) -> Assembly:
@@ -347,13 +508,22 @@ def without_own_springs(answer: Assembly) -> Assembly:
 
 def _minimise(small: Reduction) -> LeastEnergy:
     """Least energy of a reduced problem; infeasible ones are named."""
+    joints = small.joints
+    spread = stiffness_spread(joints, small.linearisation.size)
+    beyond = ""
+    if spread > _RIGID_BESIDE:
+        beyond = (
+            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
+            "stiffest count as rigid"
+        )
     if small.inconsistent:
         raise CannotAssemble(
             f"a rigid part stays open by {small.inconsistent:.3g} (rad, or m per "
-            "reference length): no play or spring acts there"
+            f"reference length): no play or spring acts there{beyond}"
         )
-    joints = small.joints
     least = minimise_energy(small.G, small.h, small.d, small.H, small.k, joints.group)
     if not least.feasible:
-        raise CannotAssemble("no play within its bounds closes what no spring can")
+        raise CannotAssemble(
+            f"no play within its bounds closes what no spring can{beyond}"
+        )
     return least

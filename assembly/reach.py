@@ -12,6 +12,7 @@ cone of 10 rad beside ones of 1e-5 costs digits; so each is left out until it is
 that it could be passed: dq = -A_q^+ A_v dv is largest at a sum over the cones.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
-from assembly.clearance import clearance_bounds
+from assembly.clearance import clearance_bounds, scales_with_margin
 from assembly.closure import VirtualJoints, virtual_joints
 from assembly.energy import Assembly, without_own_springs
 from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
@@ -162,54 +163,69 @@ def reachable_screws(
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
     if reading == "budget" and (answer.forces or energy_budget < 0):
         raise ValueError("the budget reading needs no load and a budget >= 0")
-    robot, mode = answer.posture.robot, "free" if reading == "free" else "elastic"
+    mode = "free" if reading == "free" else "elastic"
     holder = answer
     if reading == "free":
         # turning about the own axis costs nothing here: only what stays loaded
         # without those soft springs is held
         holder = without_own_springs(answer)
-    kept = answer.joints.bounded_motion | holder.joints.bounded_motion
+
+    def play(joints: VirtualJoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        held = np.zeros(joints.cones.shape[1], dtype=bool)
+        if reading != "budget":
+            held = loaded_cones(holder, joints)
+        columns, group = joints.cones[:, ~held], joints.group[~held]
+        start = clearances_in(answer, joints)[~held]
+        if reading == "budget":
+            radius = np.sqrt(2 * (1 + energy_budget) * answer.stored)
+            columns = np.hstack([columns, joints.elastic * radius])
+            spring = answer.elastic / max(radius, 1e-300)
+            start = np.concatenate([start, spring])
+            last = group.max(initial=-1) + 1
+            group = np.concatenate([group, np.full(len(spring), last)])
+        lin = answer.linearisation
+        return lin.rows @ columns, lin.platform @ columns, start, group
+
+    return within_bounds(answer, mode, holder.joints.bounded_motion, play)
+
+
+def within_bounds(
+    answer: Assembly, mode: str, kept: frozenset[int],
+    play: Callable[[VirtualJoints], tuple[NDArray, NDArray, NDArray, NDArray]],
+) -> Reach:  # fmt: skip
+    """Platform screws as cones move about an answer and free motions follow.
+
+    Args:
+        answer: where they start.
+        mode: of compliant joints, see :func:`assembly.closure.virtual_joints`.
+        kept: frames whose bound of the joint's own motion is certain to count.
+        play: unit cones of given virtual joints: their columns in the closures (6
+            closures, nv) and at the platform (6, nv), start and groups (nv,).
+
+    Returns:
+        The set, within all bounds.
+    """
+    kept = kept | answer.joints.bounded_motion
     while True:
-        joints = virtual_joints(robot, mode, bounded_motion=kept)
-        moving = _Moving(answer, holder, joints, reading, energy_budget)
-        passed = moving.passed
-        if not passed:
+        joints = virtual_joints(answer.posture.robot, mode, bounded_motion=kept)
+        A_v, P_v, start, group = play(joints)
+        group = np.unique(group, return_inverse=True)[1]
+        moving = _Moving(answer, joints, A_v, P_v, start, group)
+        if not moving.passed:
             return moving.reach
-        kept = kept | passed
+        kept = kept | moving.passed
 
 
 @dataclass(frozen=True, eq=False)
 class _Moving:
-    """What may move in a reading: columns of screws, and where (22) left them."""
+    """Cones that move, and the free motions that follow them."""
 
     answer: Assembly
-    holder: Assembly
     joints: VirtualJoints
-    reading: str
-    energy_budget: float
-
-    @cached_property
-    def pinned(self) -> NDArray:
-        """(nu,) bool: clearances that carry load, held by complementary slackness."""
-        if self.reading == "budget":
-            return np.zeros(self.joints.cones.shape[1], dtype=bool)
-        return loaded_cones(self.holder, self.joints)
-
-    @cached_property
-    def _columns(self) -> tuple[NDArray, NDArray, NDArray]:
-        """(6n, nv) of unit cones, where they start, and their groups."""
-        held = self.pinned
-        columns = self.joints.cones[:, ~held]
-        start = self._start()[~held]
-        group = self.joints.group[~held]
-        if self.reading == "budget":
-            radius = np.sqrt(2 * (1 + self.energy_budget) * self.answer.energy)
-            columns = np.hstack([columns, self.joints.elastic * radius])
-            spring = self.answer.elastic / max(radius, 1e-300)
-            start = np.concatenate([start, spring])
-            last = group.max(initial=-1) + 1
-            group = np.concatenate([group, np.full(len(spring), last)])
-        return columns, start, np.unique(group, return_inverse=True)[1]
+    A_v: NDArray
+    P_v: NDArray
+    start: NDArray
+    group: NDArray
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
@@ -225,49 +241,45 @@ class _Moving:
         """[-] what counts as zero beside what is left of the nominal closures."""
         return least + 30.0 * self.answer.posture.mismatch
 
-    @property
+    @cached_property
     def passed(self) -> frozenset[int]:
         """Frames whose own motion may pass a bound that is left out here."""
-        columns, start, group = self._columns
         back, drift = self._follow
-        bounds = clearance_bounds(
-            self.joints.robot, "free" if self.reading == "free" else "elastic"
-        )[:, [0, 0, 1, 2, 2, 3]].ravel()
         row = self.joints.free.argmax(axis=0)
-        limit = bounds[row]
-        if not np.isfinite(limit).any():
+        # what has no spring here has its bound in every reading
+        limit = clearance_bounds(self.joints.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()[row]
+        own = scales_with_margin(self.joints.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()[row]
+        limited = np.isfinite(limit) & ~own
+        if not limited.any():
             return frozenset()
-        step = -back @ (self.answer.linearisation.rows @ columns)
-        middle = self.answer.clearance_screws.ravel()[row] - step @ start
-        most = np.abs(middle) + sum(
-            np.linalg.norm(step[:, group == c], axis=1) for c in np.unique(group)
-        )
+        step = -back @ self.A_v
+        middle = self.answer.clearance_screws.ravel()[row] - step @ self.start
+        most = np.abs(middle)
+        for c in range(self.group.max(initial=-1) + 1):
+            most = most + np.linalg.norm(step[:, self.group == c], axis=1)
         # a motion that nothing but its bound holds goes up to it
-        drifts = drift.any(axis=0)
-        passing = np.isfinite(limit) & ((most > limit) | drifts)
+        passing = limited & ((most > limit) | drift.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
     @property
     def reach(self) -> Reach:
         """The set of platform screws."""
         lin = self.answer.linearisation
-        columns, start, group = self._columns
         back, drift = self._follow
-        A_q = lin.rows @ self.joints.free
-        A_v, P_v = lin.rows @ columns, lin.platform @ columns
-        Z = complement(A_q, self._rounding(_RANK))
-        rows = _rows(Z.T @ A_v, NOISE * np.abs(A_v).max(initial=0.0))
+        Z = complement(lin.rows @ self.joints.free, self._rounding(_RANK))
+        rows = _rows(Z.T @ self.A_v, NOISE * np.abs(self.A_v).max(initial=0.0))
         follow = lin.platform @ self.joints.free @ back
         return Reach(
-            self.answer.platform_screw, P_v - follow @ A_v, rows, start, group, drift
-        )
+            self.answer.platform_screw, self.P_v - follow @ self.A_v, rows, self.start,
+            self.group, drift,
+        )  # fmt: skip
 
-    def _start(self) -> NDArray:
-        """(nu,) the solution's clearances in these cones."""
-        screws = self.answer.clearance_screws.ravel()
-        size = (self.joints.cones**2).sum(axis=0)
-        u = self.joints.cones.T @ screws / size
-        return into_cones(u, self.joints.group)
+
+def clearances_in(answer: Assembly, joints: VirtualJoints) -> NDArray:
+    """(nu,) an answer's clearances in the unit cones of other virtual joints."""
+    screws = answer.clearance_screws.ravel()
+    u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
+    return into_cones(u, joints.group)
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:

@@ -74,7 +74,10 @@ def solution_of(
     try:
         results["zone"] = zone_of(posture)
         answer = solve_assembly(posture, load, gravity=gravity)
-        open_ = filter(None, (results["zone"].get("reason"), answer.unproved))
+        open_ = filter(None, (
+            results["zone"].get("reason"),
+            answer.unproved or "; ".join(answer.unproved_screw),
+        ))  # fmt: skip
         return results | _answer(answer, gravity) | _status("; ".join(open_))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
@@ -94,6 +97,7 @@ def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
         "clearance_excess": answer.clearance_excess(),
         "duality_gap": answer.duality_gap(),
         "relative_gap": answer.relative_gap(),
+        "screw": vars(answer.screw_bound),
     }
     return {
         **_screws_and_wrenches(answer),
@@ -354,8 +358,22 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
+        _screw_bound_text(certificate["screw"]),
     ]
     return "\n".join(lines)
+
+
+def _screw_bound_text(bound: dict[str, float]) -> str:
+    """How far any platform screw of least energy may be from the one told."""
+    wrong = 1e3 * bound["rotation_error"], 1e6 * bound["translation_error"]
+    loose = 1e3 * bound["rotation_open"], 1e6 * bound["translation_open"]
+    text = f"platform error proved to {wrong[0]:.1e} mrad, {wrong[1]:.1e} um"
+    if max(loose) > 1e-9:
+        text += (
+            "; at the same energy play leaves open up to "
+            f"{loose[0]:.3g} mrad, {loose[1]:.3g} um"
+        )
+    return text
 
 
 def _factor(value: float | None) -> str:

@@ -16,8 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.energy import (
+    SPREAD,
     CannotAssemble,
+    closure_rounding,
+    drop_zeros,
     solve_assembly,
+    stiffness_spread,
     without_own_springs,
 )
 from assembly.nominal import size_of
@@ -141,7 +145,10 @@ def minimise_energies(
         np.zeros((count, nu)), np.zeros((count, nq)),
         np.zeros((count, 6 * len(robot.closures))), np.zeros(count),
     )  # fmt: skip
-    assemble_all(structure, T, all_errors, off, out)
+    if stiffness_spread(joints, structure.size) > SPREAD:
+        out.road[:] = ROADS.index("uncertified")  # what rounds is for the other road
+    else:
+        assemble_all(structure, T, all_errors, off, out)
     answers = Energies(
         out.energy, out.bound, out.without_play, out.platform_screw, out.open,
         _excess(out.clearances, structure.starts), out.clearances, out.motions,
@@ -154,6 +161,9 @@ def minimise_energies(
         own = robot if np.array_equal(here, robot.errors) else robot.with_errors(here)
         posture = Posture(own, np.full(n, np.nan), T[i], float(off[i]))
         _solve_slowly(posture, compliant, answers, i)
+    left = answers.closure_residual
+    left = left + closure_rounding(all_errors, joints, structure.size)
+    drop_zeros(answers.energy, answers.bound, answers.multipliers, left)
     return answers
 
 

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, linearise, virtual_joints
+from assembly.energy import closure_rounding, drop_zeros
+from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.loaded_draws import Loads, forces_of, loads_of, solve_loaded
@@ -146,7 +148,11 @@ class OnePosture:
                 slower |= (np.abs(parts @ rows.T) > limit).any(axis=1)
         missed = np.abs(e @ self.unanswered[:, some].T)
         slower |= missed.max(axis=1, initial=0.0) > _RIGID
-        answer = Draws(energy, bound, u, y @ self.closing.T, parts @ screws.T, slower)
+        multipliers = y @ self.closing.T
+        size = size_of(self.posture.robot)
+        left = closure_rounding(errors, self.joints, size)
+        drop_zeros(energy, bound, multipliers, left)
+        answer = Draws(energy, bound, u, multipliers, parts @ screws.T, slower)
         self._solve_slowly(errors, answer)
         return answer
 
