@@ -25,10 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.links import compliance_factor, joint_compliances, link_compliances
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
+from stiffness.reading import BadInput, quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +201,19 @@ def linearise(posture: Posture) -> Linearisation:
 
     Returns:
         The constraint matrix and the map to the platform screw.
+
+    Raises:
+        BadInput: a geometric error is beyond 1e6 rad or m.
     """
     robot = posture.robot
+    wrong = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
+    if wrong.any():
+        frame = robot.frames[int(np.argmax(wrong))]
+        raise BadInput(
+            f"{robot.name}: frame {quoted(frame.name)}.geometric_error: found "
+            f"{np.abs(frame.geometric_error).max():g}, expected numbers of size at "
+            f"most {LARGEST_LENGTH:g} [rad, m]"
+        )
     size = size_of(robot)
     scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
     blocks = closure_signs(robot)[:, :, None, None] * posture.paths

@@ -323,7 +323,8 @@ class Assembly:
     @property
     def _springs_settled(self) -> bool:
         """Whether springs, as far as the gap leaves them open, hardly move a frame."""
-        blocks = self.joints.elastic.reshape(-1, 6, self.joints.elastic.shape[1])
+        frames, springs = len(self.posture.robot.frames), self.elastic.size
+        blocks = self.joints.elastic.reshape(frames, 6, springs)
         moved = np.linalg.norm(self.posture.paths @ blocks, axis=(0, 2))
         far = np.sqrt(2 * self.uncertainty) * np.linalg.norm(
             moved.reshape(2, 3), axis=1

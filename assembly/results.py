@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.mobility import mobility
-from assembly.pose_error import bound_pose_error
+from assembly.pose_error import PoseError, bound_pose_error
 from assembly.posture import Posture
-from assembly.reach import reachable_screws
+from assembly.reach import READINGS, reachable_screws
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
 from assembly.zone import zone_margin
+from stiffness.reading import BadInput
+from stiffness.screws import WRENCH
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
@@ -67,6 +69,7 @@ def solution_of(
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
+        "remarks": list(robot.remarks),
         "load": np.zeros(6) if load is None else np.asarray(load),
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
@@ -241,59 +244,76 @@ def _linearisation_text(found: dict[str, Any]) -> str:
 
 def pose_error_of(
     posture: Posture,
-    readings: Sequence[str],
+    readings: Sequence[str] | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
     direction: ArrayLike | None = None,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
     """Everything ``assembly error`` reports, as plain values.
 
     Args:
         posture: where the robot stands.
-        readings: of problem (27).
+        readings: of problem (27); without any, all that are defined: ``budget`` is not
+            under a load.
         point: (3,) [m] whose translation is asked for, platform axes.
         direction: (6,) along which the largest error is asked for too.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
         options: of :func:`assembly.pose_error.bound_pose_error`.
 
     Returns:
         The keys of the public format; ``status`` as in :func:`solution_of`.
+
+    Raises:
+        BadInput: reading ``budget`` is asked under a load.
     """
+    loaded = bool(np.any(load) or np.any(gravity))
+    if loaded and "budget" in (readings or ()):
+        raise BadInput(
+            "reading budget: found a load; expected frozen or free (the budget is a "
+            "factor on the energy of closing alone)"
+        )
+    readings = readings or (READINGS[:2] if loaded else READINGS)
     results: dict[str, Any] = {
         "robot": posture.robot.name,
         "status": "ok",
         "pose": posture.pose(),
+        "load": np.zeros(6) if load is None else np.asarray(load, dtype=float),
+        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
         "error": None,
         "point": np.asarray(point, dtype=float),
     }
-    offset = posture.platform[:3, :3] @ results["point"]
-    try:
-        answer = solve_assembly(posture)
-        found = [
-            bound_pose_error(answer, name, offset=offset, **options)
-            for name in readings
-        ]
-        along = {
-            name: _support(answer, name, offset, direction, **options)
-            for name in readings if direction is not None
-        }  # fmt: skip
-    except (CannotAssemble, SolverFailed) as error:
-        return results | {"status": failure_status(error), "reason": str(error)}
-    table = {
-        one.reading: {
-            "rotation": _bracket(one.rotation_error, one.rotation_screw),
-            "translation": _bracket(one.translation_error, one.translation_screw),
-            "cuts": one.cuts,
-        }
-        | ({"along": along[one.reading]} if along else {})
-        for one in found
-    }
     if direction is not None:
         results["direction"] = np.asarray(direction, dtype=float)
+    offset = posture.platform[:3, :3] @ results["point"]
+    try:
+        answer = solve_assembly(posture, load, gravity=gravity)
+        table, open_ = {}, []
+        for name in readings:
+            one = bound_pose_error(answer, name, offset=offset, **options)
+            table[name] = _bounds(one)
+            open_ += [f"{name}: {one.unproved}"] if one.unproved else []
+            if direction is not None:
+                along = _support(answer, name, offset, direction, **options)
+                table[name]["along"] = along
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {"relative_gap": answer.relative_gap()}
-    open_ = "; ".join(f"{one.reading}: {one.unproved}" for one in found if one.unproved)
-    return results | _status(open_) | {
-        "energy": answer.energy, "error": table, "certificate": certificate
+    return results | _status("; ".join(open_)) | {
+        "energy": answer.energy, "platform_screw": answer.platform_screw,
+        "error": table, "certificate": certificate,
     }  # fmt: skip
+
+
+def _bounds(one: PoseError) -> dict[str, Any]:
+    """Both brackets of a reading."""
+    return {
+        "rotation": _bracket(one.rotation_error, one.rotation_screw),
+        "translation": _bracket(one.translation_error, one.translation_screw),
+        "cuts": one.cuts,
+    }
 
 
 def _support(
@@ -343,6 +363,7 @@ def solution_text(results: dict[str, Any]) -> str:
         Text without colours.
     """
     lines = [f"{results['robot']} at {_numbers(results['pose'].values())} [m, rad]"]
+    lines += remark_lines(results["remarks"])
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
@@ -359,8 +380,40 @@ def solution_text(results: dict[str, Any]) -> str:
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
         _screw_bound_text(certificate["screw"]),
+        *_wrench_lines(results),
     ]
     return "\n".join(lines)
+
+
+def remark_lines(remarks: Sequence[str]) -> list[str]:
+    """What a robot's file leaves to a default, a line each."""
+    return [f"note: {remark}" for remark in remarks]
+
+
+def _wrench_lines(results: dict[str, Any]) -> list[str]:
+    """Wrenches through all frames and closures as a table."""
+    rows = {name: frame["wrench"] for name, frame in results["frames"].items()}
+    shut = {
+        " - ".join(closure["frames"]): closure["wrench"]
+        for closure in results["closures"]
+    }
+    width = max(map(len, (*rows, *shut, "closure")))
+    units = [f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH]
+
+    def table(head: str, wrenches: dict[str, NDArray]) -> list[str]:
+        lines = [f"{head:{width}s}" + "".join(f"{unit:>13s}" for unit in units)]
+        for name, wrench in wrenches.items():
+            least = 1e-9 * max(float(np.abs(wrench).max()), 1e-3)
+            shown = (0.0 if abs(w) < least else float(w) for w in wrench)
+            lines.append(f"{name:{width}s}" + "".join(f"{w:13.5g}" for w in shown))
+        return lines
+
+    lines = ["", "wrenches through the bodies, at each frame's origin in its axes"]
+    lines += table("frame", rows)
+    if shut:
+        lines += ["", "wrenches of the closures, at the platform's origin, base axes"]
+        lines += table("closure", shut)
+    return lines
 
 
 def _screw_bound_text(bound: dict[str, float]) -> str:

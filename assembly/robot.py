@@ -227,6 +227,7 @@ class Robot:
         description: one line.
         effects: parameters of the effects that the machine is known to have, by name;
             see :mod:`assembly.effects`.
+        remarks: what its file leaves to a default that is easily overlooked.
     """
 
     name: str
@@ -235,6 +236,7 @@ class Robot:
     closures: tuple[tuple[str, str], ...] = ()
     description: str = ""
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", parents_first(self.frames))

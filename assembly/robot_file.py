@@ -100,12 +100,25 @@ def declared_robot(root: Table, name: str) -> Robot:
     closures = tuple(_closure(table, names) for table in tables[1])
     _check_known(root, "platform", platform, names)
     try:
-        robot = Robot(name, platform, frames, closures, description)
+        remarks = _remarks(tables[0])
+        robot = Robot(name, platform, frames, closures, description, remarks=remarks)
         robot = replace(robot, effects=read_effects(effects, robot))
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
     return robot
+
+
+def _remarks(tables: list[Table]) -> tuple[str, ...]:
+    """That the frames named have ``dh`` without ``alpha``, which turns the next axis."""
+    # the other three are zero as often as not; a forgotten alpha is another machine
+    dh = {table.content["name"]: table.content.get("dh") for table in tables}
+    flat = [
+        quoted(name) for name, given in dh.items() if given and "alpha" not in given
+    ]
+    if not flat:
+        return ()
+    return (f"dh without alpha, taken as 0: {', '.join(flat)}",)
 
 
 def _frame(table: Table) -> Frame:

@@ -1,5 +1,6 @@
 """Robot files: what must load does, what must not says why, and both ways round."""
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -834,6 +835,47 @@ def test_the_documentations_bearing_turns_freely_and_yields_as_its_data_sheet_sa
     assert mobility(home_posture(robot)).locked_freedoms == 1
     with pytest.raises(FreeMotion):
         solve_assembly(home_posture(robot), [0, 0, 1.0, 0, 0, 0])
+
+
+def test_a_dh_table_without_alpha_is_told(write_file, run, monkeypatch):
+    """By solve, in text and JSON, and by show; with alpha nothing is said."""
+    text = """
+platform = "tool"
+[[frame]]
+name = "arm"
+parent = "base"
+dh = { a = 0.3 }
+[[frame]]
+name = "wrist"
+parent = "arm"
+dh = { a = 0.2, alpha = 0.0 }
+[[frame]]
+name = "tool"
+parent = "wrist"
+dh = { d = 0.1 }
+"""
+    told = 'dh without alpha, taken as 0: "arm", "tool"'
+    file = write_file(text)
+    assert read_robot(file).remarks == (told,)
+    _, out, _ = run("assembly", "solve", file)
+    assert f"\nnote: {told}\n" in out
+    _, out, _ = run("assembly", "solve", file, "--json", "-")
+    assert json.loads(out)["remarks"] == [told]
+
+    class Plotter:
+        def screenshot(self, name):
+            Path(name).write_bytes(b"")
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("assembly.plot.draw_assembly", lambda *_: Plotter())
+    status, out, _ = run("assembly", "show", file, "-o", file.with_suffix(".png"))
+    assert (status, out) == (0, f"note: {told}\n")
+    full = text.replace("a = 0.3", "a = 0.3, alpha = 0").replace(
+        "d =", "alpha = 0, d ="
+    )
+    assert read_robot(write_file(full)).remarks == ()
 
 
 def test_a_bearing_is_written_and_read_back(tmp_path):

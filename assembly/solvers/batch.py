@@ -24,6 +24,7 @@ from assembly.energy import (
     stiffness_spread,
     without_own_springs,
 )
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
@@ -133,8 +134,11 @@ def minimise_energies(
             f"minimise_energies: transforms have shape {T.shape} and errors "
             f"{errors.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or (k, {n}, 6)"
         )
-    if not (np.isfinite(T).all() and np.isfinite(errors).all()):
-        raise ValueError("minimise_energies: transforms or errors are not all finite")
+    if not (np.isfinite(T).all() and np.all(np.abs(errors) <= LARGEST_LENGTH)):
+        raise ValueError(
+            "minimise_energies: transforms or errors are not all finite, or an error "
+            f"is larger than {LARGEST_LENGTH:g} [rad, m]"
+        )
     all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
     joints, structure = structure_of(robot, compliant)
