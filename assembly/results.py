@@ -290,9 +290,15 @@ def pose_error_of(
     offset = posture.platform[:3, :3] @ results["point"]
     try:
         answer = solve_assembly(posture, load, gravity=gravity)
-        table, open_ = {}, []
+        table: dict[str, Any] = {}
+        open_ = []
         for name in readings:
-            one = bound_pose_error(answer, name, offset=offset, **options)
+            try:
+                one = bound_pose_error(answer, name, offset=offset, **options)
+            except FreeMotion as error:  # without their own springs, joints give way
+                nothing = dict.fromkeys(("rotation", "translation"))
+                table[name] = nothing | {"reason": str(error)}
+                continue
             table[name] = _bounds(one)
             open_ += [f"{name}: {one.unproved}"] if one.unproved else []
             if direction is not None:
@@ -340,17 +346,23 @@ def pose_error_text(results: dict[str, Any]) -> str:
     if results["status"] != "ok":
         lines.append(f"{results['status']}: {results['reason']}")
     for reading, found in (results["error"] or {}).items():
-        rotation, translation = found["rotation"], found["translation"]
+        if "reason" in found:
+            lines.append(f"{reading:7s} no answer: {found['reason']}")
+            continue
         lines.append(
-            f"{reading:7s} rotation {1e3 * rotation['lower']:.6g} to "
-            f"{1e3 * rotation['upper']:.6g} mrad, translation "
-            f"{1e3 * translation['lower']:.6g} to {1e3 * translation['upper']:.6g} mm"
+            f"{reading:7s} rotation {_bounds_text(found['rotation'], 'mrad')}, "
+            f"translation {_bounds_text(found['translation'], 'mm')}"
         )
         if "along" in found:
-            low, high = found["along"]["lower"], found["along"]["upper"]
             unit = "mm" if np.any(results["direction"][3:]) else "mrad"
-            lines.append(f"        along it {1e3 * low:.6g} to {1e3 * high:.6g} {unit}")
+            lines.append(f"        along it {_bounds_text(found['along'], unit)}")
     return "\n".join(lines)
+
+
+def _bounds_text(found: dict[str, Any], unit: str) -> str:
+    """Two bounds, in thousandths of rad or m."""
+    low, high = 1e3 * found["lower"], 1e3 * found["upper"]
+    return f"{low:.6g} to {high:.6g} {unit}" if low < np.inf else "without bound"
 
 
 def solution_text(results: dict[str, Any]) -> str:

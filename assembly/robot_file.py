@@ -110,7 +110,7 @@ def declared_robot(root: Table, name: str) -> Robot:
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
-    """That the frames named have ``dh`` without ``alpha``, which turns the next axis."""
+    """That the frames named have ``dh`` without ``alpha``, which turns their axis."""
     # the other three are zero as often as not; a forgotten alpha is another machine
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     flat = [

@@ -113,6 +113,37 @@ mass = 3.0
     assert "reading budget: found a load; expected frozen or free" in err
 
 
+HINGE = """
+platform = "tip"
+[[frame]]
+name = "hinge"
+parent = "base"
+joint = "revolute"
+joint_stiffness = [1e6, 1e6, 100, 1e6, 1e6, 1e6]
+clearance = { radial = 3e-5, axial = 2e-5 }
+[[frame]]
+name = "tip"
+parent = "hinge"
+"""
+
+
+def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
+    """A moment that the hinge's own spring carries; by hand M / k, and the play."""
+    file = tmp_path / "hinge.toml"
+    file.write_text(HINGE)
+    status, out, _ = run("assembly", "error", file, "--load", "mz=0.1")
+    assert status == 0
+    frozen, free = out.splitlines()[1:]
+    assert frozen.split() == "frozen rotation 1 to 1 mrad, translation".split() + [
+        "0.0360555", "to", "0.0360555", "mm",
+    ]  # fmt: skip
+    assert free.startswith("free    no answer: the load drives a motion")
+    _, out, _ = run("assembly", "error", file, "--load", "mz=0.1", "--json", "-")
+    assert json.loads(out)["error"]["free"]["rotation"] is None
+    _, out, _ = run("assembly", "error", file, "--reading", "free")
+    assert "rotation without bound, translation 0.0360555 to" in out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
