@@ -36,6 +36,12 @@ from assembly.closure import (
 )
 from assembly.load import Forces, forces_on, weights
 from assembly.posture import Posture
+from assembly.rounding import (
+    ROUNDING,
+    closure_rounding,
+    stiffness_spread,
+    told_from_zero,
+)
 from assembly.solvers.conic import (
     GAP,
     GAP_WITHOUT_PLAY,
@@ -49,10 +55,6 @@ if TYPE_CHECKING:
     from assembly.screw_bound import ScrewBound
 
 LEFT_OPEN, EXCESS = 1e-9, 1e-9  # accepted: [rad, lengths] of a closure, [-] of play
-_ROUNDING = 8 * float(np.finfo(float).eps)  # of sums of some tens of terms
-_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m], and of its size: accepted of the screw
-_AMPLIFIED = 10.0  # by closures, of what springs move; beyond it, it is looked at
-SPREAD = 1e13  # of stiffnesses: rounding of the stiffest is 1e-3 of the softest
 _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest are taken for rigid
 
 
@@ -252,7 +254,7 @@ class Assembly:
         still_open = float(np.abs(self.multipliers) @ left)
         return float(
             springs @ springs / 2 + np.maximum(gains, 0.0).sum() + 2 * slip
-            + still_open + _ROUNDING * (sizes.sum() + abs(self._work))
+            + still_open + ROUNDING * (sizes.sum() + abs(self._work))
         )  # fmt: skip
 
     @cached_property
@@ -275,6 +277,8 @@ class Assembly:
         play within 1e-9 of its bounds, whose energy is at most 1e-8 of it, and of the
         loads' work, plus 1e-12 of that without play above the least possible.
         """
+        from assembly.screw_bound import springs_settled, unproved_screw
+
         left, excess, gap = (
             self.closure_residual(), self.clearance_excess(), self.duality_gap()
         )  # fmt: skip
@@ -291,45 +295,9 @@ class Assembly:
             said.append(f"a closure stays open by {left:.1e} (rad, or m per length)")
         if not excess <= EXCESS:
             said.append(f"a clearance is exceeded by {excess:.1e} of its size")
-        if not said and not self._springs_settled:
-            said += self.unproved_screw
+        if not said and not springs_settled(self):
+            said += unproved_screw(self)
         return "; ".join(said)
-
-    @property
-    def unproved_screw(self) -> list[str]:
-        """What of the platform screw the gap leaves unproved, beside what play leaves.
-
-        Proved is what is within 1e-5 rad and m, plus 1e-3 of its size.
-        """
-        bound, allowed = self.screw_bound, self._allowed
-        softest = stiffness_spread(self.joints, self.linearisation.size)
-        why = f"; stiffnesses differ {softest:.0e} times" if softest > SPREAD else ""
-        return [
-            f"the platform's {part} is proved to {error:.1e} {unit} only, expected "
-            f"{most:.1e}{why}"
-            for part, error, unit, most in (
-                ("rotation", bound.rotation_error, "rad", allowed[0]),
-                ("translation", bound.translation_error, "m", allowed[1]),
-            )
-            if not error <= most
-        ]
-
-    @property
-    def _allowed(self) -> NDArray:
-        """(2,) [rad, m] most that the platform screw may be wrong by."""
-        halves = self.platform_screw.reshape(2, 3)
-        return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
-
-    @property
-    def _springs_settled(self) -> bool:
-        """Whether springs, as far as the gap leaves them open, hardly move a frame."""
-        frames, springs = len(self.posture.robot.frames), self.elastic.size
-        blocks = self.joints.elastic.reshape(frames, 6, springs)
-        moved = np.linalg.norm(self.posture.paths @ blocks, axis=(0, 2))
-        far = np.sqrt(2 * self.uncertainty) * np.linalg.norm(
-            moved.reshape(2, 3), axis=1
-        )
-        return bool(np.all(_AMPLIFIED * far <= self._allowed))
 
     def relative_gap(self) -> float:
         """[-] duality gap relative to energy, or to 1e-4 of that without play."""
@@ -437,69 +405,6 @@ def solve_with(
     # nothing is forced: springs and wrenches are rounding of zero
     nothing = np.zeros_like(y), np.zeros_like(multipliers)
     return replace(answer, elastic=nothing[0], multipliers=nothing[1])
-
-
-def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
-    """(...,) [rad, lengths] what rounding may leave open in a closure.
-
-    Args:
-        errors: (..., n, 6) [rad, m] geometric errors.
-        joints: what may move.
-        size: [m] reference length.
-
-    Returns:
-        8 units in the last place of the sum of errors and clearances.
-    """
-    weights = np.repeat([1.0, 1.0 / size], 3)
-    play = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
-    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((play @ weights).sum())
-    return _ROUNDING * sums
-
-
-def told_from_zero(
-    energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, left: ArrayLike
-) -> NDArray:
-    """Whether least energies differ from zero by more than their certificate can tell.
-
-    Springs are known to sqrt(2 gap), so an energy up to the gap may be none; and the
-    wrenches' work on what rounding leaves open in the closures is worth nothing.
-
-    Args:
-        energy: (...,) [J].
-        gap: (...,) [J] energy minus its certified bound.
-        multipliers: (..., 6 closures) of the scaled closures.
-        left: (...,) [rad, lengths] open in the closures, rounding included.
-
-    Returns:
-        (...,) bool; also where the energy is not a number.
-    """
-    worth = np.asarray(gap) + left * np.abs(multipliers).sum(axis=-1)
-    return ~(np.asarray(energy) <= worth)
-
-
-def drop_zeros(
-    energy: NDArray, bound: NDArray, multipliers: NDArray, left: NDArray
-) -> None:
-    """Make zero, in place, the energies of unloaded robots that cannot be told from it.
-
-    Args:
-        energy: (k,) [J].
-        bound: (k,) [J] certified lower bound.
-        multipliers: (k, 6 closures) of the scaled closures; zero where they are no more
-            than rounding.
-        left: (k,) [rad, lengths] open in the closures, rounding included.
-    """
-    rounding = ~told_from_zero(energy, 0.0, multipliers, left)
-    zero = ~told_from_zero(energy, energy - bound, multipliers, left)
-    energy[zero], multipliers[rounding] = 0.0, 0.0
-    bound[zero] = np.minimum(bound[zero], 0.0)
-
-
-def stiffness_spread(joints: VirtualJoints, size: float) -> float:
-    """[-] stiffest over softest spring, turns counted at the reference length."""
-    weights = np.tile(np.repeat([1.0, 1.0 / size], 3), len(joints.elastic) // 6)
-    compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
-    return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))
 
 
 def without_own_springs(answer: Assembly) -> Assembly:

@@ -12,11 +12,12 @@ from assembly.mobility import mobility
 from assembly.pose_error import PoseError, bound_pose_error
 from assembly.posture import Posture
 from assembly.reach import READINGS, reachable_screws
+from assembly.screw_bound import unproved_screw
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
+from assembly.wrench_table import wrench_lines
 from assembly.zone import zone_margin
 from stiffness.reading import BadInput
-from stiffness.screws import WRENCH
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
@@ -79,7 +80,7 @@ def solution_of(
         answer = solve_assembly(posture, load, gravity=gravity)
         open_ = filter(None, (
             results["zone"].get("reason"),
-            answer.unproved or "; ".join(answer.unproved_screw),
+            answer.unproved or "; ".join(unproved_screw(answer)),
         ))  # fmt: skip
         return results | _answer(answer, gravity) | _status("; ".join(open_))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -392,7 +393,7 @@ def solution_text(results: dict[str, Any]) -> str:
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
         _screw_bound_text(certificate["screw"]),
-        *_wrench_lines(results),
+        *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
 
@@ -400,32 +401,6 @@ def solution_text(results: dict[str, Any]) -> str:
 def remark_lines(remarks: Sequence[str]) -> list[str]:
     """What a robot's file leaves to a default, a line each."""
     return [f"note: {remark}" for remark in remarks]
-
-
-def _wrench_lines(results: dict[str, Any]) -> list[str]:
-    """Wrenches through all frames and closures as a table."""
-    rows = {name: frame["wrench"] for name, frame in results["frames"].items()}
-    shut = {
-        " - ".join(closure["frames"]): closure["wrench"]
-        for closure in results["closures"]
-    }
-    width = max(map(len, (*rows, *shut, "closure")))
-    units = [f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH]
-
-    def table(head: str, wrenches: dict[str, NDArray]) -> list[str]:
-        lines = [f"{head:{width}s}" + "".join(f"{unit:>13s}" for unit in units)]
-        for name, wrench in wrenches.items():
-            least = 1e-9 * max(float(np.abs(wrench).max()), 1e-3)
-            shown = (0.0 if abs(w) < least else float(w) for w in wrench)
-            lines.append(f"{name:{width}s}" + "".join(f"{w:13.5g}" for w in shown))
-        return lines
-
-    lines = ["", "wrenches through the bodies, at each frame's origin in its axes"]
-    lines += table("frame", rows)
-    if shut:
-        lines += ["", "wrenches of the closures, at the platform's origin, base axes"]
-        lines += table("closure", shut)
-    return lines
 
 
 def _screw_bound_text(bound: dict[str, float]) -> str:

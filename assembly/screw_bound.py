@@ -20,9 +20,12 @@ from numpy.typing import NDArray
 from assembly.closure import VirtualJoints
 from assembly.energy import Assembly
 from assembly.reach import Reach, clearances_in, within_bounds
+from assembly.rounding import SPREAD, stiffness_spread
 from assembly.solvers.conic import SolverFailed, cone_sizes
 
 _CAPPED = 0.1  # [-] of a cone: a push that leaves it more room holds nothing
+_SCREW, _SCREW_SHARE = 1e-5, 1e-3  # [rad, m], and of its size: accepted of the screw
+_AMPLIFIED = 10.0  # by closures, of what springs move; beyond it, it is looked at
 
 
 @dataclass(frozen=True)
@@ -119,3 +122,41 @@ def _heights(reach: Reach) -> NDArray:
         except SolverFailed:  # nothing is known that way
             found.append(np.inf)
     return np.maximum(np.reshape(found, (2, 6)).max(axis=0), 0.0)
+
+
+def unproved_screw(answer: Assembly) -> list[str]:
+    """What of the platform screw the gap leaves unproved, beside what play leaves open.
+
+    Args:
+        answer: the assembly found.
+
+    Returns:
+        A sentence for each half that is not proved to 1e-5 rad or m plus 1e-3 of it.
+    """
+    bound, allowed = answer.screw_bound, _allowed(answer)
+    softest = stiffness_spread(answer.joints, answer.linearisation.size)
+    why = f"; stiffnesses differ {softest:.0e} times" if softest > SPREAD else ""
+    return [
+        f"the platform's {part} is proved to {error:.1e} {unit} only, expected "
+        f"{most:.1e}{why}"
+        for part, error, unit, most in (
+            ("rotation", bound.rotation_error, "rad", allowed[0]),
+            ("translation", bound.translation_error, "m", allowed[1]),
+        )
+        if not error <= most
+    ]
+
+
+def _allowed(answer: Assembly) -> NDArray:
+    """(2,) [rad, m] most that the platform screw may be wrong by."""
+    halves = answer.platform_screw.reshape(2, 3)
+    return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
+
+
+def springs_settled(answer: Assembly) -> bool:
+    """Whether springs, as far as the gap leaves them open, hardly move a frame."""
+    frames, springs = len(answer.posture.robot.frames), answer.elastic.size
+    blocks = answer.joints.elastic.reshape(frames, 6, springs)
+    moved = np.linalg.norm(answer.posture.paths @ blocks, axis=(0, 2))
+    far = np.sqrt(2 * answer.uncertainty) * np.linalg.norm(moved.reshape(2, 3), axis=1)
+    return bool(np.all(_AMPLIFIED * far <= _allowed(answer)))

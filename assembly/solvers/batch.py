@@ -16,18 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.energy import (
-    SPREAD,
     CannotAssemble,
-    closure_rounding,
-    drop_zeros,
     solve_assembly,
-    stiffness_spread,
     without_own_springs,
 )
 from assembly.joint_file import LARGEST_LENGTH
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
+from assembly.rounding import SPREAD, closure_rounding, drop_zeros, stiffness_spread
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
 from assembly.zone import zone_margin
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, linearise, virtual_joints
-from assembly.energy import closure_rounding, drop_zeros
 from assembly.nominal import size_of
 from assembly.posture import Posture
+from assembly.rounding import closure_rounding, drop_zeros
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.loaded_draws import Loads, forces_of, loads_of, solve_loaded
 from assembly.solvers.reduction import complement, reduce_problem
