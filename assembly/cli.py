@@ -1,5 +1,6 @@
 """The commands ``forcefit assembly ...``: parse, call one function, print or save."""
 
+import math
 import os
 import sys
 import time
@@ -10,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from assembly.joint_file import LARGEST, LARGEST_LENGTH
 from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
@@ -77,17 +79,17 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
     from stiffness.screws import WRENCH
 
     names = [name.lower() for name in WRENCH]
-    given = _components(texts, "--load", names)
+    given = _components(texts, "--load", names, LARGEST)
     return [given.get(name, 0.0) for name in names]
 
 
 def _components(
-    texts: list[str], option: str, names: Sequence[str]
+    texts: list[str], option: str, names: Sequence[str], largest: float
 ) -> dict[str, float]:
     """Numbers given by component, of a known few."""
     from assembly.posture import parse_assignments
 
-    given = parse_assignments(texts, option)
+    given = parse_assignments(texts, option, largest)
     for name in given:
         if name not in names:
             hint = nearest(name, names)
@@ -111,13 +113,13 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
         The numbers along x, y and z.
 
     Raises:
-        BadInput: a name other than x, y, z, or not a number.
+        BadInput: a name other than x, y, z, or not a number of at most 1e6.
     """
     if not texts:
         return None
     from assembly.posture import parse_assignments
 
-    given = parse_assignments(texts, option)
+    given = parse_assignments(texts, option, LARGEST_LENGTH)
     for name in given:
         if name not in {"x", "y", "z"}:
             raise BadInput(f'{option}: unknown component "{name[:60]}"; valid: x, y, z')
@@ -141,8 +143,8 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     from stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
-    given = _components(texts, "--direction", names)
-    length = sum(value**2 for value in given.values()) ** 0.5
+    given = _components(texts, "--direction", names, LARGEST_LENGTH)
+    length = math.hypot(*given.values())
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
             "--direction: expected components of a translation or of a rotation, not "
@@ -185,8 +187,8 @@ def declared_posture(
 
     return place_robot(
         load_robot(robot),
-        pose=parse_assignments(pose, "--pose") if pose else None,
-        joints=parse_assignments(joint, "--joint") if joint else None,
+        pose=parse_assignments(pose, "--pose", LARGEST_LENGTH) if pose else None,
+        joints=parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None,
     )
 
 
@@ -333,8 +335,14 @@ def error(
     pose: PoseOption = None,
     joint: JointOption = None,
     reading: Annotated[
-        list[str] | None, typer.Option(help="frozen | free | budget; default all.")
+        list[str] | None,
+        typer.Option(
+            help="frozen | free | budget; default all, under a load the first two."
+        ),
     ] = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
     energy_budget: Annotated[
         float, typer.Option(help="eta of the budget reading: E <= (1 + eta) E*.")
     ] = 0.05,
@@ -354,8 +362,9 @@ def error(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.pose_error import READINGS
+    """Certified bounds of the platform's largest pose error, problem (27)."""
+    from assembly.effects.acting import act
+    from assembly.reach import READINGS
     from assembly.results import pose_error_of, pose_error_text
 
     for name in reading or ():
@@ -368,16 +377,20 @@ def error(
         "tolerance_translation": tolerance_translation,
     }
     for key, value in options.items():
-        if not 0 < value < float("inf"):
+        if not 0 < value <= LARGEST_LENGTH:
             option = "--" + key.replace("_", "-")
-            raise BadInput(f"{option}: found {value}, expected a finite number > 0")
-    posture = posture_of(robot, pose, joint)
-    at = parse_vector(point, "--point") or (0.0, 0.0, 0.0)
-    along = parse_direction(direction)
+            expected = f"a number > 0 and at most {LARGEST_LENGTH:g}"
+            raise BadInput(f"{option}: found {value}, expected {expected}")
+    acting = act(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under),
+    )  # fmt: skip
     with one_thread():
         results = pose_error_of(
-            posture, reading or READINGS, point=at, direction=along, **options
-        )
+            acting.posture, reading or None, load=acting.load, gravity=acting.gravity,
+            point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
+            direction=parse_direction(direction), **options,
+        )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
@@ -418,7 +431,8 @@ def show(
     from assembly.energy import solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly
-    from assembly.pose_error import READINGS
+    from assembly.reach import READINGS
+    from assembly.results import remark_lines
 
     if output is not None:
         check_writable(output)
@@ -430,6 +444,10 @@ def show(
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
     answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
+    print(
+        "".join(f"{line}\n" for line in remark_lines(answer.posture.robot.remarks)),
+        end="",
+    )
     plotter = draw_assembly(answer, exaggeration, errors, reading, output is not None)
     if output is None:
         plotter.show()

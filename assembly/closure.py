@@ -25,11 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.links import compliance_factor, joint_compliances, link_compliances
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
 from stiffness.display import html_table, short_repr
+from stiffness.reading import BadInput, quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class VirtualJoints:
         group: (nu,) which cone a column belongs to: two columns for a disc.
         scaled: (nu,) bool, whether the margin's factor scales the cone.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: whether bounds of passive joints' own motion are kept.
+        bounded_motion: frames whose bound of the passive joint's own motion is kept.
     """
 
     robot: Robot
@@ -54,14 +56,15 @@ class VirtualJoints:
     group: NDArray
     scaled: NDArray
     free: NDArray
-    bounded_motion: bool
+    bounded_motion: frozenset[int]
 
     __repr__, _repr_html_ = short_repr, html_table
 
 
 def virtual_joints(
-    robot: Robot, compliant: str = "elastic", bounded_motion: bool = False
-) -> VirtualJoints:
+    robot: Robot, compliant: str = "elastic",
+    bounded_motion: bool | frozenset[int] = False,
+) -> VirtualJoints:  # fmt: skip
     """Columns of everything that may move.
 
     Args:
@@ -70,12 +73,15 @@ def virtual_joints(
             act; ``"hinged"``, they do but for the one about (or along) the joint's own
             z, which is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and
             the own z is locked or free: the two readings of problem (21).
-        bounded_motion: keep the bounds of passive joints' own motion.  They are large
-            and almost never reached, so they are left out first and checked after.
+        bounded_motion: keep the bounds of passive joints' own motion, of all or of
+            these frames.  They are large and almost never reached, so they are left
+            out first and checked after.
 
     Returns:
         The columns.
     """
+    if isinstance(bounded_motion, bool):
+        bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
     return _virtual_joints(_Parts(_parts(robot), robot), compliant, bounded_motion)
 
 
@@ -101,15 +107,17 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    case: _Parts, compliant: str, bounded_motion: bool
+    case: _Parts, compliant: str, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
     """The columns, once for all robots of the same parts."""
     robot = case.robot
     turns = compliant in {"free", "hinged"}
     bounds = clearance_bounds(robot, "free" if turns else "elastic")
     play = scales_with_margin(robot)
-    if not bounded_motion:
-        bounds = np.where(~play & (bounds > 0), np.inf, bounds)
+    left_out = [i not in bounded_motion for i in range(len(bounds))]
+    bounds = np.where(
+        np.array(left_out)[:, None] & ~play & (bounds > 0), np.inf, bounds
+    )
     links = hinges = np.zeros((0, 6, 6))
     if compliant in {"elastic", "hinged"}:
         links, hinges = link_compliances(robot), joint_compliances(robot)
@@ -198,8 +206,19 @@ def linearise(posture: Posture) -> Linearisation:
 
     Returns:
         The constraint matrix and the map to the platform screw.
+
+    Raises:
+        BadInput: a geometric error is beyond 1e6 rad or m.
     """
     robot = posture.robot
+    wrong = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
+    if wrong.any():
+        frame = robot.frames[int(np.argmax(wrong))]
+        raise BadInput(
+            f"{robot.name}: frame {quoted(frame.name)}.geometric_error: found "
+            f"{np.abs(frame.geometric_error).max():g}, expected numbers of size at "
+            f"most {LARGEST_LENGTH:g} [rad, m]"
+        )
     size = size_of(robot)
     scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
     blocks = closure_signs(robot)[:, :, None, None] * posture.paths

@@ -15,7 +15,7 @@ series carry the same wrench, which (23) adds to itself, and the paths to the pl
 alone, (24)-(26), sum to zero on an unloaded platform.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,12 @@ from assembly.closure import (
 )
 from assembly.load import Forces, forces_on, weights
 from assembly.posture import Posture
+from assembly.rounding import (
+    ROUNDING,
+    closure_rounding,
+    stiffness_spread,
+    told_from_zero,
+)
 from assembly.solvers.conic import (
     GAP,
     GAP_WITHOUT_PLAY,
@@ -51,7 +57,11 @@ if TYPE_CHECKING:
     import xarray
 
 
+if TYPE_CHECKING:
+    from assembly.screw_bound import ScrewBound
+
 LEFT_OPEN, EXCESS = 1e-9, 1e-9  # accepted: [rad, lengths] of a closure, [-] of play
+_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest are taken for rigid
 
 
 class CannotAssemble(Exception):
@@ -123,16 +133,25 @@ class Assembly:
         """Where the robot stands nominally."""
         return self.linearisation.posture
 
-    @property
+    @cached_property
     def energy(self) -> float:
-        """[J] elastic energy stored."""
+        """[J] elastic energy stored; 0 where the certificate cannot tell it from 0."""
+        told = told_from_zero(
+            self.stored, self.duality_gap(), self.multipliers,
+            self.closure_residual() + self.rounding,
+        )  # fmt: skip
+        return self.stored if told else 0.0
+
+    @property
+    def stored(self) -> float:
+        """[J] in the springs as they were found."""
         return float(self.elastic @ self.elastic) / 2
 
     @property
     def potential(self) -> float:
         """[J] energy minus the work of the loads."""
         on_errors = self.forces.body @ self.posture.robot.errors.ravel()
-        return self.energy - self._work - float(on_errors)
+        return self.stored - self._work - float(on_errors)
 
     @property
     def _work(self) -> float:
@@ -237,10 +256,48 @@ class Assembly:
         left = self.linearisation.rows @ self.screws.ravel()
         return float(np.abs(left).max(initial=0.0))
 
-    def clearance_excess(self) -> float:
+    def clearance_excess(self, compliant: str = "elastic") -> float:
         """[-] by how much the worst clearance leaves its cone, relative to its size."""
-        bounds = clearance_bounds(self.posture.robot)
+        turns = compliant in {"free", "hinged"}
+        bounds = clearance_bounds(self.posture.robot, "free" if turns else "elastic")
         return clearance_excess(self.clearance_screws, bounds)
+
+    @cached_property
+    def rounding(self) -> float:
+        """[rad, lengths] what rounding may leave open in a closure."""
+        lin = self.linearisation
+        return float(closure_rounding(self.posture.robot.errors, self.joints, lin.size))
+
+    @cached_property
+    def uncertainty(self) -> float:
+        """[J] the duality gap without cancellation, and with rounding counted in.
+
+        Energy minus its bound is |y - s|^2 / 2, with s the springs as the wrenches
+        would have them, plus for each cone what its wrench could still gain, plus the
+        work of the multipliers on what the closures leave open.
+        """
+        body, joint = self.wrenches.ravel(), self.joint_wrenches.ravel()
+        pull = self.joints.elastic.T
+        springs = self.elastic - np.where(self.joints.links, pull @ body, pull @ joint)
+        pulls = self.joints.cones.T @ joint
+        sizes = cone_sizes(pulls, self.joints.group)
+        gains = sizes - np.bincount(
+            self.joints.group, weights=pulls * self.clearances, minlength=len(sizes)
+        )
+        slip = np.abs(self.joints.free.T @ joint) @ np.abs(self.motions)
+        left = np.abs(self.linearisation.rows @ self.screws.ravel()) + self.rounding
+        still_open = float(np.abs(self.multipliers) @ left)
+        return float(
+            springs @ springs / 2 + np.maximum(gains, 0.0).sum() + 2 * slip
+            + still_open + ROUNDING * (sizes.sum() + abs(self._work))
+        )  # fmt: skip
+
+    @cached_property
+    def screw_bound(self) -> "ScrewBound":
+        """How far any platform screw of least energy may be from this one's."""
+        from assembly.screw_bound import bound_screw
+
+        return bound_screw(self)
 
     def duality_gap(self) -> float:
         """[J] certified: the energy is at most this above the least possible."""
@@ -255,10 +312,12 @@ class Assembly:
         play within 1e-9 of its bounds, whose energy is at most 1e-8 of it, and of the
         loads' work, plus 1e-12 of that without play above the least possible.
         """
+        from assembly.screw_bound import springs_settled, unproved_screw
+
         left, excess, gap = (
             self.closure_residual(), self.clearance_excess(), self.duality_gap()
         )  # fmt: skip
-        allowed = GAP * (self.energy + abs(self._work))
+        allowed = GAP * (self.stored + abs(self._work))
         allowed += GAP_WITHOUT_PLAY * self.energy_without_play
         said = []
         # written so that a value that is not a number is not proved
@@ -271,12 +330,14 @@ class Assembly:
             said.append(f"a closure stays open by {left:.1e} (rad, or m per length)")
         if not excess <= EXCESS:
             said.append(f"a clearance is exceeded by {excess:.1e} of its size")
+        if not said and not springs_settled(self):
+            said += unproved_screw(self)
         return "; ".join(said)
 
     def relative_gap(self) -> float:
         """[-] duality gap relative to energy, or to 1e-4 of that without play."""
         # inside an assembly zone the least energy is zero, and no gap relative to it
-        scale = max(self.energy, 1e-4 * self.energy_without_play, 1e-300)
+        scale = max(self.stored, 1e-4 * self.energy_without_play, 1e-300)
         return self.duality_gap() / scale
 
 
@@ -307,21 +368,27 @@ def solve_assembly(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
     """
-    lin = linearise(posture)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     forces = _all_forces(posture, wrench, bodies, gravity)
-    robot = posture.robot
+    return _solve_within(linearise(posture), "elastic", wrench, forces)
+
+
+def _solve_within(
+    lin: Linearisation, compliant: str, load: NDArray, forces: Forces
+) -> Assembly:
+    """Close a manipulator; bounds of passive joints' motion count where they matter."""
+    robot = lin.posture.robot
     try:
-        answer = solve_with(lin, virtual_joints(robot), wrench, forces)
+        answer = solve_with(lin, virtual_joints(robot, compliant), load, forces)
     except FreeMotion:
         if not has_bounded_motion(robot):
             raise
     else:
-        if answer.clearance_excess() <= 1e-9:
+        if answer.clearance_excess(compliant) <= 1e-9:
             return answer
     # the bound of a passive joint's own motion was left out, but it matters
-    joints = virtual_joints(robot, bounded_motion=True)
-    return solve_with(lin, joints, wrench, forces)
+    joints = virtual_joints(robot, compliant, bounded_motion=True)
+    return solve_with(lin, joints, load, forces)
 
 
 def _all_forces(
@@ -363,27 +430,41 @@ def solve_with(
     y = small.springs(u)
     q = small.motions(u, y)
     multipliers = small.multipliers(least.springs, least.rigid_multipliers)
-    return Assembly(
+    answer = Assembly(
         lin, joints, load, forces, y, u, q, multipliers, small.energy_without_play,
         small.ranks,
     )  # fmt: skip
+    left = answer.closure_residual() + answer.rounding
+    if forces or told_from_zero(answer.stored, 0.0, multipliers, left):
+        return answer
+    # nothing is forced: springs and wrenches are rounding of zero
+    nothing = np.zeros_like(y), np.zeros_like(multipliers)
+    return replace(answer, elastic=nothing[0], multipliers=nothing[1])
 
 
 def without_own_springs(answer: Assembly) -> Assembly:
     """The least energy when compliant joints turn freely about their own axis."""
-    joints = virtual_joints(answer.posture.robot, "hinged")
-    return solve_with(answer.linearisation, joints, answer.load, answer.forces)
+    return _solve_within(answer.linearisation, "hinged", answer.load, answer.forces)
 
 
 def _minimise(small: Reduction) -> LeastEnergy:
     """Least energy of a reduced problem; infeasible ones are named."""
+    joints = small.joints
+    spread = stiffness_spread(joints, small.linearisation.size)
+    beyond = ""
+    if spread > _RIGID_BESIDE:
+        beyond = (
+            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
+            "stiffest count as rigid"
+        )
     if small.inconsistent:
         raise CannotAssemble(
             f"a rigid part stays open by {small.inconsistent:.3g} (rad, or m per "
-            "reference length): no play or spring acts there"
+            f"reference length): no play or spring acts there{beyond}"
         )
-    joints = small.joints
     least = minimise_energy(small.G, small.h, small.d, small.H, small.k, joints.group)
     if not least.feasible:
-        raise CannotAssemble("no play within its bounds closes what no spring can")
+        raise CannotAssemble(
+            f"no play within its bounds closes what no spring can{beyond}"
+        )
     return least

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from assembly.pose_error import Reach
+from assembly.reach import Reach
 from stiffness.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
@@ -51,7 +51,7 @@ def error_body(reach: Reach, part: str, count: int = 200) -> ErrorBody:
     """The set of errors, from its support functions.
 
     Args:
-        reach: of :func:`assembly.pose_error.reachable_screws`.
+        reach: of :func:`assembly.reach.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
         count: directions to look in, evenly spread.
 
@@ -59,13 +59,13 @@ def error_body(reach: Reach, part: str, count: int = 200) -> ErrorBody:
         The body between its inner and outer approximation.
 
     Raises:
-        ValueError: the part is neither, or the platform moves without bound.
+        ValueError: the part is neither, or has no bound.
         SolverFailed: the cone solver gave up.
     """
     if part not in PARTS:
         raise ValueError(f"part is {part!r}, expected 'rotation' or 'translation'")
-    if reach.unbounded:
-        raise ValueError("the platform moves freely: its errors have no bound")
+    if reach.unbounded(PARTS[part].start):
+        raise ValueError(f"the platform moves freely: its {part} has no bound")
     directions = even_directions(count)
     weights = np.eye(6)[PARTS[part]]
     found = [reach.support(d @ weights) for d in directions]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import Clearance
+from assembly.robot import LOCKED, Clearance
 from stiffness.reading import Table, find_fault, number_array
 
 LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
@@ -35,34 +35,46 @@ def read_clearance(table: Table) -> Clearance | None:
     return Clearance(**bounds)
 
 
-def read_joint_stiffness(table: Table) -> NDArray | None:
+def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
     """K_B as a full matrix; infinities only on its diagonal.
 
     Args:
         table: of a ``[[frame]]``.
+        free: row along which a passive joint moves; 0 there, in its whole row and
+            column, leaves it free.  None if the joint does not move by itself.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] symmetric positive definite, None if absent.
+        (6, 6) [N m/rad .. N/m] symmetric positive definite but for a row and column of
+        zeros along a free motion; None if absent.
 
     Raises:
-        BadInput: another shape, or not a stiffness.
+        BadInput: another shape, not a stiffness, or ``inf`` along the free motion.
     """
     key = "joint_stiffness"
     if not table.has(key):
         return None
     value = table.content[key]
-    expected = "6 diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"
+    zero = "" if free is None else f" (number {free + 1} may be 0: free)"
+    expected = f"6 diagonal terms > 0 or inf{zero}, or 6 rows of 6 [N m/rad .. N/m]"
     K = number_array(value)
     if K is None or K.shape not in {(6,), (6, 6)} or np.isnan(K).any():
         shape = (6, 6) if isinstance(value, list) and _has_rows(value) else (6,)
         found = find_fault(value, shape, infinite=True)
         raise table.bad(key, f"found {found}, expected {expected}")
     if K.ndim == 1:
-        if K.min() <= 0:
-            raise table.bad(key, f"found {K.min():g} in it, expected {expected}")
+        low = K.copy()
+        if free is not None and low[free] == 0.0:
+            low[free] = 1.0
+        if low.min() <= 0:
+            raise table.bad(key, f"found {low.min():g} in it, expected {expected}")
         K = np.diag(K)
     rigid = np.isposinf(np.diag(K))
-    soft = np.ix_(~rigid, ~rigid)
+    if free is not None and rigid[free]:
+        raise table.bad(key, LOCKED)
+    bare = rigid.copy()
+    if free is not None:
+        bare[free] = not (K[free].any() or K[:, free].any())
+    soft = np.ix_(~bare, ~bare)
     wrong = (rigid[:, None] | rigid) & (K != 0.0) | ~np.isfinite(K)
     wrong &= ~np.diag(rigid)
     if wrong.any():

@@ -52,7 +52,7 @@ def link_compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Compliance of every joint, K_B^-1; zero where rigid or not given.
+    """Compliance of every joint, K_B^-1; zero where rigid, free or not given.
 
     Args:
         robot: of n frames.
@@ -62,9 +62,10 @@ def joint_compliances(robot: Robot) -> NDArray:
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
-        if frame.joint_stiffness is not None:
-            soft = np.ix_(*[np.isfinite(np.diag(frame.joint_stiffness))] * 2)
-            C[i][soft] = np.linalg.inv(frame.joint_stiffness[soft])
+        K = frame.springs
+        if K is not None:
+            soft = np.ix_(*[np.isfinite(np.diag(K))] * 2)
+            C[i][soft] = np.linalg.inv(K[soft])
     return C
 
 

@@ -19,10 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.posture import Posture
 from assembly.robot import BeamLink, beam_axis
 from stiffness.beam import declared_section
+from stiffness.reading import BadInput
 from stiffness.screws import screw_map
+
+LARGEST = 1e60  # [N m, N] weights of the largest masses at the largest gravity included
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +62,12 @@ def forces_on(
 
     Returns:
         The forces; all zero where nothing is given.
+
+    Raises:
+        BadInput: a number is not finite, or so large that its square overflows.
     """
+    for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
+        _check(whose, given, LARGEST, "N m, N")
     robot, T = posture.robot, posture.transforms
     on_body, after = np.zeros((2, *T.shape[:-2], 6))
     if bodies is not None:
@@ -91,7 +100,11 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     Returns:
         ``bodies`` and ``carried`` (..., n, 6) of :func:`forces_on` [N m, N].  Links
         given by a matrix, a mesh or a library have no weight of their own here.
+
+    Raises:
+        BadInput: gravity is not finite, or beyond 1e6 m/s^2.
     """
+    _check("gravity", gravity, LARGEST_LENGTH, "m/s^2")
     robot, T = posture.robot, posture.transforms
     g = np.broadcast_to(np.asarray(gravity, dtype=float), (*T.shape[:-3], 3))
     bodies, carried = np.zeros((2, *T.shape[:-2], 6))
@@ -131,6 +144,19 @@ def row_forces(postures: Posture, load: NDArray, gravity: NDArray) -> Forces:
     if gravity.any():
         bodies, carried = weights(postures, gravity)
     return forces_on(postures, load, bodies, carried)
+
+
+def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
+    """Refuse numbers that no machine has and no double carries on."""
+    if given is None:
+        return
+    values = np.asarray(given, dtype=float)
+    wrong = ~(np.abs(values) <= largest)  # so that what is not a number is wrong
+    if wrong.any():
+        raise BadInput(
+            f"{whose}: found {values[wrong].flat[0]:g}, expected finite numbers of "
+            f"size at most {largest:g} [{unit}]"
+        )
 
 
 def _at(arm: NDArray, force: NDArray) -> NDArray:

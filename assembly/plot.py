@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.energy import Assembly
 from assembly.error_body import ErrorBody, error_body
-from assembly.pose_error import reachable_screws
+from assembly.reach import reachable_screws
 from stiffness.screws import rotation_matrix, screw_map
 
 

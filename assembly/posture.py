@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.joint_file import LARGEST, LARGEST_LENGTH
 from assembly.nominal import NOT_CLOSED, Target, Track, follow
 from assembly.robot import Robot
 from stiffness.display import Figures, brief, html_table, numbers, short_repr
@@ -150,18 +151,22 @@ def place_robot(
     return _posture(robot, track, 0)
 
 
-def parse_assignments(texts: Iterable[str], option: str) -> dict[str, float]:
+def parse_assignments(
+    texts: Iterable[str], option: str, largest: float = LARGEST
+) -> dict[str, float]:
     """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
 
     Args:
         texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
         option: whose they are, for messages.
+        largest: no sound value is larger than this, either sign.
 
     Returns:
         The numbers by name.
 
     Raises:
-        BadInput: not of that form, not a finite number, or a name given twice.
+        BadInput: not of that form, not a finite number, too large, or a name given
+            twice.
     """
     values: dict[str, float] = {}
     for part in ",".join(texts).split(","):
@@ -174,7 +179,7 @@ def parse_assignments(texts: Iterable[str], option: str) -> dict[str, float]:
             raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
         if name in values:
             raise BadInput(f'{option}: "{name[:60]}" is given twice')
-        values[name] = _finite(f"{option} {name[:60]}", value)
+        values[name] = _finite(f"{option} {name[:60]}", value, largest)
     return values
 
 
@@ -185,7 +190,7 @@ def pose_target(pose: Mapping[str, float]) -> Target:
         if name not in POSE:
             hint = nearest(name, POSE)
             raise BadInput(f'pose: unknown component "{name[:60]}"{hint}')
-        goal[0, POSE.index(name)] = _finite(f"pose.{name}", value)
+        goal[0, POSE.index(name)] = _finite(f"pose.{name}", value, LARGEST_LENGTH)
     return Target(pose=goal)
 
 
@@ -197,14 +202,17 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
         if name not in actuated:
             hint = nearest(name, actuated)
             raise BadInput(f'joints: no actuated joint "{name[:60]}"{hint}')
-        goal[robot.index(name)] = _finite(f"joint {name}", value)
+        goal[robot.index(name)] = _finite(f"joint {name}", value, LARGEST_LENGTH)
     return Target(coordinates=goal[None])
 
 
-def _finite(whose: str, value: float) -> float:
-    """The value, refused if it is not a finite number."""
+def _finite(whose: str, value: float, largest: float) -> float:
+    """The value, refused if it is not a finite number, or beyond any machine."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
+    if abs(value) > largest:
+        expected = f"expected a number of size at most {largest:g}"
+        raise BadInput(f"{whose}: found {value:g}, {expected}")
     return float(value)
 
 

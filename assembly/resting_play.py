@@ -105,7 +105,7 @@ def _tight(frame: Frame) -> Frame:
     if frame.clearance is None:
         return frame
     kept = Clearance()
-    if frame.passive and frame.joint_stiffness is None:
+    if frame.passive and not frame.compliant:
         own = "axial" if frame.joint == "prismatic" else "spin"
         kept = Clearance(**{own: getattr(frame.clearance, own)})
     return replace(frame, clearance=kept)

@@ -9,12 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.exact import ExactAssembly, solve_exact
 from assembly.mobility import mobility
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import PoseError, bound_pose_error
 from assembly.posture import Posture
+from assembly.reach import READINGS, reachable_screws
+from assembly.screw_bound import unproved_screw
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.reduction import FreeMotion
+from assembly.wrench_table import wrench_lines
 from assembly.zone import zone_margin
 from stiffness.display import bracket, numbers, rounded, screw_text
+from stiffness.reading import BadInput
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
@@ -67,6 +71,7 @@ def solution_of(
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
+        "remarks": list(robot.remarks),
         "load": np.zeros(6) if load is None else np.asarray(load),
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
@@ -74,7 +79,10 @@ def solution_of(
     try:
         results["zone"] = zone_of(posture)
         answer = solve_assembly(posture, load, gravity=gravity)
-        open_ = filter(None, (results["zone"].get("reason"), answer.unproved))
+        open_ = filter(None, (
+            results["zone"].get("reason"),
+            answer.unproved or "; ".join(unproved_screw(answer)),
+        ))  # fmt: skip
         return results | _answer(answer, gravity) | _status("; ".join(open_))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
@@ -94,6 +102,7 @@ def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
         "clearance_excess": answer.clearance_excess(),
         "duality_gap": answer.duality_gap(),
         "relative_gap": answer.relative_gap(),
+        "screw": vars(answer.screw_bound),
     }
     return {
         **_screws_and_wrenches(answer),
@@ -229,59 +238,82 @@ def _linearisation_text(found: dict[str, Any]) -> str:
 
 def pose_error_of(
     posture: Posture,
-    readings: Sequence[str],
+    readings: Sequence[str] | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
     direction: ArrayLike | None = None,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
     """Everything ``assembly error`` reports, as plain values.
 
     Args:
         posture: where the robot stands.
-        readings: of problem (27).
+        readings: of problem (27); without any, all that are defined: ``budget`` is not
+            under a load.
         point: (3,) [m] whose translation is asked for, platform axes.
         direction: (6,) along which the largest error is asked for too.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
         options: of :func:`assembly.pose_error.bound_pose_error`.
 
     Returns:
         The keys of the public format; ``status`` as in :func:`solution_of`.
+
+    Raises:
+        BadInput: reading ``budget`` is asked under a load.
     """
+    loaded = bool(np.any(load) or np.any(gravity))
+    if loaded and "budget" in (readings or ()):
+        raise BadInput(
+            "reading budget: found a load; expected frozen or free (the budget is a "
+            "factor on the energy of closing alone)"
+        )
+    readings = readings or (READINGS[:2] if loaded else READINGS)
     results: dict[str, Any] = {
         "robot": posture.robot.name,
         "status": "ok",
         "pose": posture.pose(),
+        "load": np.zeros(6) if load is None else np.asarray(load, dtype=float),
+        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
         "error": None,
         "point": np.asarray(point, dtype=float),
     }
-    offset = posture.platform[:3, :3] @ results["point"]
-    try:
-        answer = solve_assembly(posture)
-        found = [
-            bound_pose_error(answer, name, offset=offset, **options)
-            for name in readings
-        ]
-        along = {
-            name: _support(answer, name, offset, direction, **options)
-            for name in readings if direction is not None
-        }  # fmt: skip
-    except (CannotAssemble, SolverFailed) as error:
-        return results | {"status": failure_status(error), "reason": str(error)}
-    table = {
-        one.reading: {
-            "rotation": _bracket(one.rotation_error, one.rotation_screw),
-            "translation": _bracket(one.translation_error, one.translation_screw),
-            "cuts": one.cuts,
-        }
-        | ({"along": along[one.reading]} if along else {})
-        for one in found
-    }
     if direction is not None:
         results["direction"] = np.asarray(direction, dtype=float)
+    offset = posture.platform[:3, :3] @ results["point"]
+    try:
+        answer = solve_assembly(posture, load, gravity=gravity)
+        table: dict[str, Any] = {}
+        open_ = []
+        for name in readings:
+            try:
+                one = bound_pose_error(answer, name, offset=offset, **options)
+            except FreeMotion as error:  # without their own springs, joints give way
+                nothing = dict.fromkeys(("rotation", "translation"))
+                table[name] = nothing | {"reason": str(error)}
+                continue
+            table[name] = _bounds(one)
+            open_ += [f"{name}: {one.unproved}"] if one.unproved else []
+            if direction is not None:
+                along = _support(answer, name, offset, direction, **options)
+                table[name]["along"] = along
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {"relative_gap": answer.relative_gap()}
-    open_ = "; ".join(f"{one.reading}: {one.unproved}" for one in found if one.unproved)
-    return results | _status(open_) | {
-        "energy": answer.energy, "error": table, "certificate": certificate
+    return results | _status("; ".join(open_)) | {
+        "energy": answer.energy, "platform_screw": answer.platform_screw,
+        "error": table, "certificate": certificate,
     }  # fmt: skip
+
+
+def _bounds(one: PoseError) -> dict[str, Any]:
+    """Both brackets of a reading."""
+    return {
+        "rotation": _bracket(one.rotation_error, one.rotation_screw),
+        "translation": _bracket(one.translation_error, one.translation_screw),
+        "cuts": one.cuts,
+    }
 
 
 def _support(
@@ -290,9 +322,9 @@ def _support(
 ) -> dict[str, Any]:  # fmt: skip
     """Largest error along a direction: certified, attained, and the screw there."""
     reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
-    if reach.unbounded:
-        return _bracket((np.inf, np.inf), reach.centre)
     found = reach.support(direction)
+    if found.height == np.inf:
+        return _bracket((np.inf, np.inf), reach.centre)
     attained = float(np.asarray(direction) @ found.screw)
     return _bracket((attained, found.height), found.screw)
 
@@ -302,26 +334,28 @@ def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
-def _bracket_text(found: dict[str, Any]) -> str:
-    """Both bounds in mrad or mm."""
-    return bracket((found["lower"], found["upper"]))
-
-
 def pose_error_text(results: dict[str, Any]) -> str:
     """Bounds for people: a line for each reading."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
         lines.append(f"{results['status']}: {results['reason']}")
     for reading, found in (results["error"] or {}).items():
-        rotation, translation = found["rotation"], found["translation"]
+        if "reason" in found:
+            lines.append(f"{reading:7s} no answer: {found['reason']}")
+            continue
         lines.append(
-            f"{reading:7s} rotation {_bracket_text(rotation)} mrad, "
-            f"translation {_bracket_text(translation)} mm"
+            f"{reading:7s} rotation {_bounds_text(found['rotation'], 'mrad')}, "
+            f"translation {_bounds_text(found['translation'], 'mm')}"
         )
         if "along" in found:
             unit = "mm" if np.any(results["direction"][3:]) else "mrad"
-            lines.append(f"        along it {_bracket_text(found['along'])} {unit}")
+            lines.append(f"        along it {_bounds_text(found['along'], unit)}")
     return "\n".join(lines)
+
+
+def _bounds_text(found: dict[str, Any], unit: str) -> str:
+    """Two bounds, in thousandths of rad or m."""
+    return bracket((found["lower"], found["upper"]), unit)
 
 
 def solution_text(results: dict[str, Any]) -> str:
@@ -334,6 +368,7 @@ def solution_text(results: dict[str, Any]) -> str:
         Text without colours.
     """
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    lines += remark_lines(results["remarks"])
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
@@ -349,8 +384,28 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
+        _screw_bound_text(certificate["screw"]),
+        *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
+
+
+def remark_lines(remarks: Sequence[str]) -> list[str]:
+    """What a robot's file leaves to a default, a line each."""
+    return [f"note: {remark}" for remark in remarks]
+
+
+def _screw_bound_text(bound: dict[str, float]) -> str:
+    """How far any platform screw of least energy may be from the one told."""
+    wrong = 1e3 * bound["rotation_error"], 1e6 * bound["translation_error"]
+    loose = 1e3 * bound["rotation_open"], 1e6 * bound["translation_open"]
+    text = f"platform error proved to {wrong[0]:.1e} mrad, {wrong[1]:.1e} um"
+    if max(loose) > 1e-9:
+        text += (
+            "; at the same energy play leaves open up to "
+            f"{loose[0]:.3g} mrad, {loose[1]:.3g} um"
+        )
+    return text
 
 
 def _factor(value: float | None) -> str:

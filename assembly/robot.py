@@ -21,6 +21,10 @@ from stiffness.screws import rotation_matrix, transform
 
 JOINTS = ("fixed", "revolute", "prismatic")
 BASE = "base"
+LOCKED = (
+    "found inf along the own motion of a passive joint, which would lock it; expected "
+    '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
+)
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,8 @@ class Frame:
         position: [rad or m] joint coordinate in the home pose.
         geometric_error: (6,) [rad, m] delta l.
         clearance: the joint's play, None if it has none.
-        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None.
+        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
+            0 along a passive joint's own motion (its row and column) leaves it free.
         link: elasticity of the body, None if rigid.
         mass: [kg] of the body beside its link's own.
         centre_of_mass: (3,) [m] of that mass, in the frame's axes.
@@ -166,6 +171,9 @@ class Frame:
             if value is not None:
                 value = _locked(value, shape, f"frame '{self.name}': {name}")
                 object.__setattr__(self, name, value)
+        own = self.own_stiffness
+        if self.passive and own is not None and np.isinf(own):
+            raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
 
     @property
     def passive(self) -> bool:
@@ -175,12 +183,28 @@ class Frame:
     @property
     def compliant(self) -> bool:
         """Whether the joint is passive and its motion is a spring's."""
-        return self.passive and self.joint_stiffness is not None
+        return self.passive and bool(self.own_stiffness)
 
     @property
     def own_axis(self) -> int:
         """Row of the screw along which the joint moves: RZ, or TZ if prismatic."""
         return 5 if self.joint == "prismatic" else 2
+
+    @property
+    def own_stiffness(self) -> float | None:
+        """[N m/rad or N/m] of K_B along the joint's motion, None without K_B."""
+        K = self.joint_stiffness
+        return None if K is None else float(K[self.own_axis, self.own_axis])
+
+    @property
+    def springs(self) -> NDArray | None:
+        """(6, 6) K_B of what deforms: ``inf`` also along a motion that is free."""
+        K = self.joint_stiffness
+        if K is None or self.compliant or not self.passive:
+            return K
+        K = K.copy()
+        K[self.own_axis, self.own_axis] = np.inf
+        return K
 
 
 _SHAPES = {
@@ -206,6 +230,7 @@ class Robot:
         description: one line.
         effects: parameters of the effects that the machine is known to have, by name;
             see :mod:`assembly.effects`.
+        remarks: what its file leaves to a default that is easily overlooked.
     """
 
     name: str
@@ -214,6 +239,7 @@ class Robot:
     closures: tuple[tuple[str, str], ...] = ()
     description: str = ""
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 

@@ -100,12 +100,25 @@ def declared_robot(root: Table, name: str) -> Robot:
     closures = tuple(_closure(table, names) for table in tables[1])
     _check_known(root, "platform", platform, names)
     try:
-        robot = Robot(name, platform, frames, closures, description)
+        remarks = _remarks(tables[0])
+        robot = Robot(name, platform, frames, closures, description, remarks=remarks)
         robot = replace(robot, effects=read_effects(effects, robot))
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
     return robot
+
+
+def _remarks(tables: list[Table]) -> tuple[str, ...]:
+    """That the frames named have ``dh`` without ``alpha``, which turns their axis."""
+    # the other three are zero as often as not; a forgotten alpha is another machine
+    dh = {table.content["name"]: table.content.get("dh") for table in tables}
+    flat = [
+        quoted(name) for name, given in dh.items() if given and "alpha" not in given
+    ]
+    if not flat:
+        return ()
+    return (f"dh without alpha, taken as 0: {', '.join(flat)}",)
 
 
 def _frame(table: Table) -> Frame:
@@ -119,6 +132,8 @@ def _frame(table: Table) -> Frame:
         message = 'found one on a fixed joint; expected joint = "revolute" | '
         raise table.bad(key, message + '"prismatic", or no such key')
     translation, rotation = _placement(table)
+    passive = joint != "fixed" and not actuated
+    own = (5 if joint == "prismatic" else 2) if passive else None
     frame = Frame(
         name=name,
         parent=table.text("parent", expected='the name of a frame, or "base"'),
@@ -129,7 +144,7 @@ def _frame(table: Table) -> Frame:
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         clearance=read_clearance(table),
-        joint_stiffness=read_joint_stiffness(table),
+        joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
         mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
         centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),

@@ -36,8 +36,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
 from assembly.energy import solve_assembly
-from assembly.pose_error import Reach, bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture, place_many
+from assembly.reach import Reach, reachable_screws
 from assembly.robot import Robot
 from assembly.solvers import conic
 from assembly.solvers.batch import minimise_energies, zone_margins

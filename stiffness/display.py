@@ -111,9 +111,10 @@ def largest(screws: ArrayLike) -> str:
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
 
 
-def bracket(bounds: tuple[float, float]) -> str:
-    """Two bounds [rad or m] in thousandths."""
-    return f"{1e3 * bounds[0]:.6g} to {1e3 * bounds[1]:.6g}"
+def bracket(bounds: tuple[float, float], unit: str) -> str:
+    """Two bounds [rad or m] in thousandths; the unit is mrad or mm."""
+    low, high = 1e3 * bounds[0], 1e3 * bounds[1]
+    return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:

@@ -13,6 +13,7 @@ from assembly.robots import BUILT_IN, load_robot
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.batch_error import bound_pose_errors
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
+from tests.test_pose_error import hinged_frame
 
 PARTS = ("rotation_error", "translation_error")
 
@@ -108,11 +109,27 @@ def test_random_robots(seed):
         batch = bound_pose_errors(
             robot, posture.transforms[None], reading, mismatch=posture.mismatch
         )
-        if np.isinf(one.rotation_error[0]):
+        if np.isinf([one.rotation_error[0], one.translation_error[0]]).any():
             assert batch.slower[0]
-            assert np.isinf(batch.rotation_error[0]).all()
+            assert tuple(batch.rotation_error[0]) == one.rotation_error
+            assert tuple(batch.translation_error[0]) == one.translation_error
         else:
             assert_overlap(batch, 0, one)
+
+
+@pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
+@pytest.mark.parametrize("reading", ["frozen", "free"])
+def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
+    """The compiled road answers where no play comes near them, the other elsewhere."""
+    posture = home_posture(hinged_frame(spin))
+    one = bound_pose_error(solve_assembly(posture), reading)
+    batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
+    assert_overlap(batch, 0, one)
+    assert batch.slower[0] == (0.0 < spin < 1e-3)
+    loose = home_posture(hinged_frame(None))
+    most = bound_pose_errors(loose.robot, loose.transforms[None], reading)
+    less = batch.rotation_error[0, 1] < 0.99 * most.rotation_error[0, 0]
+    assert less == (spin < 1e-3)
 
 
 def test_the_budget_goes_one_at_a_time():

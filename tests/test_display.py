@@ -9,8 +9,9 @@ import pytest
 
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import place_robot
+from assembly.reach import reachable_screws
 from assembly.results import solution_of, solution_text
 from assembly.singularity import find_singularities
 from assembly.zone import zone_margin

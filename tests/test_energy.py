@@ -8,12 +8,18 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from assembly.energy import CannotAssemble, solve_assembly
-from assembly.posture import home_posture, place_many, place_robot
+from assembly.flexibility import flexibility
+from assembly.load import row_forces
+from assembly.posture import Posture, home_posture, place_many, place_robot
 from assembly.reference import reference_energy
-from assembly.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.resting_play import without_play
+from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.conic import minimise_energy
+from assembly.solvers.one_posture import prepare_energies
 from assembly.solvers.reduction import FreeMotion
+from assembly.zone import zone_margin
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -279,6 +285,214 @@ def test_play_bound_of_a_passive_joint_holds_where_it_matters():
     unbounded = replace(robot, frames=(frames[0], replace(frames[1], clearance=None),
                                        *frames[2:]))  # fmt: skip
     assert solve_assembly(home_posture(unbounded)).energy == pytest.approx(0, abs=1e-20)
+
+
+def as_bearings(robot):
+    """The robot with compliant joints free along their own motion; the same with each
+    of them as two frames: the springs, rigid along it, then a bare free joint.
+    """
+    bearings, split, after = [], [], {}
+    for f in robot.frames:
+        parent = after.get(f.parent, f.parent)
+        if not f.compliant:
+            bearings.append(f)
+            split.append(replace(f, parent=parent))
+            continue
+        K, rigid = f.joint_stiffness.copy(), f.joint_stiffness.copy()
+        K[f.own_axis, f.own_axis], rigid[f.own_axis, f.own_axis] = 0.0, np.inf
+        bearings.append(replace(f, joint_stiffness=K))
+        spring = replace(f, parent=parent, joint="fixed", joint_stiffness=rigid)
+        axis = replace(Frame(f"{f.name}.axis", f.name), joint=f.joint)
+        if f.clearance is not None:
+            key = "axial" if f.joint == "prismatic" else "spin"
+            bound = getattr(f.clearance, key)
+            spring = replace(spring, clearance=replace(f.clearance, **{key: None}))
+            axis = replace(axis, clearance=Clearance(**{key: bound}))
+        split += [spring, axis]
+        after[f.name] = axis.name
+    return replace(robot, frames=tuple(bearings)), replace(robot, frames=tuple(split))
+
+
+def test_a_bearing_is_its_springs_and_then_a_free_joint():
+    """In every solver; energies to 1e-8 of those without play, 1e-12 where linear."""
+    compared = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        one, two = as_bearings(random_robot(rng, 2, 3))
+        if len(one.frames) == len(two.frames):
+            continue
+        first, second = home_posture(one), home_posture(two)
+        load = rng.normal(size=6) if seed % 2 else None
+        try:
+            answer = solve_assembly(first, load)
+        except (CannotAssemble, FreeMotion) as error:
+            with pytest.raises(type(error)):
+                solve_assembly(second, load)
+            continue
+        other = solve_assembly(second, load)
+        scale = 1e-8 * answer.energy_without_play + 1e-20
+        assert answer.potential == pytest.approx(other.potential, rel=1e-8, abs=scale)
+        assert not answer.unproved
+        zones = [zone_margin(p, "free").margin for p in (first, second)]
+        if zones[0] is not None:
+            assert zones[0] == pytest.approx(zones[1], rel=1e-7)
+        batch = minimise_energies(one, first.transforms[None])
+        assert batch.energy[0] == pytest.approx(
+            solve_assembly(second).energy, rel=1e-7, abs=scale
+        )
+        tight = without_play(one), without_play(two)
+        rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
+                for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
+        found = [
+            flexibility(p).solve(
+                np.zeros(1, int), p.robot.errors.reshape(1, -1), row_forces(
+                    p, np.zeros((1, 6)), np.zeros((1, 3))
+                ),
+            )
+            for p in rows
+        ]  # fmt: skip
+        if all(f.solved[0] for f in found):
+            np.testing.assert_allclose(
+                found[0].platform_screw, found[1].platform_screw, rtol=1e-7, atol=1e-12
+            )
+        compared += 1
+    assert compared > 10
+
+
+def arm_against_wall(young, soft=50.0):
+    """A bar of modulus ``young`` between a soft hinge and a wall that is off by 0.1 mm
+    along it and 0.2 mm across; asked for is how far the hinge turns.
+    """
+    K = np.diag([np.inf, np.inf, soft, np.inf, np.inf, np.inf])
+    bar = BeamLink({"radius": 0.01}, young, 0.3, theory="euler")
+    frames = (
+        Frame("hinge", joint="revolute", joint_stiffness=K),
+        Frame("side", "hinge"),
+        Frame("tip", "hinge", [0.5, 0, 0], link=bar, joint="revolute"),
+        Frame("end", "tip"),
+        Frame("wall", translation=[0.5, 0, 0],
+              geometric_error=[0, 0, 0, -1e-4, 2e-4, 0]),
+    )  # fmt: skip
+    return home_posture(Robot("arm", "side", frames, (("end", "wall"),)))
+
+
+@pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
+def test_a_hinges_turn_is_within_its_bound_or_refused_by_name(young):
+    """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
+    F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
+    """
+    if young >= 1e30:
+        with pytest.raises(CannotAssemble, match="stiffnesses differ 3e"):
+            solve_assembly(arm_against_wall(young))
+        return
+    answer = solve_assembly(arm_against_wall(young))
+    give = 0.5**2 / 50.0 + 0.5**3 / (3 * young * np.pi * 0.01**4 / 4)
+    turn = 2e-4 / give * 0.5 / 50.0
+    off, bound = abs(answer.platform_screw[2] - turn), answer.screw_bound
+    assert off <= bound.rotation + 1e-15
+    assert bound.rotation_open == 0.0
+    assert answer.unproved == ""
+    assert bound.rotation_error < 1e-8
+
+
+@pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
+@pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide"])
+def test_a_screw_that_rounding_spoils_is_never_certified(name, young):
+    """Against Young = 1e16: from there on the screws no longer change, to 1e-5 of them.
+
+    Beams of all links equally stiff, so that the answer is a limit of its own.
+    """
+
+    def stiff(young):
+        rng = np.random.default_rng(1)
+        robot = load_robot(name)
+        errors = 1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6))
+        frames = (
+            replace(f, link=replace(f.link, young=young) if f.link else None)
+            for f in robot.with_errors(errors).frames
+        )
+        return solve_assembly(home_posture(replace(robot, frames=tuple(frames))))
+
+    answer, limit = stiff(young), stiff(1e16)
+    bound, off = answer.screw_bound, answer.platform_screw - limit.platform_screw
+    other = limit.screw_bound
+    if young >= 1e16:
+        assert np.linalg.norm(off[:3]) <= bound.rotation + other.rotation
+        assert np.linalg.norm(off[3:]) <= bound.translation + other.translation
+    if young != 1e18:  # in between its bound is what is told
+        assert bool(answer.unproved) == (young >= 1e24)
+        posture = answer.posture
+        batch = minimise_energies(posture.robot, posture.transforms[None])
+        assert (batch.status[0] == "ok") == (answer.unproved == "")
+
+
+def test_screws_of_least_energy_from_another_solver_are_within_the_bound():
+    """cvxpy's answers, of 1e-8 J at best, are themselves off by the root of that: told
+    apart by what their own energies are above the bound.
+    """
+    compared = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        posture = home_posture(random_robot(rng, 2, 3))
+        try:
+            answer = solve_assembly(posture)
+        except CannotAssemble:
+            continue
+        energy, screw = reference_energy(posture)
+        # any assembly this much above the least, not only the least: the same bound
+        worse = replace(answer, multipliers=answer.multipliers)
+        worse.__dict__["uncertainty"] = answer.uncertainty + max(
+            energy - answer.bound, 1e-9 * answer.energy_without_play
+        )
+        bound = worse.screw_bound
+        off = screw - answer.platform_screw
+        assert np.linalg.norm(off[:3]) <= bound.rotation + 1e-9
+        assert np.linalg.norm(off[3:]) <= bound.translation + 1e-9
+        compared += answer.energy > 0
+    assert compared > 10
+
+
+def test_rounding_of_zero_is_zero():
+    """Errors of a loop that add up to nothing, but not in floating point: 0.1 + 0.2."""
+    parts = [1e-4, 2e-4, -3e-4]
+    frames = [Frame("f0", translation=[0.1, 0, 0], link=MatrixLink(1e6 * np.eye(6)))]
+    for i, error in enumerate(parts):
+        frames.append(Frame(f"f{i + 1}", f"f{i}", [0.1, 0, 0],
+                            geometric_error=[0, 0, 0, error, 0, 0]))  # fmt: skip
+    frames.append(Frame("wall", translation=[0.4, 0, 0]))
+    robot = Robot("loop", "f3", tuple(frames), (("f3", "wall"),))
+    posture = home_posture(robot)
+    assert sum(parts) != 0.0
+    answer = solve_assembly(posture)
+    assert answer.energy == 0.0
+    assert not answer.wrenches.any()
+    assert minimise_energies(robot, posture.transforms[None]).energy[0] == 0.0
+    drawn = prepare_energies(posture).solve(robot.errors[None])
+    assert drawn.energy[0] == 0.0
+    # what is small and not rounding stays: k g^2 / 2 of one spring, by hand
+    for gap in (1e-6, 1e-12, 1e-17):
+        frames[1] = replace(frames[1], geometric_error=[0, 0, 0, gap, 0, 0])
+        small = replace(robot, frames=(*frames[:2], Frame("f3", "f1", [0.2, 0, 0]),
+                                       frames[-1]))  # fmt: skip
+        here = home_posture(small)
+        for energy in (
+            solve_assembly(here).energy,
+            minimise_energies(small, here.transforms[None]).energy[0],
+            prepare_energies(here).solve(small.errors[None]).energy[0],
+        ):
+            assert energy == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
+
+
+def test_play_that_just_suffices_stores_nothing():
+    """A gap of the size of the play, to the last digit: inside, at, and beyond it."""
+    direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
+    for gap, energy in ((1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0),
+                        (1.0001e-4, 0.5e6 * 1e-8**2 / 2)):  # fmt: skip
+        robot = coaxial_beams(gap * direction, clearance=Clearance(radial=1e-4))
+        posture = home_posture(robot)
+        batch = minimise_energies(robot, posture.transforms[None])
+        for found in (solve_assembly(posture).energy, batch.energy[0]):
+            assert found == (pytest.approx(energy, rel=1e-3) if energy else 0.0)
 
 
 def test_frames_in_another_order_give_the_same_answer():

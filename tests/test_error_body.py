@@ -6,8 +6,9 @@ import pytest
 from assembly.energy import solve_assembly
 from assembly.error_body import error_body, even_directions
 from assembly.plot import draw_assembly
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture, place_robot
+from assembly.reach import reachable_screws
 from assembly.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
 

@@ -1,15 +1,19 @@
 """``assembly error`` at a point and along a direction; ``exact`` under gravity."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from assembly.energy import solve_assembly
 from assembly.exact import solve_exact
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture, place_robot
+from assembly.reach import reachable_screws
 from assembly.robots import load_robot
+from assembly.solvers.batch import minimise_energies
+from stiffness.reading import BadInput
 
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
@@ -69,3 +73,143 @@ def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
     assert linear["linearisation_error"]["translation"] == pytest.approx(
         off[3:].tolist(), abs=1e-15
     )
+
+
+def test_the_error_under_a_load_is_the_sag_and_what_play_adds(run, tmp_path):
+    """A pin with play on an elastic post, pushed down: the axial play is pressed, so
+    only the radial one is left; the post gives F / k. By hand.
+    """
+    (tmp_path / "post.toml").write_text("""
+platform = "tip"
+[[frame]]
+name = "post"
+parent = "base"
+joint_stiffness = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6]
+clearance = { radial = 3e-5, axial = 2e-5 }
+mass = 2.0
+[[frame]]
+name = "tip"
+parent = "post"
+mass = 3.0
+""")
+    words = ["assembly", "error", tmp_path / "post.toml", "--load", "fz=-20"]
+    _, out, _ = run(*words, "--json", "-")
+    found = json.loads(out)
+    assert list(found["error"]) == ["frozen", "free"]
+    assert found["load"] == [0, 0, 0, 0, 0, -20]
+    sag = 2e-5 + 20 / 1e6
+    bounds = found["error"]["frozen"]["translation"]
+    far = np.hypot(3e-5, sag)
+    assert bounds["lower"] <= far * (1 + 1e-9)
+    assert bounds["upper"] >= far * (1 - 1e-9)
+    assert bounds["upper"] - bounds["lower"] <= 1e-6
+    _, out, _ = run(*words, "--gravity", "z=-10", "--json", "-")
+    # the post's own mass hangs before its joint
+    sag = 2e-5 + (20 + 3.0 * 10) / 1e6
+    screw = json.loads(out)["platform_screw"]
+    assert screw[5] == pytest.approx(-sag, rel=1e-9)
+    status, out, err = run(*words, "--reading", "budget")
+    assert (status, out) == (2, "")
+    assert "reading budget: found a load; expected frozen or free" in err
+
+
+HINGE = """
+platform = "tip"
+[[frame]]
+name = "hinge"
+parent = "base"
+joint = "revolute"
+joint_stiffness = [1e6, 1e6, 100, 1e6, 1e6, 1e6]
+clearance = { radial = 3e-5, axial = 2e-5 }
+[[frame]]
+name = "tip"
+parent = "hinge"
+"""
+
+
+def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
+    """A moment that the hinge's own spring carries; by hand M / k, and the play."""
+    file = tmp_path / "hinge.toml"
+    file.write_text(HINGE)
+    status, out, _ = run("assembly", "error", file, "--load", "mz=0.1")
+    assert status == 0
+    frozen, free = out.splitlines()[1:]
+    assert frozen.split() == "frozen rotation 1 to 1 mrad, translation".split() + [
+        "0.0360555", "to", "0.0360555", "mm",
+    ]  # fmt: skip
+    assert free.startswith("free    no answer: the load drives a motion")
+    _, out, _ = run("assembly", "error", file, "--load", "mz=0.1", "--json", "-")
+    assert json.loads(out)["error"]["free"]["rotation"] is None
+    _, out, _ = run("assembly", "error", file, "--reading", "free")
+    assert "rotation without bound, translation 0.0360555 to" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["solve", "--load", "fx=1e300"],
+         "--load fx: found 1e+300, expected a number of size at most 1e+40"),
+        (["exact", "--load", "mz=-1e300"], "--load mz: found -1e+300"),
+        (["error", "--load", "fx=1e300"], "--load fx: found 1e+300"),
+        (["solve", "--gravity", "z=1e300"],
+         "--gravity z: found 1e+300, expected a number of size at most 1e+06"),
+        (["solve", "--pose", "tx=1e300"], "--pose tx: found 1e+300"),
+        (["zone", "--pose", "rz=1e160"], "--pose rz: found 1e+160"),
+        (["solve", "--joint", "left.drive=1e300"], "--joint left.drive: found 1e+300"),
+        (["solve", "--under", "temperature=1e300"], "--under temperature: found"),
+        (["error", "--point", "x=1e300"], "--point x: found 1e+300"),
+        (["error", "--direction", "tx=1e300"], "--direction tx: found 1e+300"),
+        (["error", "--energy-budget", "1e300"], "--energy-budget: found 1e+300"),
+    ],
+)  # fmt: skip
+def test_what_no_double_carries_is_refused_by_name(run, words, message):
+    status, out, err = run("assembly", words[0], "five_bar", *words[1:])
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_the_same_from_python():
+    posture = home_posture(load_robot("five_bar"))
+    with pytest.raises(BadInput, match=r"load: found 1e\+300, expected finite numbers"):
+        solve_assembly(posture, [0, 0, 0, 1e300, 0, 0])
+    with pytest.raises(BadInput, match="gravity: found nan"):
+        solve_assembly(posture, gravity=[0, 0, np.nan])
+    errors = np.zeros((len(posture.robot.frames), 6))
+    errors[2, 3] = 1e300
+    robot = posture.robot.with_errors(errors)
+    with pytest.raises(BadInput, match=r"geometric_error: found 1e\+300"):
+        solve_assembly(replace(posture, robot=robot))
+    with pytest.raises(ValueError, match="an error is larger than"):
+        minimise_energies(robot, posture.transforms[None])
+    assert solve_assembly(posture, [0, 0, 0, 1e40, 0, 0]).energy > 1e60
+
+
+def test_solve_prints_the_wrenches_of_frames_and_closures(run):
+    status, out, _ = run("assembly", "solve", "five_bar", "--load", "fx=10,mz=1")
+    assert status == 0
+    lines = out.splitlines()
+    heads = [line for line in lines if "MX [N m]" in line]
+    assert len(heads) == 2
+    frames = lines[lines.index(heads[0]) + 1 :]
+    answer = solve_assembly(home_posture(load_robot("five_bar")), [0, 0, 1, 10, 0, 0])
+    robot = answer.posture.robot
+    for frame, line in zip(robot.frames, frames, strict=False):
+        assert line.split()[0] == frame.name
+        assert len(line) == len(heads[0])
+        shown = [float(word) for word in line.split()[1:]]
+        expected = answer.wrenches[robot.index(frame.name)]
+        np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-9)
+    closure = lines[lines.index(heads[1]) + 1]
+    assert closure.startswith("left.tip - right.tip ")
+    shown = [float(word) for word in closure.split()[3:]]
+    expected = answer.closure_wrenches[0]
+    np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-9)
+    assert "platform error proved to" in out
+
+
+def test_the_certificate_of_solve_covers_the_screw(run):
+    _, out, _ = run("assembly", "solve", "five_bar", "--load", "fx=10", "--json", "-")
+    screw = json.loads(out)["certificate"]["screw"]
+    assert 0 < screw["rotation_error"] < 1e-6
+    assert screw["rotation"] >= screw["rotation_open"] > 1e-5

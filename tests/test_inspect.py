@@ -274,3 +274,11 @@ def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
     assert out == ""
     assert "campaign.toml: cannot be read" in err
     assert "Traceback" not in err
+
+
+def test_a_dh_table_without_alpha_is_told(tmp_path):
+    flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
+    assert flat != ARM
+    campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))
+    found = [r for r in inspect_campaign(campaign).remarks if r.about == "robot"]
+    assert [r.text for r in found] == ['dh without alpha, taken as 0: "two"']

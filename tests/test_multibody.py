@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import validation.multibody.exudyn_solver
+from assembly.energy import solve_assembly
 from assembly.posture import home_posture, place_robot
 from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
@@ -217,14 +218,32 @@ def test_an_infinite_stiffness_locks_its_axis():
     np.testing.assert_allclose(answer.joint_screws[0], 1e-6 * np.eye(6)[2], atol=1e-14)
 
 
-def test_a_passive_joint_with_an_infinite_spring_does_not_move():
-    K = np.diag([np.inf] * 6)
+@pytest.mark.parametrize("play", [None, Clearance(radial=1e-5)])
+def test_a_bearing_turns_freely_and_yields_otherwise(play):
+    """A bar from a bearing to a wall that is askew by up to 3e-3 rad and 0.2 mm.
+
+    Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size.
+    """
+    K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
+    error = [0, 1e-4, 3e-3, 0, 0, 2e-4]
     frames = (
-        Frame("pin", joint="revolute", joint_stiffness=K),
-        Frame("tip", "pin", translation=[0.3, 0, 0]),
-    )
-    answer = simulate_assembly(home_posture(Robot("pin", "tip", frames)), load=6 * [1])
-    assert not answer.platform_screw.any()
+        Frame("hub", joint="revolute", joint_stiffness=K, clearance=play),
+        Frame("tip", "hub", translation=[0.3, 0, 0]),
+        Frame("wall", translation=[0.3, 0, 0], joint_stiffness=np.diag([1e9] * 6),
+              geometric_error=error),
+        Frame("end", "wall"),
+    )  # fmt: skip
+    posture = home_posture(Robot("hub", "tip", frames, (("tip", "end"),)))
+    answer = simulate_assembly(posture, clearances=play is not None)
+    linear = solve_assembly(posture)
+    assert linear.energy > 0.1
+    assert answer.energy == pytest.approx(linear.energy, rel=2e-3)
+    assert abs(answer.joint_wrenches[0][2]) < 1e-6 * abs(answer.joint_wrenches[0][1])
+    ours, theirs = linear.joint_screws[0], answer.joint_screws[0]
+    np.testing.assert_allclose(theirs[[1, 5]], ours[[1, 5]], rtol=5e-3)
+    turned = linear.clearance_screws[0][2]
+    assert turned > 2e-3
+    assert answer.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
 
 
 def test_a_serial_chain_composes_its_errors_exactly():

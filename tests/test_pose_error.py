@@ -1,6 +1,7 @@
 """Bounds of (27): closed forms, the reference's brackets, and a second road."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,14 +9,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import HalfspaceIntersection
 
+from assembly.clearance import CONES, clearance_bounds
+from assembly.closure import linearise
 from assembly.energy import solve_assembly
-from assembly.pose_error import bound_pose_error, reachable_screws
+from assembly.pose_error import bound_pose_error
 from assembly.posture import home_posture, place_robot
+from assembly.reach import reachable_screws
 from assembly.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
 from assembly.solvers.majorant import eigenvectors, largest_on_sphere
 from assembly.solvers.polytope import cut, empty_polytope, farthest_corner, start_box
-from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    planar_four_bar,
+    small_clearance,
+)
 
 CASES = [
     pytest.param(case, point, id=f"{case['name']}-{point['x']}-{point['z']}")
@@ -88,6 +98,95 @@ def test_a_platform_that_moves_freely_has_no_bound():
     found = bounds(limited)
     assert_holds(found.rotation_error, 0.01, 1e-9)
     assert_holds(found.translation_error, 0.005, 1e-9)
+
+
+@pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
+def test_a_passive_joint_with_a_bound_turns_up_to_it(spin):
+    """An arm L on it: y: radial + L spin, z: axial + L tilt, both at once, by hand."""
+    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
+    hub = Frame("hub", joint="revolute", clearance=play)
+    found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
+    far = np.hypot(1e-5 + 0.2 * spin, 2e-5 + 0.2 * 3e-4)
+    assert_holds(found.translation_error, far, 1e-7 * spin + 1e-9)
+    assert_holds(found.rotation_error, np.hypot(spin, 3e-4), 1e-7 * spin + 1e-9)
+
+
+def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
+    """On the axis, h above the bearing: radial + h tilt, and axial; by hand.
+
+    Off the axis the point runs round without bound.
+    """
+    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
+    hub = Frame("hub", joint="revolute", clearance=play)
+    robot = Robot("spindle", "tool", (hub, Frame("tool", "hub", [0, 0, 0.4])))
+    found = bounds(robot)
+    assert found.rotation_error == (np.inf, np.inf)
+    assert_holds(found.translation_error, np.hypot(1e-5 + 0.4 * 3e-4, 2e-5), 1e-9)
+    found = bounds(robot, offset=[0, 1e-3, 0])
+    assert found.translation_error == (np.inf, np.inf)
+    slide = replace(hub, joint="prismatic", clearance=Clearance(tilt=3e-4))
+    found = bounds(replace(robot, frames=(slide, robot.frames[1])))
+    assert_holds(found.rotation_error, 3e-4, 1e-9)
+    assert found.translation_error == (np.inf, np.inf)
+
+
+def hinged_frame(spin):
+    """A four-bar with play in its pins, two of them bounded to +-spin."""
+    play = small_clearance(spin=spin)
+    robot = planar_four_bar()
+    limited = {"pin_a": play, "rocker": play, "pin_b": small_clearance()}
+    return replace(robot, frames=tuple(
+        replace(f, clearance=limited.get(f.name)) for f in robot.frames
+    ))  # fmt: skip
+
+
+def feasible(posture, cp):
+    """Screws of play within every bound that close the perfect robot, for cvxpy."""
+    robot, lin = posture.robot, linearise(posture)
+    c = cp.Variable((len(robot.frames), 6))
+    moved = 1e-4 * cp.reshape(c, (6 * len(robot.frames),), order="C")
+    within = [lin.rows @ moved * 1e4 == 0]
+    for j, row in enumerate(clearance_bounds(robot)):
+        for k, rows in enumerate(CONES):
+            if np.isfinite(row[k]):
+                part = cp.hstack([c[j, r] for r in rows])
+                within.append(cp.norm(part) <= row[k] * 1e4)
+    return lin.platform @ moved, within
+
+
+@pytest.mark.parametrize("spin", [1.0, 3e-4, 1e-4, 1e-5, 1e-8])
+def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng):
+    """Put back into the closures by cvxpy, which also finds the supports; its 1e-6."""
+    import cvxpy as cp
+
+    from assembly.reference import OPTIMAL, _solve
+
+    posture = home_posture(hinged_frame(spin))
+    answer = solve_assembly(posture)
+    found = bound_pose_error(answer, tolerance_translation=1e-9)
+    x, within = feasible(posture, cp)
+    for screw in (found.rotation_screw, found.translation_screw):
+        off = cp.Problem(cp.Minimize(cp.sum_squares(1e4 * (x - screw))), within)
+        _solve(off, OPTIMAL)
+        assert off.value < 1e-10
+    reach = reachable_screws(answer, "frozen")
+    for direction in rng.normal(size=(4, 6)) * [0.1, 0.1, 0.1, 1, 1, 1]:
+        most = cp.Problem(cp.Maximize(1e4 * direction @ x), within)
+        _solve(most, OPTIMAL)
+        height = reach.support(direction).height
+        assert height == pytest.approx(most.value / 1e4, rel=1e-6, abs=1e-11)
+
+
+def test_the_largest_error_grows_with_the_bound_and_begins_where_it_is_zero():
+    spins = [0.0, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1.0]
+    found = [bounds(hinged_frame(spin)) for spin in spins]
+    for part in ("rotation_error", "translation_error"):
+        low, high = np.array([getattr(one, part) for one in found]).T
+        assert np.all(low[:-1] <= high[1:])
+        assert high[1] - low[0] <= 3e-9
+        assert low[-1] > 1.1 * high[0]
+        # a bound that no play comes near changes nothing
+        assert low[-1] == pytest.approx(low[-2], rel=1e-5)
 
 
 def test_planar_loop_by_vertex_enumeration():

@@ -1,7 +1,9 @@
 """Robot files: what must load does, what must not says why, and both ways round."""
 
+import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from assembly.energy import solve_assembly
+from assembly.mobility import mobility
 from assembly.posture import home_posture
 from assembly.robot import (
     BeamLink,
@@ -20,6 +24,7 @@ from assembly.robot import (
     Robot,
 )
 from assembly.robot_file import read_robot, write_robot
+from assembly.solvers.reduction import FreeMotion
 from stiffness.reading import BadInput
 
 FOUR_BAR = """
@@ -254,23 +259,35 @@ REFUSED = {
     "five stiffnesses": (
         SPRING, "joint_stiffness = [1, 2, 3, 4, 5]",
         'frame "rocker".joint_stiffness: found [1, 2, 3, 4, 5] of length 5, expected 6 '
-        "diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"),
+        "diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 "
+        "[N m/rad .. N/m]"),
     "a stiffness of zero": (
-        SPRING, "joint_stiffness = [1, 2, 0, 4, 5, 6]",
+        SPRING, "joint_stiffness = [1, 0, 3, 4, 5, 6]",
         'frame "rocker".joint_stiffness: found 0 in it, expected 6 diagonal terms > 0 '
-        "or inf, or 6 rows of 6 [N m/rad .. N/m]"),
+        "or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
+    "a locked bearing": (
+        SPRING, "joint_stiffness = [inf, inf, inf, 2e8, 2e8, 2e8]",
+        'frame "rocker".joint_stiffness: found inf along the own motion of a passive '
+        "joint, which would lock it; expected 0 (free, as a bearing), a number > 0 (a "
+        'spring), or joint = "fixed"'),
+    "a free row that is not empty": (
+        SPRING, f"joint_stiffness = {rows({(3, 3): 0, (3, 4): 1, (4, 3): 1})}",
+        'frame "rocker".joint_stiffness: not positive definite: found 0 as term '
+        "[3, 3] of the diagonal, expected > 0"),
     "a stiffness of minus infinity": (
         SPRING, "joint_stiffness = [1, 2, -inf, 4, 5, 6]",
         'frame "rocker".joint_stiffness: found -inf in it, expected 6 diagonal terms > '
-        "0 or inf, or 6 rows of 6 [N m/rad .. N/m]"),
+        "0 or inf (number 3 may be 0: free), or 6 rows of 6 [N m/rad .. N/m]"),
     "nan in a joint's stiffness": (
         SPRING, f"joint_stiffness = {rows({(2, 3): math.nan})}",
         'frame "rocker".joint_stiffness: found nan as number 3 in row 2, expected 6 '
-        "diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"),
+        "diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of 6 "
+        "[N m/rad .. N/m]"),
     "an integer no float holds in a joint's stiffness": (
         SPRING, f"joint_stiffness = [1, 2, 1{'0' * 400}, 4, 5, 6]",
         'frame "rocker".joint_stiffness: found an integer of 1329 bits as number 3, '
-        "expected 6 diagonal terms > 0 or inf, or 6 rows of 6 [N m/rad .. N/m]"),
+        "expected 6 diagonal terms > 0 or inf (number 3 may be 0: free), or 6 rows of "
+        "6 [N m/rad .. N/m]"),
     "inf off the diagonal": (
         SPRING, f"joint_stiffness = {rows({(1, 2): math.inf, (2, 1): math.inf})}",
         'frame "rocker".joint_stiffness: found inf at [1, 2]; expected inf only on the '
@@ -744,13 +761,18 @@ def robots(draw):
         joint = draw(st.sampled_from(["fixed", "revolute", "prismatic"]))
         joint = "fixed" if i == len(given) - 1 else joint
         bare = {"clearance": None, "joint_stiffness": None}
+        moves = joint != "fixed"
+        actuated = moves and draw(st.booleans())
         stiffness = st.none() | (diagonals | st.just([math.inf] * 6)).map(np.diag)
+        K = draw(stiffness)
+        own = 5 if joint == "prismatic" else 2
+        if moves and not actuated and K is not None and np.isinf(K[own, own]):
+            K[own, own] = 0.0  # free: a passive joint is not locked by its stiffness
         play = st.none() | st.floats(0, 1)
         kinds = bare if i == len(given) - 1 else {
             "clearance": draw(st.none() | st.builds(Clearance, play, play, play, play)),
-            "joint_stiffness": draw(stiffness),
+            "joint_stiffness": K,
         }  # fmt: skip
-        moves = joint != "fixed"
         x, y, z = draw(vectors)
         frames.append(
             Frame(
@@ -759,7 +781,7 @@ def robots(draw):
                 translation=np.array([x, y, z + 50.0]),  # never on the parent's origin
                 rotation=np.array(draw(vectors)),
                 joint=joint,
-                actuated=moves and draw(st.booleans()),
+                actuated=actuated,
                 position=0.0,
                 geometric_error=np.array([*draw(vectors), *draw(vectors)]),
                 link=draw(links),
@@ -790,3 +812,78 @@ def test_the_documentations_example_loads_and_closes(write_file):
     # both legs are mirror images, so they meet on the y axis
     assert posture.platform[0, 3] == pytest.approx(0.0, abs=1e-9)
     assert {f.joint for f in robot.frames} == {"fixed", "revolute"}
+
+
+def test_the_documentations_bearing_turns_freely_and_yields_as_its_data_sheet_says(
+    write_file,
+):
+    """Radial 1.2e8 N/m, axial 6e7 N/m: under 60 N the hub moves by F/k, worked by hand.
+
+    Its play is taken up first; about its axis nothing resists.
+    """
+    text = (Path(__file__).parents[1] / "docs" / "robot_files.md").read_text("utf-8")
+    example = text.split("```toml\n")[2].split("```")[0]
+    alone = 'platform = "hub_flange"\n[[frame]]\nname = "hub_flange"\nparent = "hub"\n'
+    robot = read_robot(write_file(alone + example.replace('"right.elbow"', '"base"')))
+    hub = robot.frame("hub")
+    assert not hub.compliant
+    assert hub.own_stiffness == 0.0
+    up = solve_assembly(home_posture(robot), [0, 0, 0, 60.0, 0, 0])
+    assert up.platform_screw[3] == pytest.approx(5e-6 + 60 / 1.2e8, rel=1e-9)
+    along = solve_assembly(home_posture(robot), [0, 0, 0, 0, 0, 60.0])
+    assert along.platform_screw[5] == pytest.approx(8e-6 + 60 / 6e7, rel=1e-9)
+    assert mobility(home_posture(robot)).locked_freedoms == 1
+    with pytest.raises(FreeMotion):
+        solve_assembly(home_posture(robot), [0, 0, 1.0, 0, 0, 0])
+
+
+def test_a_dh_table_without_alpha_is_told(write_file, run, monkeypatch):
+    """By solve, in text and JSON, and by show; with alpha nothing is said."""
+    text = """
+platform = "tool"
+[[frame]]
+name = "arm"
+parent = "base"
+dh = { a = 0.3 }
+[[frame]]
+name = "wrist"
+parent = "arm"
+dh = { a = 0.2, alpha = 0.0 }
+[[frame]]
+name = "tool"
+parent = "wrist"
+dh = { d = 0.1 }
+"""
+    told = 'dh without alpha, taken as 0: "arm", "tool"'
+    file = write_file(text)
+    assert read_robot(file).remarks == (told,)
+    _, out, _ = run("assembly", "solve", file)
+    assert f"\nnote: {told}\n" in out
+    _, out, _ = run("assembly", "solve", file, "--json", "-")
+    assert json.loads(out)["remarks"] == [told]
+
+    class Plotter:
+        def screenshot(self, name):
+            Path(name).write_bytes(b"")
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("assembly.plot.draw_assembly", lambda *_: Plotter())
+    status, out, _ = run("assembly", "show", file, "-o", file.with_suffix(".png"))
+    assert (status, out) == (0, f"note: {told}\n")
+    full = text.replace("a = 0.3", "a = 0.3, alpha = 0").replace(
+        "d =", "alpha = 0, d ="
+    )
+    assert read_robot(write_file(full)).remarks == ()
+
+
+def test_a_bearing_is_written_and_read_back(tmp_path):
+    K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
+    hub = Frame("hub", joint="revolute", joint_stiffness=K)
+    robot = Robot("hub", "tool", (hub, Frame("tool", "hub")))
+    write_robot(robot, tmp_path / "hub.toml")
+    again = read_robot(tmp_path / "hub.toml").frame("hub")
+    assert np.array_equal(again.joint_stiffness, K)
+    with pytest.raises(BadInput, match="found inf along the own motion"):
+        replace(hub, joint_stiffness=np.diag([1.0, 1.0, np.inf, 1.0, 1.0, 1.0]))

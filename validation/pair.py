@@ -98,8 +98,8 @@ def sprung(robot: Robot) -> NDArray:
     """
     rows = np.zeros((len(robot.frames), 6))
     for row, frame in zip(rows, robot.frames, strict=True):
-        if frame.joint_stiffness is not None:
-            row[:] = np.isfinite(np.diag(frame.joint_stiffness))
+        if frame.springs is not None:
+            row[:] = np.isfinite(np.diag(frame.springs))
     return rows
 
 

@@ -16,8 +16,8 @@ from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.energy import Assembly, solve_assembly
 from assembly.links import link_compliance
 from assembly.mesh_link import mesh_link_stiffness
-from assembly.pose_error import READINGS
 from assembly.posture import POSE, Posture, place_robot
+from assembly.reach import READINGS
 from assembly.results import pose_error_of, solution_of
 from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot

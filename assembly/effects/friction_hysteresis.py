@@ -18,8 +18,8 @@ def elastic_joints(robot: Robot) -> tuple[str, ...]:
 
 
 def _springy(frame: Frame) -> bool:
-    K = frame.joint_stiffness
-    return K is not None and bool(K[frame.own_axis, frame.own_axis] < float("inf"))
+    own = frame.own_stiffness
+    return own is not None and 0.0 < own < float("inf")
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

@@ -79,6 +79,8 @@ def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray
         (6, 6) with ``inf`` on the diagonal where rigid.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
+    free = np.diag(K) == 0.0  # in series with what resists nothing, nothing resists
+    K[free, free] = np.inf
     soft = np.isfinite(np.diag(K))
     C = np.zeros((6, 6))
     if soft.any():
@@ -88,4 +90,5 @@ def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray
     K = np.diag(np.full(6, np.inf))
     if soft.any():
         K[np.ix_(soft, soft)] = np.linalg.inv(C[np.ix_(soft, soft)])
+    K[free], K[:, free] = 0.0, 0.0
     return K

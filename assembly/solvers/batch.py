@@ -20,9 +20,11 @@ from assembly.energy import (
     solve_assembly,
     without_own_springs,
 )
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.nominal import size_of
 from assembly.posture import Posture
 from assembly.robot import Robot
+from assembly.rounding import SPREAD, closure_rounding, drop_zeros, stiffness_spread
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
 from assembly.zone import zone_margin
 from stiffness.display import html_table, short_repr
@@ -55,6 +57,7 @@ class Energies:
         clearance_excess: (k,) [-] by how much the worst clearance leaves its cone.
         clearances: (k, nu) in units of the cones of :attr:`joints`; NaN where the
             bound of a passive joint's own motion mattered.
+        motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         road: (k,) index into :data:`ROADS`.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
@@ -70,6 +73,7 @@ class Energies:
     closure_residual: NDArray
     clearance_excess: NDArray
     clearances: NDArray
+    motions: NDArray
     multipliers: NDArray
     road: NDArray
     status: NDArray
@@ -155,8 +159,11 @@ def minimise_energies(
             f"minimise_energies: transforms have shape {T.shape} and errors "
             f"{errors.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or (k, {n}, 6)"
         )
-    if not (np.isfinite(T).all() and np.isfinite(errors).all()):
-        raise ValueError("minimise_energies: transforms or errors are not all finite")
+    if not (np.isfinite(T).all() and np.all(np.abs(errors) <= LARGEST_LENGTH)):
+        raise ValueError(
+            "minimise_energies: transforms or errors are not all finite, or an error "
+            f"is larger than {LARGEST_LENGTH:g} [rad, m]"
+        )
     all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
     joints, structure = structure_of(robot, compliant)
@@ -167,11 +174,14 @@ def minimise_energies(
         np.zeros((count, nu)), np.zeros((count, nq)),
         np.zeros((count, 6 * len(robot.closures))), np.zeros(count),
     )  # fmt: skip
-    assemble_all(cone_solvers(), structure, T, all_errors, off, out)
+    if stiffness_spread(joints, structure.size) > SPREAD:
+        out.road[:] = ROADS.index("uncertified")  # what rounds is for the other road
+    else:
+        assemble_all(cone_solvers(), structure, T, all_errors, off, out)
     answers = Energies(
         out.energy, out.bound, out.without_play, out.platform_screw, out.open,
-        _excess(out.clearances, structure.starts), out.clearances, out.multipliers,
-        out.road,
+        _excess(out.clearances, structure.starts), out.clearances, out.motions,
+        out.multipliers, out.road,
         np.full(count, "ok", dtype=object), np.full(count, "", dtype=object), joints,
     )  # fmt: skip
     for i in np.flatnonzero(out.road >= _COMPILED).tolist():
@@ -180,6 +190,9 @@ def minimise_energies(
         own = robot if np.array_equal(here, robot.errors) else robot.with_errors(here)
         posture = Posture(own, np.full(n, np.nan), T[i], float(off[i]))
         _solve_slowly(posture, compliant, answers, i)
+    left = answers.closure_residual
+    left = left + closure_rounding(all_errors, joints, structure.size)
+    drop_zeros(answers.energy, answers.bound, answers.multipliers, left)
     return answers
 
 
@@ -195,7 +208,7 @@ def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -
     """Row i of the answers by the slower road."""
     a = answers
     for values in (a.energy, a.bound, a.energy_without_play, a.platform_screw,
-                   a.closure_residual, a.clearance_excess, a.clearances,
+                   a.closure_residual, a.clearance_excess, a.clearances, a.motions,
                    a.multipliers):  # fmt: skip
         values[i] = np.nan
     try:
@@ -214,7 +227,7 @@ def _solve_slowly(posture: Posture, compliant: str, answers: Energies, i: int) -
     a.closure_residual[i] = one.closure_residual()
     a.clearance_excess[i] = one.clearance_excess()
     if one.clearances.shape == a.clearances[i].shape:
-        a.clearances[i] = one.clearances
+        a.clearances[i], a.motions[i] = one.clearances, one.motions
     a.bound[i], a.multipliers[i] = one.bound, one.multipliers
     if one.unproved:
         a.status[i], a.reason[i] = "solver failed", one.unproved

@@ -6,7 +6,7 @@ that road does not cover is solved by :mod:`assembly.pose_error`, and counted; r
 ``budget`` always is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.energy import CannotAssemble, solve_assembly
-from assembly.pose_error import READINGS, PoseError, bound_pose_error
+from assembly.pose_error import PoseError, bound_pose_error
 from assembly.posture import Posture
+from assembly.reach import READINGS
 from assembly.robot import Robot
 from assembly.solvers.batch import Energies, minimise_energies, structure_of
 from assembly.solvers.conic import SolverFailed
@@ -142,7 +143,8 @@ def bound_pose_errors(
         )
         bound_all(
             cone_solvers(), structure, T, off, energies.platform_screw.copy(),
-            np.ascontiguousarray(energies.clearances[:, column_of]), loads,
+            np.ascontiguousarray(energies.clearances[:, column_of]),
+            _motions(robot, structure, energies), loads,
             np.asarray(offset, dtype=float).copy(), tolerance, bounds,
         )  # fmt: skip
     found = PoseErrors(
@@ -206,8 +208,9 @@ def _loads(
         held = structure_of(robot, "hinged")[1]
         holder = minimise_energies(robot, T, errors, off, "hinged")
         road[~np.isfinite(holder.clearances).all(axis=1)] = 1
-    column_of = _places(moving, structure_of(robot)[1])
-    cone_of = np.searchsorted(held.starts, _places(moving, held), side="right") - 1
+    column_of = _places(_cones(moving), _cones(structure_of(robot)[1]))
+    places = _places(_cones(moving), _cones(held))
+    cone_of = np.searchsorted(held.starts, places, side="right") - 1
     loads = Loads(
         held, holder.multipliers, holder.clearances, holder.energy,
         holder.energy_without_play, cone_of[moving.starts[:-1]].astype(np.int64),
@@ -215,13 +218,25 @@ def _loads(
     return moving, column_of, loads
 
 
-def _places(some: "Structure", among: "Structure") -> NDArray:
-    """Which clearance of another reading each clearance is: the same frame and axis."""
-    place = {
-        key: i
-        for i, key in enumerate(
-            zip(among.cone_frame.tolist(), among.cone_axis.tolist(), strict=True)
-        )
-    }
-    keys = zip(some.cone_frame.tolist(), some.cone_axis.tolist(), strict=True)
-    return np.array([place[key] for key in keys], dtype=np.int64)
+def _motions(robot: Robot, moving: "Structure", energies: Energies) -> NDArray:
+    """(k, nq) [rad, m] free motions of (22) where they have a bound, 0 elsewhere."""
+    motions = np.zeros((len(energies.motions), len(moving.free_bound)))
+    bounded = np.flatnonzero(np.isfinite(moving.free_bound))
+    places = zip(moving.free_frame[bounded], moving.free_axis[bounded], strict=True)
+    structure = structure_of(robot)[1]
+    among = zip(structure.free_frame, structure.free_axis, strict=True)
+    motions[:, bounded] = energies.motions[:, _places(places, among)]
+    return motions
+
+
+def _cones(structure: "Structure") -> Iterable[tuple[int, int]]:
+    """Frame and axis of every clearance."""
+    return zip(structure.cone_frame, structure.cone_axis, strict=True)
+
+
+def _places(
+    some: Iterable[tuple[int, int]], among: Iterable[tuple[int, int]]
+) -> NDArray:
+    """Where each column of one reading is in another: the same frame and axis."""
+    place = {(int(j), int(axis)): i for i, (j, axis) in enumerate(among)}
+    return np.array([place[int(j), int(axis)] for j, axis in some], dtype=np.int64)

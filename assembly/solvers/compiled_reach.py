@@ -2,7 +2,8 @@
 
 Readings ``frozen`` and ``free`` of (27): deformations stay, unloaded clearances move,
 passive joints follow.  See :mod:`assembly.pose_error` for what is asked, and
-:mod:`assembly.solvers.farthest` for the search.  What hangs on rounding is handed back.
+:mod:`assembly.solvers.farthest` for the search.  What hangs on rounding is handed back,
+and a point where a passive joint could pass the bound of its motion.
 """
 
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from assembly.solvers.compiled_reduction import (
     Structure,
     free_columns,
+    least_motions,
     orthogonal_rows,
     paths_of,
     small_problem,
@@ -78,7 +80,8 @@ class Bounds(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def bound_all(
     solvers: ConeSolvers, s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
-    clearances: NDArray, loads: Loads, offset: NDArray, tolerance: NDArray, out: Bounds,
+    clearances: NDArray, motions: NDArray, loads: Loads, offset: NDArray,
+    tolerance: NDArray, out: Bounds,
 ) -> None:  # fmt: skip
     """Bracket the largest pose errors of all points that are not handed back yet.
 
@@ -89,6 +92,7 @@ def bound_all(
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         centre: (k, 6) [rad, m] platform screws of (22) at the platform's origin.
         clearances: (k, nu) of (22), in these cones.
+        motions: (k, nq) [rad, m] of (22) where they have a bound, else anything.
         loads: which of them are held.
         offset: (3,) [m] from the platform's origin to the point asked about.
         tolerance: (2,) [rad, m] asked of upper minus lower bounds.
@@ -100,7 +104,7 @@ def bound_all(
             continue
         decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
         found, body = body_of(
-            s, T[i], mismatch[i], centre[i], clearances[i], loaded, offset
+            s, T[i], mismatch[i], centre[i], clearances[i], motions[i], loaded, offset
         )
         if not (decided and found):
             out.road[i] = HANDED_BACK
@@ -160,7 +164,7 @@ def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
 @njit(cache=True, error_model="numpy")
 def body_of(
     s: Structure, T: NDArray, mismatch: float, centre: NDArray, clearances: NDArray,
-    loaded: NDArray, offset: NDArray,
+    motions: NDArray, loaded: NDArray, offset: NDArray,
 ) -> tuple[bool, Body]:  # fmt: skip
     """The set of platform screws of one point, and whether it was found.
 
@@ -170,11 +174,13 @@ def body_of(
         mismatch: see there.
         centre: see there.
         clearances: see there.
+        motions: see there.
         loaded: see there.
         offset: see there.
 
     Returns:
-        Whether no rank hangs on rounding and the platform moves within bounds; the set.
+        Whether no rank hangs on rounding, the platform moves within bounds, and no
+        passive joint comes to the bound of its own motion; the set.
     """
     tolerance = _RANK + 30.0 * mismatch
     P = paths_of(T, s)
@@ -188,7 +194,9 @@ def body_of(
     if rank < 0:
         return False, Body(centre, *nothing)
     bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
-    if not bounded:
+    if not bounded or not _within_bounds(
+        s, P, F, turns, diagonal, order, rank, clearances, motions, loaded
+    ):
         return False, Body(centre, *nothing)
     Z = orthogonal_rows(F, turns, rank, m)
     columns, _ = small_problem(s, P, Z, len(Z), np.zeros(m))
@@ -242,6 +250,40 @@ def _follow(
                 largest = max(largest, abs(drive[i]))
     turn_all(F, turns, rank, follow)
     return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
+
+
+@njit(cache=True, error_model="numpy")
+def _within_bounds(
+    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
+    order: NDArray, rank: int, clearances: NDArray, motions: NDArray, loaded: NDArray,
+) -> bool:  # fmt: skip
+    """Whether no play takes a passive joint past its bound; see assembly.reach."""
+    nq, m = F.shape
+    if not np.any(s.free_bound < np.inf):
+        return True
+    middle, most = motions.copy(), np.zeros(nq)
+    moved, step = np.zeros(m), np.zeros(nq)
+    for c in range(len(s.starts) - 1):
+        if loaded[c]:
+            continue
+        squares = np.zeros(nq)
+        for i in range(s.starts[c], s.starts[c + 1]):
+            j = s.cone_frame[i]
+            for k in range(m // 6):
+                sign = s.patterns[s.pattern_of[j], k] * s.cone_size[i]
+                for a in range(6):
+                    moved[6 * k + a] = sign * P[j, s.cone_axis[i], a]
+            least_motions(F, turns, diagonal, order, rank, moved, step)
+            for q in range(nq):
+                middle[q] -= step[q] * clearances[i]
+                squares[q] += step[q] * step[q]
+        most += np.sqrt(squares)
+    for q in range(nq):
+        # written so that what is not a number is not within
+        if s.free_bound[q] < np.inf:
+            if not abs(middle[q]) + most[q] <= s.free_bound[q]:
+                return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")

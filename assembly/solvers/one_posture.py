@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.clearance import clearance_bounds
 from assembly.closure import VirtualJoints, closure_signs, linearise, virtual_joints
+from assembly.nominal import size_of
 from assembly.posture import Posture
+from assembly.rounding import closure_rounding, drop_zeros
 from assembly.solvers.batch import minimise_energies
 from assembly.solvers.loaded_draws import Loads, forces_of, loads_of, solve_loaded
 from assembly.solvers.reduction import complement, reduce_problem
@@ -148,7 +150,11 @@ class OnePosture:
                 slower |= (np.abs(parts @ rows.T) > limit).any(axis=1)
         missed = np.abs(e @ self.unanswered[:, some].T)
         slower |= missed.max(axis=1, initial=0.0) > _RIGID
-        answer = Draws(energy, bound, u, y @ self.closing.T, parts @ screws.T, slower)
+        multipliers = y @ self.closing.T
+        size = size_of(self.posture.robot)
+        left = closure_rounding(errors, self.joints, size)
+        drop_zeros(energy, bound, multipliers, left)
+        answer = Draws(energy, bound, u, multipliers, parts @ screws.T, slower)
         self._solve_slowly(errors, answer)
         return answer
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from assembly.effects.acting import check_covariates
 from assembly.link_stress import stressed_names
-from assembly.pose_error import READINGS
 from assembly.posture import home_posture
+from assembly.reach import READINGS
 from assembly.robot import Robot
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design

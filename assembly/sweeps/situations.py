@@ -75,7 +75,8 @@ def assemble_situations(here: Conditions) -> tuple[Energies, NDArray]:
 
     found = Energies(
         unknown(), unknown(), unknown(), unknown(6), unknown(), unknown(),
-        unknown(joints.cones.shape[1]), unknown(6 * len(here.robot.closures)),
+        unknown(joints.cones.shape[1]), unknown(joints.free.shape[1]),
+        unknown(6 * len(here.robot.closures)),
         np.zeros(k, dtype=int), np.full(k, "ok", dtype=object),
         np.full(k, "", dtype=object), joints,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from validation.campaign.design_signatures import (
     design_signatures,
 )
 from validation.campaign.measuring_order import Revisits, revisits
-from validation.campaign.remark import LOST, Remark
+from validation.campaign.remark import CAREFUL, LOST, Remark
 from validation.campaign.repeats import RepeatNoise, repeat_noise
 from validation.campaign.separability import Separability, compare_signatures
 
@@ -113,6 +113,7 @@ def inspect_campaign(
     repeats = revisits(campaign, campaign.repeat)
     visits = revisits(campaign, campaign.configuration)
     remarks = remarks_on(campaign, repeats, visits, noise)
+    remarks += [Remark("robot", CAREFUL, text) for text in campaign.robot.remarks]
     if signatures.unregistered:
         text = f"The registration cannot be found. {signatures.unregistered}"
         remarks.insert(0, Remark("registration", LOST, text))

@@ -163,11 +163,11 @@ def build(model: Model, case: Case) -> Tree:
         if case.clearances and play.cones:
             contacts[frame.name] = model.add_contact(place, play)
             place = contacts[frame.name].far
-        K = frame.joint_stiffness
+        K = frame.springs
         if K is not None and np.isfinite(np.diag(K)).any():
             joints[frame.name] = model.add_spring(place, K)
             place = joints[frame.name].far
-        elif frame.passive and not frame.compliant and frame.name not in contacts:
+        if frame.passive and not frame.compliant and frame.name not in contacts:
             idle[frame.name] = model.add_idle(place, frame.own_axis)
             place = idle[frame.name].far
         before[frame.name] = place

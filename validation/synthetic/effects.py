@@ -166,7 +166,7 @@ def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
 
 def own_compliance(frame: Frame) -> float:
     """[rad/(N m) or m/N] of a declared joint along its own motion, 0 if rigid."""
-    K = frame.joint_stiffness
+    K = frame.springs
     if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
         return 0.0
     soft = np.flatnonzero(np.isfinite(np.diag(K)))

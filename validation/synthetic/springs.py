@@ -144,9 +144,10 @@ def _taken_apart(machines: Sequence[Machine], q: NDArray) -> _Parts:
 def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
     """(6, 6) of a frame's link and of its joint."""
     joint = np.zeros((6, 6))
-    if frame.joint_stiffness is not None:
-        soft = np.ix_(*[np.isfinite(np.diag(frame.joint_stiffness))] * 2)
-        joint[soft] = np.linalg.inv(frame.joint_stiffness[soft])
+    K = frame.springs
+    if K is not None:
+        soft = np.ix_(*[np.isfinite(np.diag(K))] * 2)
+        joint[soft] = np.linalg.inv(K[soft])
     link = np.zeros((6, 6)) if frame.link is None else link_compliance(frame)
     return link, joint
 
