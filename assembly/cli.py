@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 import typer
 
-from assembly.joint_file import LARGEST, LARGEST_LENGTH
 from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
@@ -76,6 +75,7 @@ def parse_load(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from assembly.joint_file import LARGEST
     from stiffness.screws import WRENCH
 
     names = [name.lower() for name in WRENCH]
@@ -117,6 +117,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     """
     if not texts:
         return None
+    from assembly.joint_file import LARGEST_LENGTH
     from assembly.posture import parse_assignments
 
     given = parse_assignments(texts, option, LARGEST_LENGTH)
@@ -140,6 +141,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
+    from assembly.joint_file import LARGEST_LENGTH
     from stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
@@ -182,6 +184,7 @@ def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
     """The posture asked for, of the robot without the effects of its file."""
+    from assembly.joint_file import LARGEST_LENGTH
     from assembly.posture import parse_assignments, place_robot
     from assembly.robots import load_robot
 
@@ -364,6 +367,7 @@ def error(
 ) -> None:
     """Certified bounds of the platform's largest pose error, problem (27)."""
     from assembly.effects.acting import act
+    from assembly.joint_file import LARGEST_LENGTH
     from assembly.reach import READINGS
     from assembly.results import pose_error_of, pose_error_text
 

@@ -8,9 +8,9 @@ before any elimination, leaves more than the gap asked for.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel, part
 from assembly.solvers.compiled_reduction import (
     Structure,
     eliminate_springs,
@@ -68,7 +68,7 @@ class Answers(NamedTuple):
     open: NDArray
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def assemble_all(
     solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: Answers,
@@ -136,7 +136,7 @@ def assemble_all(
         out.road[point] = _certify(point, s, P, own, moved, road, out)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _certify(
     point: int, s: Structure, P: NDArray, errors: NDArray, moved: NDArray, road: int,
     out: Answers,
@@ -181,7 +181,7 @@ def _certify(
     return UNCERTIFIED
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _complementary(
     s: Structure, P: NDArray, errors: NDArray, multipliers: NDArray, motions: NDArray
 ) -> tuple[float, float]:
@@ -219,7 +219,7 @@ def _complementary(
     return total, cost
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _minimise(
     solvers: ConeSolvers, s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray,
     y: NDArray,
@@ -248,7 +248,7 @@ def _minimise(
     return road
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def small_answer(
     solvers: ConeSolvers, Gt: NDArray, h: NDArray, starts: NDArray, relative: float,
     absolute: float, u: NDArray, y: NDArray,
@@ -276,7 +276,7 @@ def small_answer(
     return INTERIOR
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _into_cones(starts: NDArray, u: NDArray) -> None:
     """Cones' vectors shortened to length 1 where rounding made them longer."""
     for c in range(len(starts) - 1):

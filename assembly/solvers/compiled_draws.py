@@ -6,9 +6,9 @@ any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel, part
 from assembly.solvers.compiled_assembly import small_answer
 from assembly.solvers.compiled_zone import farthest, turn_first
 from assembly.solvers.cone_solvers import ConeSolvers
@@ -21,7 +21,7 @@ _PROJECTIONS, _INWARDS = 30, 0.8
 _MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def least_energies(
     solvers: ConeSolvers, Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
     cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
@@ -109,7 +109,7 @@ def least_energies(
         road[point] = SOLVED if fine else UNCERTIFIED
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@part(nogil=True)
 def _within(
     Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
 ) -> bool:
@@ -154,7 +154,7 @@ def _within(
     return False
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def least_margins(
     solvers: ConeSolvers, B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
     bound: NDArray, pulls: NDArray,

@@ -9,9 +9,9 @@ where nothing is violated.  Its multipliers n bound the margin from below,
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel, part
 from assembly.solvers.compiled_reduction import (
     Structure,
     free_columns,
@@ -32,7 +32,7 @@ _LEFT = 1e-13  # part of what may stay open, as in assembly.solvers.reduction
 _STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def all_margins(
     solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     margin: NDArray, bound: NDArray, road: NDArray,
@@ -95,7 +95,7 @@ def all_margins(
                 road[i] = SOLVED
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def largest_clearance(s: Structure, P: NDArray) -> float:
     """Largest entry of the clearances' closure columns, for the noise floor."""
     largest = 0.0
@@ -111,7 +111,7 @@ def largest_clearance(s: Structure, P: NDArray) -> float:
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def orthonormal_rows(
     rows: NDArray, right: NDArray, largest: float
 ) -> tuple[bool, NDArray, NDArray]:
@@ -146,7 +146,7 @@ def orthonormal_rows(
     return True, B, w
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def turn_first(B: NDArray, w: NDArray, size: float) -> None:
     """Combine the rows of B so that the first is along w and the others across it."""
     v = divide(w, size)
@@ -162,7 +162,7 @@ def turn_first(B: NDArray, w: NDArray, size: float) -> None:
         B[0, c] *= sign
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def farthest(
     solvers: ConeSolvers, B: NDArray, starts: NDArray
 ) -> tuple[NDArray, NDArray]:

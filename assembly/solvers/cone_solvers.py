@@ -8,9 +8,10 @@ as an argument is compiled without them.
 from functools import cache
 from typing import Any, NamedTuple
 
-from numba import cfunc, njit, types
+from numba import cfunc, types
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel
 from assembly.solvers import dual_newton, interior
 
 _row = types.Array(types.float64, 1, "C")
@@ -53,7 +54,7 @@ def cone_solvers() -> ConeSolvers:
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def interior_point(
     solvers: ConeSolvers, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     starts: NDArray, tolerance: float,
@@ -62,7 +63,7 @@ def interior_point(
     return solvers.interior_point(G, h, d, H, k, starts, tolerance, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def newton(
     solvers: ConeSolvers, Gt: NDArray, h: NDArray, d: NDArray, springs: int,
     starts: NDArray, relative: float, absolute: float, steps: int, sharp: float,

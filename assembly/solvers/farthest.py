@@ -21,9 +21,9 @@ Sources:
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel, part
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
@@ -66,7 +66,7 @@ class Search(NamedTuple):
     outer: Polytope
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def begin(
     body: Body, part: int, tolerance: float, most: int, outer: Polytope
 ) -> Search:
@@ -102,7 +102,7 @@ def begin(
     return search
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _first_direction(body: Body, search: Search) -> None:
     """Where the body would reach farthest if no closure held it."""
     p, nv = body.rows.shape
@@ -145,7 +145,7 @@ def _first_direction(body: Body, search: Search) -> None:
                 search.direction[a] = sign * d[a]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
     """Look on until the bounds are as close as asked.
 
@@ -179,7 +179,7 @@ def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
         choose(search)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def learn(
     body: Body, search: Search, height: float, screw: NDArray, pulls: NDArray
 ) -> None:
@@ -204,7 +204,7 @@ def learn(
     search.bounds[1] = max(search.bounds[1], search.bounds[0])
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _improve(search: Search, screw: NDArray) -> None:
     """Keep a screw that is farther than the best."""
     size = 0.0
@@ -218,7 +218,7 @@ def _improve(search: Search, screw: NDArray) -> None:
         copy(screw, search.best)
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _add_plane(search: Search, direction: NDArray, height: float) -> None:
     """A new plane: of the box, or kept for it, or cut at once."""
     stage = search.counts[0]
@@ -235,7 +235,7 @@ def _add_plane(search: Search, direction: NDArray, height: float) -> None:
         search.counts[2] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _set_side(search: Search, direction: NDArray, height: float) -> None:
     """A side of the box, if the direction is one of its axes or the opposite."""
     for axis in range(3):
@@ -249,7 +249,7 @@ def _set_side(search: Search, direction: NDArray, height: float) -> None:
             search.heights[0, axis] = -height
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> None:
     """What a symmetric body's support says of the other side: v turned round."""
     start = body.start
@@ -270,7 +270,7 @@ def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> N
     _add_plane(search, divide(search.direction, -1.0), max(height, reached))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def choose(search: Search) -> None:
     """The next direction, and the stage that looks in it."""
     counts, direction = search.counts, search.direction
@@ -301,7 +301,7 @@ def choose(search: Search) -> None:
         _towards(search, corner)
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _towards(search: Search, point: NDArray) -> None:
     """Look towards a point."""
     size = np.sqrt(inner(point, point))
@@ -309,7 +309,7 @@ def _towards(search: Search, point: NDArray) -> None:
         search.direction[a] = point[a] / size
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _start_boxing(search: Search) -> None:
     """A box along the best point's direction, its planes not known yet."""
     search.counts[0] = _BOXING

@@ -18,14 +18,15 @@ Sources:
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from assembly.compiled import kernel, part
 
 _LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
 _SWEEPS, _STEPS = 12, 60
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@part(fastmath={"contract", "reassoc"})
 def majorant_bound(
     centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray, w: NDArray
 ) -> float:
@@ -75,7 +76,7 @@ def majorant_bound(
     return constant + largest_on_sphere(Q, linear)
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"}, error_model="numpy")
+@part(fastmath={"contract", "reassoc"})
 def _follow_rows(
     H: NDArray, X: NDArray, start: NDArray, sizes: NDArray, A: NDArray, fixed: NDArray
 ) -> bool:
@@ -120,7 +121,7 @@ def _follow_rows(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
     """Largest value of d.Q d/2 + g.d over unit vectors d.
 
@@ -161,7 +162,7 @@ def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def eigenvectors(Q: NDArray) -> tuple[NDArray, NDArray]:
     """Eigenvalues (3,) of a symmetric matrix, and vectors as columns (3, 3)."""
     D, V, values = Q.copy(), np.zeros((3, 3)), np.empty(3)

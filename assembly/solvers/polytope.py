@@ -9,8 +9,9 @@ corners lie together and nothing else changes.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from assembly.compiled import kernel
 
 _MOST = 4096  # corners; 400 planes make 800
 
@@ -29,7 +30,7 @@ class Polytope(NamedTuple):
     used: NDArray
 
 
-@njit(cache=True)
+@kernel
 def empty_polytope() -> Polytope:
     """Room for a body."""
     return Polytope(
@@ -37,7 +38,7 @@ def empty_polytope() -> Polytope:
     )
 
 
-@njit(cache=True)
+@kernel
 def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> None:
     """Make the body a box.
 
@@ -59,7 +60,7 @@ def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> Non
     body.used[0], body.used[1] = 8, 6
 
 
-@njit(cache=True)
+@kernel
 def cut(body: Polytope, normal: NDArray, height: float) -> bool:
     """Keep the points x with normal . x <= height.
 
@@ -117,7 +118,7 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@kernel
 def farthest_corner(body: Polytope) -> NDArray:
     """(3,) the corner farthest from the origin."""
     best, at = -1.0, 0

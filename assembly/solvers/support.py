@@ -12,9 +12,9 @@ and its point is drawn into the body: height and point never depend on the solve
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel, part
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.vectors import divide, inner
 
@@ -40,7 +40,7 @@ class Body(NamedTuple):
     starts: NDArray
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def support(
     solvers: ConeSolvers, body: Body, part: int, direction: NDArray, tolerance: float
 ) -> tuple[float, NDArray, NDArray, NDArray]:
@@ -97,7 +97,7 @@ def support(
     return height, within(body, v) if p else v, pulls, n
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def within(body: Body, v: NDArray) -> NDArray:
     """A nearby v that satisfies rows and cones to rounding."""
     step = np.empty(len(v))
@@ -123,7 +123,7 @@ def within(body: Body, v: NDArray) -> NDArray:
     return step
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def screw_at(body: Body, v: NDArray) -> NDArray:
     """(6,) platform screw at v."""
     screw = body.centre.copy()
@@ -134,7 +134,7 @@ def screw_at(body: Body, v: NDArray) -> NDArray:
     return screw
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def symmetric(body: Body) -> bool:
     """Whether v -> -v leaves the rows satisfied."""
     for i in range(len(body.rows)):

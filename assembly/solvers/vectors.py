@@ -5,11 +5,12 @@ and its error messages into every kernel that calls it: ten times the code to co
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import part
 
-@njit(cache=True, error_model="numpy")
+
+@part
 def inner(a: NDArray, b: NDArray) -> float:
     """a.b, summed in order; :func:`assembly.solvers.interior.dot` is the quick one."""
     total = 0.0
@@ -18,21 +19,21 @@ def inner(a: NDArray, b: NDArray) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def fill(to: NDArray, value: float) -> None:
     """Set all of a row to a value."""
     for j in range(len(to)):
         to[j] = value
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def copy(source: NDArray, to: NDArray) -> None:
     """Copy a row into the first components of another."""
     for j in range(len(source)):
         to[j] = source[j]
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def divide(v: NDArray, divisor: float) -> NDArray:
     """(n,) a new row: v / divisor."""
     quotient = np.empty(len(v))

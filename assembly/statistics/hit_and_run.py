@@ -8,13 +8,13 @@ Sources:
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from assembly.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def hit_and_run(
     rows: NDArray, starts: NDArray, free: NDArray, u: NDArray, steps: int,
     rng: np.random.Generator,
@@ -59,7 +59,7 @@ def hit_and_run(
             u[c] += step * z[c]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(nogil=True)
 def push_all(
     solvers: ConeSolvers, rows: NDArray, starts: NDArray, free: NDArray, u: NDArray,
     pushes: NDArray, ends: NDArray,
