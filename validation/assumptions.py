@@ -25,7 +25,6 @@ from validation.validity import (
     spread_cost,
 )
 
-
 NOTHING = "nothing to compare: without errors and load neither model moves"
 
 

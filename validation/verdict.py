@@ -101,8 +101,12 @@ Answer = TypeVar("Answer", bound=Comparison)
 def verdict(answer: Comparison) -> str:
     """What was found on the scales there are.
 
-    ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` where no check had
-    anything to compare.
+    Args:
+        answer: of a comparison.
+
+    Returns:
+        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` where no check
+        had anything to compare.
     """
     found = {check.verdict for check in answer.checks.values()}
     if "fails" in found and len(answer.pairs) >= _FEWEST:
