@@ -4,7 +4,9 @@ Quick ones on a planar arm worked out by hand, slow ones on simulated campaigns:
 and, where the data are at hand, those of another program.
 """
 
+import html
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -252,6 +254,34 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     fitted = predict(apply_effects(declared, {effect: values})).deviation[0]
     assert solved == pytest.approx(fitted, abs=1e-9)  # the reading turns finitely
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
+
+
+ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
+
+
+def test_a_report_shows_odd_names_as_they_are_written(small, tmp_path, run):
+    """Frames, covariates and rows named as formulas and tags, in plots and tables."""
+    folder = tmp_path / "campaign"
+    shutil.copytree(small, folder)
+    robot, table = folder / "robot.toml", folder / "measurements.csv"
+    text, rows = robot.read_text(), table.read_text()
+    for old, new in zip(("one", "two"), ODD, strict=True):
+        text = text.replace(f'"{old}"', f"'{new}'")
+        rows = rows.replace(f"q.{old}", f"q.{new}", 1)
+    head, *lines = rows.splitlines()
+    head += f",cov.{ODD[0]}"
+    lines = [f"{line},{k}" for k, line in enumerate(lines)]
+    robot.write_text(text)
+    table.write_text("\n".join([head, *lines]) + "\n")
+    status, _, err = run(
+        "validation", "diagnose", folder, "--report", tmp_path / "d.html"
+    )
+    assert status == 0, err
+    page = (tmp_path / "d.html").read_text(encoding="utf-8")
+    assert html.escape(ODD[1]) in page  # the joint whose encoder is off
+    assert "&amp;lt;" not in page
+    assert "<b>" not in page
+    assert "<i>" not in page
 
 
 def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):

@@ -23,8 +23,8 @@ def worst_play(results: StudyResults) -> dict[str, Any]:
     Returns:
         ``rotation`` [rad] and ``translation`` [m], reading ``frozen`` of (27), at the
         study's pose (``pose``) and the largest over its ``map``, with the number of
-        ``points`` they are over; None where there is none.  Infinite where nothing
-        bounds the platform.
+        ``points`` they are over, ``of`` all; None where there is none.  Infinite where
+        nothing bounds the platform.
     """
     parts = ("rotation", "translation")
     here = results.error.get(WORST)
@@ -37,7 +37,8 @@ def worst_play(results: StudyResults) -> dict[str, Any]:
         known = ~np.isnan(bounds["rotation"]) & ~np.isnan(bounds["translation"])
         if known.any():
             largest = {part: float(v[known].max()) for part, v in bounds.items()}
-            table["map"] = largest | {"points": int(known.sum())}
+            points = {"points": int(known.sum()), "of": known.size}
+            table["map"] = largest | points
     return table
 
 
@@ -85,7 +86,10 @@ def _ends_up(results: StudyResults) -> str:
     said = [f"Wherever its play rests, its platform is {bound} from the nominal pose"]
     if worst["map"] is not None:
         over = worst["map"]
-        said.append(f", {_bound_text(over)} over the {over['points']} poses of the map")
+        some = f" {over['points']} of" if over["points"] < over["of"] else ""
+        said.append(
+            f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
+        )
     return "".join(said) + (
         f" (certified bounds of (27), reading {WORST}); "
         f"with play resting at least energy it is {_pose_text(turn, shift)} away."

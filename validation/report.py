@@ -304,7 +304,8 @@ def _maps(results: StudyResults) -> str:
     if len(axes) == 2:
         picture = html_figure(
             map_figure(results.maps),
-            "Maps over the grid; the platform's errors with play at least energy.",
+            "Maps over the grid; the platform's errors are the bounds of (27), play "
+            "anywhere.",
         )
     return (
         f"<h2>Over the workspace</h2><p>{said}. Assembles rigidly with "

@@ -82,7 +82,7 @@ def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
     if tally is not None:
         parts += [
             "<h2>How often this is right</h2>",
-            f"<p>{calibration_text(tally)}</p>",
+            f"<p>{html.escape(calibration_text(tally))}</p>",
         ]
     return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
 
