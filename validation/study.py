@@ -4,6 +4,7 @@ A study file is TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` 
 Everything in it is read and checked before any work begins.
 """
 
+import os.path
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.sweep import sweep_poses
 from assembly.sweeps.targets import parse_grid
-from stiffness.reading import BadInput, Table, read_toml
+from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
 from validation.multibody.simulation import (
@@ -168,8 +169,7 @@ def read_study(path: Path | str, folder: Path | None = None) -> Study:
     """
     path = Path(path)
     root = read_toml(path)
-    name = root.text("robot")
-    robot = load_robot(name if name in BUILT_IN else path.parent / name)
+    robot = _robot(root, path.parent)
     robot, errors = _errors(root, robot)
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
@@ -187,12 +187,23 @@ def read_study(path: Path | str, folder: Path | None = None) -> Study:
     except BadInput as error:
         raise root.bad("", str(error)) from None
     folder = folder or Path(asked)
-    if folder.exists() and not folder.is_dir():
+    if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"{folder}: found a file, expected a folder or nothing")
     return Study(
         title, robot, errors, source, meshes, accuracy, pose, axes, scales, checks,
         wanted, folder,
     )  # fmt: skip
+
+
+def _robot(root: Table, folder: Path) -> Robot:
+    """The robot: built in, or a file beside the study's."""
+    name = root.text("robot", expected="a built-in robot or a robot file")
+    if name in BUILT_IN:
+        return load_robot(name)
+    if not os.path.isfile(folder / name):
+        found = f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+        raise root.bad("robot", f"{found}{nearest(name, BUILT_IN)}")
+    return load_robot(folder / name)
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
@@ -249,7 +260,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
     meshes: dict[str, MeshLink] = {}
     if table.has("surface"):
         surface = Path(root.file).parent / table.text("surface")
-        if not surface.is_file():
+        if not os.path.isfile(surface):
             raise table.bad("surface", f"no such file: {surface}")
         beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
         wanted = _frames(table, robot, [f.name for f in beams])
