@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from numpy.typing import NDArray
+
+from assembly.predict import predict
 from validation.campaign.campaign import READING, Campaign
 from validation.campaign.counts import (
     covariate_counts,
@@ -20,6 +23,7 @@ from validation.campaign.measuring_order import Revisits, revisits
 from validation.campaign.remark import LOST, Remark
 from validation.campaign.repeats import RepeatNoise, repeat_noise
 from validation.campaign.separability import Separability, compare_signatures
+from validation.diagnosis.signatures import conditions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,7 @@ class Inspection:
         signatures: of the library's effects.
         separability: their angles.
         remarks: sentences, those on what is lost first.
+        open: (R,) bool, rows where the robot's declared play leaves its pose free.
     """
 
     campaign: Campaign
@@ -43,6 +48,7 @@ class Inspection:
     signatures: DesignSignatures
     separability: Separability
     remarks: tuple[Remark, ...]
+    open: NDArray
 
     def table(self) -> dict:
         """Everything, in plain values for JSON."""
@@ -71,6 +77,7 @@ class Inspection:
                 "shared": self.separability.shared,
             },
             "remarks": [asdict(r) for r in self.remarks],
+            "open": [i for i, free in zip(c.ids, self.open, strict=True) if free],
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
@@ -121,6 +128,7 @@ def inspect_campaign(
         signatures=signatures,
         separability=compare_signatures(signatures.columns, signatures.nuisance),
         remarks=tuple(remarks),
+        open=predict(conditions_of(campaign)).open,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from assembly.effects import LIBRARY
 from assembly.robot import Robot
+from validation.campaign.text import open_text
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.verdict import Calibration
@@ -51,6 +52,9 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
         },
         "outliers": [
             i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
+        ],
+        "open": [
+            i for i, free in zip(found.campaign.ids, found.open, strict=True) if free
         ],
         "structure": [
             {"against": t.against, "share": t.share, "probability": t.probability}
@@ -185,6 +189,8 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
     if far:
         lines += ["", f"left out as outliers: {', '.join(far)}"]
+    if found.open.any():
+        lines += ["", open_text(found.open)]
     for trend in found.trends:
         lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
     if found.next is not None:
