@@ -6,7 +6,6 @@ and, where the data are at hand, those of another program.
 
 import html
 import json
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -28,6 +27,7 @@ from stiffness.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
+from validation.diagnosis.report import report_page
 from validation.diagnosis.results import corrected, effects, sentence, table, text
 
 CAMPAIGNS = Path(__file__).parent / "campaigns"
@@ -259,26 +259,24 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
 
 
-def test_a_report_shows_odd_names_as_they_are_written(small, tmp_path, run):
-    """Frames, covariates and rows named as formulas and tags, in plots and tables."""
-    folder = tmp_path / "campaign"
-    shutil.copytree(small, folder)
-    robot, table = folder / "robot.toml", folder / "measurements.csv"
-    text, rows = robot.read_text(), table.read_text()
-    for old, new in zip(("one", "two"), ODD, strict=True):
-        text = text.replace(f'"{old}"', f"'{new}'")
-        rows = rows.replace(f"q.{old}", f"q.{new}", 1)
-    head, *lines = rows.splitlines()
-    head += f",cov.{ODD[0]}"
-    lines = [f"{line},{k}" for k, line in enumerate(lines)]
-    robot.write_text(text)
-    table.write_text("\n".join([head, *lines]) + "\n")
-    status, _, err = run(
-        "validation", "diagnose", folder, "--report", tmp_path / "d.html"
+def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
+    """A frame, a covariate and an outlying row named as formulas and tags."""
+    found = diagnosed("none")
+    first, *others = found.campaign.robot.frames
+    named = (
+        replace(first, name=ODD[0]),
+        replace(others[0], parent=ODD[0]),
+        *others[1:],
     )
-    assert status == 0, err
-    page = (tmp_path / "d.html").read_text(encoding="utf-8")
-    assert html.escape(ODD[1]) in page  # the joint whose encoder is off
+    far = np.arange(len(found.campaign)) == 3
+    campaign = replace(
+        found.campaign,
+        robot=replace(found.campaign.robot, frames=named),
+        covariates={ODD[1]: np.arange(len(found.campaign))},
+        ids=(*"abc", ODD[1], *found.campaign.ids[4:]),
+    )
+    page = report_page(replace(found, campaign=campaign, outliers=far))
+    assert html.escape(ODD[1]) in page
     assert "&amp;lt;" not in page
     assert "<b>" not in page
     assert "<i>" not in page
