@@ -27,6 +27,7 @@ from stiffness.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
+from validation.diagnosis.holdout import Split
 from validation.diagnosis.report import report_page
 from validation.diagnosis.results import corrected, effects, sentence, table, text
 
@@ -254,6 +255,16 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     fitted = predict(apply_effects(declared, {effect: values})).deviation[0]
     assert solved == pytest.approx(fitted, abs=1e-9)  # the reading turns finitely
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
+
+
+def test_without_rows_to_spare_nothing_is_said_of_rows_kept_aside(diagnosed):
+    """A campaign of one span of time: what is judged is what was fitted."""
+    found = diagnosed("none")
+    everything = Split(np.ones(len(found.campaign), dtype=bool), "no rows: too few")
+    alone = replace(found, split=everything)
+    assert "kept aside" not in sentence(alone) + text(alone)
+    assert "on the rows fitted, too few to spare any" in sentence(alone)
+    assert "kept aside" in sentence(found)
 
 
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs

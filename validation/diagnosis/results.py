@@ -125,13 +125,12 @@ def _next(found: Diagnosis) -> dict[str, Any] | None:
 
 def sentence(found: Diagnosis) -> str:
     """What may be said, and no more."""
-    kept = (
-        f"on rows kept aside the residual is {found.before.normalised:.2f} sigma before"
-    )
+    where = _judged_on(found)
+    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
     if found.verdict == "none_needed":
         return (
             "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({found.before.normalised:.2f} sigma on rows kept aside)."
+            f"can tell ({found.before.normalised:.2f} sigma on {where})."
         )
     if found.verdict == "explained":
         names = " and ".join(found.claimed)
@@ -149,6 +148,12 @@ def sentence(found: Diagnosis) -> str:
         "No effect of the library explains the residual: at best "
         f"{found.lack.rms:.2f} sigma are left, which vary with {seen}."
     )
+
+
+def _judged_on(found: Diagnosis) -> str:
+    """Which rows the errors before and after are of."""
+    aside = ~found.split.fitted
+    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
 
 
 def calibration_text(tally: Calibration) -> str:
@@ -177,7 +182,8 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     lines += ["", "sets of effects, by probability:"]
     for names, p in found.alternatives:
         lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    lines += ["", f"{'rows kept aside':<20}{'before':>12}{'after':>12}{'noise':>12}"]
+    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
+    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
         row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
         if name == "normalised":
