@@ -287,8 +287,10 @@ def test_the_command_does_not_pass_a_robot_without_errors(more):
 
 def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
     """The errors of the file replace the robot's; the seed says which draw."""
-    target = tmp_path / "check.json"
-    example = Path(__file__).parent.parent / "examples" / "irsbot2_errors.toml"
+    target, root = tmp_path / "check.json", Path(__file__).parent.parent
+    example = root / "examples" / "irsbot2_errors.toml"
+    said = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
+    assert said in (root / "README.md").read_text(encoding="utf-8")
     words = ["irsbot2", "--errors", str(example), "--pose", "tx=0,tz=-0.5"]
     said = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
     assert said.exit_code == 0, said.output

@@ -244,8 +244,8 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml: cannot be read"),
-        ('robot = "irsbot2"', "", "robot: missing; expected a string"),
+        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml\", neither a"),
+        ('robot = "irsbot2"', "", "robot: missing; expected a built-in robot or a"),
         ("seed = 1", "", "errors.seed: missing; expected a whole number >= 0"),
         ("seed = 1", "seed = -1", "errors.seed: found -1, expected a whole number"),
         ("seed = 1", "seed = 1\nsigns = 'up'", "errors.signs: found 'up', expected"),
