@@ -91,9 +91,21 @@ def _ends_up(results: StudyResults) -> str:
             f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
         )
     return "".join(said) + (
-        f" (certified bounds of (27), reading {WORST}); "
+        f" (certified bounds of (27), reading {WORST}{_wider(results)}); "
         f"with play resting at least energy it is {_pose_text(turn, shift)} away."
     )
+
+
+def _wider(results: StudyResults) -> str:
+    """What the other readings allow, where that is more than one per cent more."""
+    said = ""
+    own = results.error[WORST]
+    for reading, found in results.error.items():
+        parts = ("rotation", "translation")
+        if any(found[p]["upper"] > 1.01 * own[p]["upper"] for p in parts):
+            bounds = {part: found[part]["upper"] for part in parts}
+            said += f"; {reading}: {_bound_text(bounds)} at the study's pose"
+    return said
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
