@@ -3,6 +3,7 @@
 import html
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -223,6 +224,8 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in said
     assert "certified bounds of (27), reading frozen" in said
     assert "with play resting at least energy it is 0 mm" in said
+    lost = verdict(replace(found, error={}, maps=None))
+    assert "could not be bounded; with play resting at least energy" in lost
     page = report_page(found)
     assert page.count("play at least energy") >= 6  # a row for each component
     assert "anywhere while no deformation changes" in page

@@ -82,6 +82,9 @@ def _ends_up(results: StudyResults) -> str:
     worst = worst_play(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
+    at_rest = f"with play resting at least energy it is {_pose_text(turn, shift)} away."
+    if worst["pose"] is None:
+        return f"How far play lets its platform go could not be bounded; {at_rest}"
     bound = _bound_text(worst["pose"])
     said = [f"Wherever its play rests, its platform is {bound} from the nominal pose"]
     if worst["map"] is not None:
@@ -91,8 +94,7 @@ def _ends_up(results: StudyResults) -> str:
             f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
         )
     return "".join(said) + (
-        f" (certified bounds of (27), reading {WORST}{_wider(results)}); "
-        f"with play resting at least energy it is {_pose_text(turn, shift)} away."
+        f" (certified bounds of (27), reading {WORST}{_wider(results)}); {at_rest}"
     )
 
 
