@@ -22,6 +22,7 @@ from assembly.exact import ExactAssembly, solve_exact
 from assembly.finite_rows import solve_rows
 from assembly.flexibility import flexibility, in_groups
 from assembly.load import row_forces
+from assembly.nearest_pose import nearest_pose
 from assembly.posture import Posture
 from assembly.resting_play import at_rest, fractions, taken_up
 from assembly.solvers.conic import SolverFailed
@@ -41,7 +42,8 @@ class Prediction:
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without an answer.
         reason: (R,) why there is none, else empty.
-        open: (R,) bool, play leaves the pose free: the one shown has it in the middle.
+        open: (R,) bool, play leaves the pose free: the one shown is, in a closed chain,
+            the nearest to nominal, in an open one that of play in the middle.
     """
 
     deviation: NDArray
@@ -67,7 +69,8 @@ def predict(here: Conditions) -> Prediction:
         one_by_one = 0 if here.exact else None
     elif play and not here.robot.closures and not here.exact:
         here, open_ = taken_up(here)
-    screws, reason = _platform_screws(here, one_by_one)
+    screws, reason, left = _platform_screws(here, one_by_one)
+    open_ |= left
     if not here.exact:
         screws = screws + here.second_order
     known = np.isfinite(screws).all(axis=1)
@@ -79,9 +82,13 @@ def predict(here: Conditions) -> Prediction:
 
 def _platform_screws(
     here: Conditions, one_by_one: int | None = None
-) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws and (R,) why there are none; some rows one by one."""
-    screws = np.full((len(here), 6), np.nan)
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Platform screws, some rows one by one.
+
+    Returns:
+        (R, 6) the screws, (R,) why there are none, (R,) whether play leaves them free.
+    """
+    screws, open_ = np.full((len(here), 6), np.nan), np.zeros(len(here), dtype=bool)
     reason = np.full(len(here), "", dtype=object)
     left = np.ones(len(here), dtype=bool)
     if not virtual_joints(here.robot).cones.shape[1]:
@@ -90,11 +97,32 @@ def _platform_screws(
         screws[left], reason[left] = np.nan, "does not close together with others"
     for row in np.flatnonzero(left)[:one_by_one].tolist():
         try:
-            screws[row] = assemble_row(here, row).platform_screw
-            reason[row] = ""
+            answer, open_[row] = _settled(here, row)
+            screws[row], reason[row] = answer.platform_screw, ""
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
-    return screws, reason
+    return screws, reason, open_
+
+
+def _settled(here: Conditions, row: int) -> tuple[Assembly | ExactAssembly, bool]:
+    """One situation, play where the pose is nearest to nominal.
+
+    With finite motions that is so of the linear answer from which they start.
+
+    Returns:
+        The assembly, and whether play leaves its pose free.
+    """
+    answer = assemble_row(here, row)
+    offset = here.posture(row).platform[:3, :3] @ here.point
+    if isinstance(answer, Assembly):
+        return nearest_pose(answer, offset)
+    start, open_ = nearest_pose(answer.linear, offset)
+    if open_:
+        gravity = here.gravity[row] if here.gravity[row].any() else None
+        answer = solve_exact(
+            start.posture, here.load[row], start, gravity=gravity, point=here.point
+        )
+    return answer, open_
 
 
 def with_second_order(here: Conditions) -> Conditions:
@@ -160,7 +188,7 @@ def settle(here: Conditions) -> Conditions:
     rest = np.zeros_like(here.errors)
     for row in range(len(here)):
         try:
-            answer = assemble_row(here, row)
+            answer, _ = _settled(here, row)
         except (CannotAssemble, FreeMotion, SolverFailed):
             continue
         rest[row] = fractions(here.robot, answer.clearance_screws)

@@ -32,6 +32,18 @@ def printable(text: str) -> bool:
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
+def plot_label(text: str) -> str:
+    """A text as matplotlib must be given it to show it as it is written.
+
+    Args:
+        text: with a name in it that a user chose.
+
+    Returns:
+        The text; matplotlib reads a formula between two dollar signs.
+    """
+    return text.replace("$", r"\$")
+
+
 def quoted(name: str) -> str:
     """A name in double quotes, on one line and never pages of it."""
     return f'"{one_line(name, 60)}"'

@@ -84,6 +84,12 @@ def test_a_robot_may_be_built_in(tmp_path):
     assert read_campaign(folder).robot.name == load_robot("irsbot2").name
 
 
+def test_labels_in_any_script_and_spaces_are_read(tmp_path):
+    """Only control characters are refused, not what a spreadsheet may write."""
+    rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
+    assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
+
+
 def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
     """The same numbers in another dialect are the same campaign."""
     plain = read_campaign(write_campaign(tmp_path / "plain"))
@@ -163,6 +169,24 @@ BAD_TABLES = {
         r'it has ; in it: if that parts the cells, say \[table\] delimiter = ";"'),
     "decimal commas": (HEAD, [ROWS[0].replace("1.5", "1,5")],
         r"line 2: found 12 cells, expected 11 as in the header; if decimals are writ"),
+    "quoted decimal commas": (HEAD, [ROWS[0].replace("1e-05", '"0,00001"'), *ROWS[1:]],
+        r'line 2 \(id "m1"\), meas.tx: found "0,00001", expected a finite number \[m\]'
+        r'; a decimal "," is not read here: write "0.00001", or say \[table\] delimi'
+        r'ter = ";", decimal = "," in campaign.toml and part cells by ";"'),
+    "decimal commas under one label": (HEAD, [ROWS[0].replace("1.5", '"1,5"')] * 2,
+        r'line 2 \(id "m1"\), cov.temperature: found "1,5", .* a decimal "," is not'),
+    "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
+        r"line 2, \"id\": found 'm\\x00', expected text without line breaks and con"),
+    "NULs at the end": (HEAD, [*ROWS, "\0" * 50],
+        r"line 6, \"id\": found '\\x00.*', expected text without line breaks"),
+    "a NUL in a column's name": (HEAD.replace("cov.time", "cov.t\0"), ROWS,
+        r"line 1, column 10: found 'cov.t\\x00', expected text without"),
+    "a NUL in a number": (HEAD, [ROWS[0].replace("1e-05", "1\0e-05")],
+        r'line 2, "meas.tx": found \'1\\x00e-05\', expected text without'),
+    "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
+        r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
+    "a delete character": (HEAD, [ROWS[0].replace("m1", "m\x7f")],
+        r"line 2, \"id\": found 'm\\x7f', expected text without"),
     "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
     "empty": (None, [], r"measurements.csv: empty; expected a header"),
     "no rows": (HEAD, [], r"measurements.csv: no rows; expected one row a measurement"),

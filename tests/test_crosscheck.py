@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -249,11 +251,55 @@ def test_a_serial_robot_has_no_energy_and_still_a_slope():
     assert answer.pairs[0].simulated.energy == 0.0
 
 
-def test_no_errors_no_difference_no_slope():
+def test_without_errors_and_load_nothing_is_compared_and_nothing_passes():
     answer = crosscheck(triangle(np.zeros(6)))
-    assert answer.passed
+    assert {check.verdict for check in answer.checks.values()} == {"no signal"}
+    assert not answer.passed
+    assert answer.table()["verdict"] == "no signal"
+    assert answer.text().splitlines()[-1].startswith("NOT CHECKED: nothing stands out")
     assert math.isnan(answer.slope)
     assert answer.differences["translation"].max() < 1e-15  # rounding of 0.4 m
+
+
+def test_what_a_serial_robot_cannot_compare_is_counted_beside_what_passed():
+    """No spring carries anything: only the platform's pose says something."""
+    error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
+    frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
+    answer = crosscheck(home_posture(Robot("bar", "b", (frame, Frame("b", "a")))))
+    silent = {k for k, check in answer.checks.items() if check.verdict == "no signal"}
+    parts = ("link rotation", "link translation", "link moment", "link force", "energy")
+    assert {f"limit of {part}" for part in parts} <= silent
+    assert answer.checks["limit of platform rotation"].verdict == "ok"
+    assert answer.passed
+    said = answer.text().splitlines()
+    counted = f"{len(silent)} of {len(answer.checks)}"
+    assert said[-1] == f"passed; {counted} checks had nothing to compare"
+
+
+@pytest.mark.parametrize("more", [[], ["--clearances"]])
+def test_the_command_does_not_pass_a_robot_without_errors(more):
+    said = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
+    assert said.exit_code == 1
+    assert "NOT CHECKED" in said.output
+    assert "passed" not in said.output
+    assert not re.search(r"\bok\b", said.output)
+
+
+def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
+    """The errors of the file replace the robot's; the seed says which draw."""
+    target, root = tmp_path / "check.json", Path(__file__).parent.parent
+    example = root / "examples" / "irsbot2_errors.toml"
+    said = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
+    assert said in (root / "README.md").read_text(encoding="utf-8")
+    words = ["irsbot2", "--errors", str(example), "--pose", "tx=0,tz=-0.5"]
+    said = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
+    assert said.exit_code == 0, said.output
+    found = json.loads(target.read_text())
+    assert {check["verdict"] for check in found["checks"].values()} == {"ok"}
+    assert found["scales"][0]["vjm"]["energy"] > 0.1
+    again = run(*words, "--scale", "1,0.5,0.25", "--seed", "2", "--json", "-")
+    other = json.loads(again.output)["scales"][0]["vjm"]["energy"]
+    assert other != found["scales"][0]["vjm"]["energy"]
 
 
 def test_a_failed_simulation_says_so_in_a_table():

@@ -4,6 +4,7 @@ Quick ones on a planar arm worked out by hand, slow ones on simulated campaigns:
 and, where the data are at hand, those of another program.
 """
 
+import html
 import json
 import subprocess
 import sys
@@ -26,6 +27,8 @@ from stiffness.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
+from validation.diagnosis.holdout import Split
+from validation.diagnosis.report import report_page
 from validation.diagnosis.results import corrected, effects, sentence, table, text
 
 CAMPAIGNS = Path(__file__).parent / "campaigns"
@@ -260,6 +263,42 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     fitted = predict(apply_effects(declared, {effect: values})).deviation[0]
     assert solved == pytest.approx(fitted, abs=1e-9)  # the reading turns finitely
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
+
+
+def test_without_rows_to_spare_nothing_is_said_of_rows_kept_aside(diagnosed):
+    """A campaign of one span of time: what is judged is what was fitted."""
+    found = diagnosed("none")
+    everything = Split(np.ones(len(found.campaign), dtype=bool), "no rows: too few")
+    alone = replace(found, split=everything)
+    assert "kept aside" not in sentence(alone) + text(alone)
+    assert "on the rows fitted, too few to spare any" in sentence(alone)
+    assert "kept aside" in sentence(found)
+
+
+ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
+
+
+def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
+    """A frame, a covariate and an outlying row named as formulas and tags."""
+    found = diagnosed("none")
+    first, *others = found.campaign.robot.frames
+    named = (
+        replace(first, name=ODD[0]),
+        replace(others[0], parent=ODD[0]),
+        *others[1:],
+    )
+    far = np.arange(len(found.campaign)) == 3
+    campaign = replace(
+        found.campaign,
+        robot=replace(found.campaign.robot, frames=named),
+        covariates={ODD[1]: np.arange(len(found.campaign))},
+        ids=(*"abc", ODD[1], *found.campaign.ids[4:]),
+    )
+    page = report_page(replace(found, campaign=campaign, outliers=far))
+    assert html.escape(ODD[1]) in page
+    assert "&amp;lt;" not in page
+    assert "<b>" not in page
+    assert "<i>" not in page
 
 
 def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):

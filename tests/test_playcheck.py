@@ -21,6 +21,7 @@ from validation.multibody.contact import (
 from validation.multibody.exudyn_parts import OutOfTime
 from validation.multibody.simulation import simulate_assembly
 from validation.playcheck import playcheck
+from validation.verdict import verdict
 
 pytestmark = pytest.mark.exudyn
 
@@ -283,21 +284,25 @@ def drawn(name, size, pose=None):
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "pose"),
-    [("hexapod", 1.0, None), ("delta", 1.0, None),
-     ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5})],
+    ("name", "size", "pose", "said"),
+    [("hexapod", 1.0, None, "no signal"), ("delta", 1.0, None, "no signal"),
+     ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed")],
 )  # fmt: skip
-def test_play_that_takes_up_everything_costs_nothing(name, size, pose):
-    """No load, and errors within the play: any place in the valley, and no energy."""
+def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
+    """No load, and errors within the play: any place in the valley, and no energy.
+
+    That says something of the overconstrained robot only: the others close without
+    energy whatever their play.
+    """
     answer = playcheck(drawn(name, size, pose), (1.0, 0.5))
     assert answer.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert answer.pairs[0].simulated.energy < 1e-8
-    assert answer.passed
+    assert verdict(answer) == said
 
 
 @pytest.mark.parametrize(
     ("name", "load"),
-    [("hexapod", [0, 0, 0, 0, 0, -50]), ("delta", [0, 0, 0, 0, 0, -50]),
+    [("hexapod", [0, 0, 0, 0, 0, -200]), ("delta", [0, 0, 0, 0, 0, -50]),
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from assembly.robot_file import write_robot
+from assembly.robots import load_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.crosscheck import crosscheck
 from validation.multibody.simulation import SimulationFailed
@@ -69,3 +70,13 @@ def test_the_command_takes_a_grid(tmp_path, capsys, monkeypatch):
         forcefit.main()
     assert done.value.code == 2
     assert "--grid: not together with" in capsys.readouterr().err
+
+
+def test_a_pose_where_nothing_is_compared_is_not_passed():
+    """The built-in robot has no errors: at every pose zero is compared with zero."""
+    rows = check_poses(load_robot("irsbot2"), AXES, lambda p: crosscheck(p, (1.0, 0.5)))
+    assert [row["passed"] for row in rows] == [None, False, False]
+    assert not poses_table(rows)["passed"]
+    said = poses_text(rows).splitlines()
+    assert said[1].endswith("NOT CHECKED, nothing stands out of the noise")
+    assert said[-1] == "0 of 2 reachable poses passed"

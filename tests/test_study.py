@@ -1,17 +1,23 @@
 """Study files, the folder a study writes, and every message of a bad one."""
 
+import html
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
+from assembly.posture import place_robot
+from assembly.results import pose_error_of
 from assembly.robot_file import write_robot
+from assembly.robots import BUILT_IN
 from stiffness.reading import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
-from validation.report import results_table, verdict, write_study
+from validation.headline import worst_play
+from validation.report import report_page, results_table, verdict, write_study
 from validation.study import read_study, run_study
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "irsbot2.toml"
@@ -101,6 +107,137 @@ def test_a_study_of_a_robot_file_with_explicit_errors(tmp_path):
     assert results_table(found)["errors"] == "geometric errors given in the study file"
 
 
+ODD = "$l_1 <b>&amp; \\$"
+
+
+def test_a_report_shows_a_links_name_as_it_is_written(tmp_path):
+    robot = coaxial_beams(np.zeros(6))
+    write_robot(robot, tmp_path / "beams.toml")
+    text = (tmp_path / "beams.toml").read_text().replace('"two"', f"'{ODD}'")
+    (tmp_path / "beams.toml").write_text(text)
+    study = f"robot = \"beams.toml\"\n[errors.explicit]\n'{ODD}' = [0,0,0,2e-4,0,0]\n"
+    study += "[checks]\ncrosscheck = false\npicture = false\n"
+    found = run_study(read_study(study_file(tmp_path, study), tmp_path / "out"))
+    write_study(found)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"<td>{html.escape(ODD)}</td>" in page
+    assert "<b>" not in page
+
+
+SLOW = pytest.mark.slow
+QUIET = "[checks]\npicture = false\n"
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in {"four_bar", "3rrr"} else pytest.param(name, marks=SLOW)
+        for name in BUILT_IN
+    ],
+)
+def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
+    tmp_path, name
+):
+    """Every built-in robot; it once ended in a division by zero, or passed."""
+    text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
+    if name == "irsbot2":
+        text += "[pose]\ntx = 0.0\ntz = -0.5\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
+    assert not found.passed
+    assert "No independent check of these numbers could be made" in verdict(found)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "What could not be checked" in page
+    assert "the robot has no geometric errors" in page
+    table = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert table["passed"] is False
+    assert set(table["unchecked"]) == {"reference", "crosscheck"}
+
+
+JUST_CONSTRAINED = """
+robot = "hexapod"
+scales = [1.0, 0.5]
+[errors]
+seed = 1
+least = [0, 0, 0, 0, 0, 0]
+most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
+"""
+
+
+@pytest.mark.exudyn
+def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
+    """Its errors cost neither energy nor play: the simulation alone has a say."""
+    text = JUST_CONSTRAINED + QUIET
+    found = run_study(read_study(study_file(tmp_path, text)))
+    assert found.verdicts == {"reference": "no signal", "crosscheck": "passed"}
+    assert set(found.unchecked) == {"reference"}
+    assert found.passed  # nobody asked for the reference by name
+    said = verdict(found)
+    assert "checks of these numbers: 1; they passed. Not checked: reference." in said
+    text += "reference = true\ncrosscheck = false\n"
+    found = run_study(read_study(study_file(tmp_path, text)))
+    assert not found.passed
+
+
+def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
+    text = SMALL.replace("tz=-0.5:-0.4:0.1", "tz=-5:-4:0.5") + QUIET
+    text += "crosscheck = false\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "passed"}
+    assert found.unchecked == {"maps": "none of the grid's points has an answer"}
+    assert not found.passed
+    assert "No point has an answer" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
+    import assembly.reference
+
+    def lost(*_):
+        raise RuntimeError("cvxpy: the problem is unbounded")
+
+    monkeypatch.setattr(assembly.reference, "reference_energy", lost)
+    text = SMALL + QUIET + "crosscheck = false\nmaps = false\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "no answer"}
+    assert not found.passed
+    assert "Not compared: cvxpy: the problem" in report_page(found)
+
+
+def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
+    """A five-bar's play, free: least energy rests it in the middle.
+
+    The bound at a pose is that of ``assembly error``, over the map the largest of the
+    bounds there; a pose error with another play says which.
+    """
+    text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
+    text += QUIET + "crosscheck = false\nreference = false\n"
+    text += "[pose]\ntx = 0.0\nty = 0.15\n"
+    found = run_study(read_study(study_file(tmp_path, text)))
+    worst = worst_play(found)
+    bounds = pose_error_of(place_robot(found.robot, found.study.pose), ["frozen"])
+    here = bounds["error"]["frozen"]["translation"]["upper"]
+    assert worst["pose"]["translation"] == pytest.approx(here, abs=1e-6)
+    upper = found.maps["translation_error"].sel(bound="upper").values
+    assert worst["map"]["translation"] == np.nanmax(upper)
+    least = np.linalg.norm(found.solution["platform_screw"][3:])
+    assert worst["pose"]["translation"] > 2e-5 > 10 * least
+    said = verdict(found)
+    assert f"at most {1e3 * here:.3g} mm" in said
+    assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in said
+    assert "certified bounds of (27), reading frozen" in said
+    assert "with play resting at least energy it is 0 mm" in said
+    lost = verdict(replace(found, error={}, maps=None))
+    assert "could not be bounded; with play resting at least energy" in lost
+    page = report_page(found)
+    assert page.count("play at least energy") >= 6  # a row for each component
+    assert "anywhere while no deformation changes" in page
+    assert "[mm], play anywhere" in page
+
+
 def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path):
     from assembly.robot import Frame, Robot
 
@@ -116,8 +253,8 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml: cannot be read"),
-        ('robot = "irsbot2"', "", "robot: missing; expected a string"),
+        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml\", neither a"),
+        ('robot = "irsbot2"', "", "robot: missing; expected a built-in robot or a"),
         ("seed = 1", "", "errors.seed: missing; expected a whole number >= 0"),
         ("seed = 1", "seed = -1", "errors.seed: found -1, expected a whole number"),
         ("seed = 1", "seed = 1\nsigns = 'up'", "errors.signs: found 'up', expected"),
@@ -133,6 +270,10 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
         ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: this check"),
         ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
         ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
+        ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
+        ("title", "scales = [1.0]\ntitle", "expected at least two different factors"),
+        ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
+        ("title", "scales = [[1]]\ntitle", "scales: found [1] as number 1, expected"),
         ("title", "title = 1 #", "title: found 1, expected a string"),
         ("title", "title", None),
     ],

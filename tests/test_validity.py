@@ -228,6 +228,32 @@ def test_a_thick_bar_is_stiffer_than_its_beam_because_its_ends_are_held(posture)
     np.testing.assert_allclose(values, np.linalg.eigvalsh(K), rtol=1e-6)
 
 
+def test_without_errors_and_load_an_assumption_costs_nothing_known(tmp_path):
+    """Both models store rounding: their ratio is not a cost."""
+    target = tmp_path / "costs.json"
+    words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", str(target)]
+    said = CliRunner().invoke(app, words)
+    assert said.exit_code == 1
+    assert "beyond" not in said.output
+    assert "nothing to compare" in said.output
+    costs = json.loads(target.read_text())["costs"]
+    assert "nothing to compare" in costs["linear closures"]["reason"]
+    assert "nothing to compare" in costs["disc and cone, not two bushes"]["reason"]
+
+
+def test_where_no_energy_is_stored_the_pose_still_has_a_cost():
+    """A serial bar turned by t at its base: the tip's shift is off by l t^2 / 2."""
+    frames = (
+        Frame("a", geometric_error=[0, 0, 0.01, 0, 0, 0]),
+        Frame("b", "a", translation=[0.5, 0, 0]),
+    )
+    cost = closure_cost(home_posture(Robot("bar", "b", frames)))
+    assert cost.position == pytest.approx(0.5 * 0.01**2 / 2, rel=1e-3)
+    assert np.isnan(cost.energy)
+    assert cost.known
+    assert cost.matters
+
+
 def test_the_command_says_which_assumptions_matter(tmp_path):
     """Disc and cone do on the paper's robot; what was not asked for says why."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"

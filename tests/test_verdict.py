@@ -87,14 +87,40 @@ def test_what_six_scales_do_not_tell_is_said():
     assert verdict(answer) == "not decided"
 
 
-def test_nothing_but_noise_passes():
+def test_nothing_but_noise_neither_fails_nor_passes():
     """Simulations resolve a hundredth of the floor; the extrapolation makes 15 of 1."""
 
     def solve(s):
         return Scale(s, 0.0, 1e-14)
 
     answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
-    assert answer.checks["limit"].verdict == "ok"
+    assert [check.verdict for check in answer.checks.values()] == ["no signal"] * 2
+    assert verdict(answer) == "no signal"
+    assert len(answer.pairs) == 4
+
+
+def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
+    """Ours is zero: a signal in the other is a difference, however small ours is."""
+
+    def solve(s):
+        return Scale(s, 0.0, 1e-6 * s)
+
+    answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
+    assert answer.checks["limit"].verdict == "fails"
+    assert verdict(answer) == "failed"
+
+
+def test_no_checks_at_all_do_not_pass():
+    class Empty(Found):
+        def __post_init__(self):
+            self.checks = {}
+
+    answer = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
+    assert verdict(answer) == "no signal"
+
+
+def test_a_value_that_is_not_a_number_is_not_known():
+    assert Check(np.nan, 1.0).verdict == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -106,6 +132,10 @@ def test_nothing_but_noise_passes():
         (Check(1.5, 1.0, 0.6), "undecided"),
         (Check(0.5, 1.0, 2.0), "undecided"),
         (Check(0.5, 1.0, 1.0), "ok"),
+        (Check(0.5, 1.0, signal=False), "no signal"),
+        (Check(np.nan, 1.0, signal=False), "no signal"),
+        (Check(1.5, 1.0, signal=False), "fails"),
+        (Check(0.5, 1.0, 2.0, signal=False), "undecided"),
     ],
 )
 def test_a_check_knows_what_it_does_not_know(check, expected):

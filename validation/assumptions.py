@@ -1,5 +1,6 @@
 """All four assumptions of :mod:`validation.validity` at one posture, as a table."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -23,6 +24,8 @@ from validation.validity import (
     link_cost,
     spread_cost,
 )
+
+NOTHING = "nothing to compare: without errors and load neither model moves"
 
 
 def assumption_costs(
@@ -54,7 +57,8 @@ def assumption_costs(
     found: dict[str, Cost | str] = {}
     for name, cost in asked.items():
         try:
-            found[name] = cost()
+            known = cost()
+            found[name] = known if known.known else NOTHING
         except (CannotAssemble, FreeMotion, SolverFailed, _NotAsked) as error:
             found[name] = str(error)
     return found
@@ -116,6 +120,13 @@ def costs_text(posture: Posture, costs: Mapping[str, Cost | str]) -> str:
         mark = "  beyond 20 um or 1 %" if cost.matters else ""
         lines.append(
             f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
-            f"urad  {100 * cost.energy:8.3g} % of the energy{mark}"
+            f"urad  {_energy_text(cost.energy)}{mark}"
         )
     return "\n".join(lines)
+
+
+def _energy_text(share: float) -> str:
+    """A relative difference of energies; without any there is none."""
+    if math.isnan(share):
+        return "no energy is stored"
+    return f"{100 * share:8.3g} % of the energy"

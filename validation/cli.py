@@ -1,6 +1,7 @@
 """The commands ``forcefit validation ...``: parse, call one function, print or save."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,6 +42,26 @@ def validation() -> None:
     """Is it true?"""
 
 
+ErrorsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="How errors are distributed (TOML); one draw of them, not the robot's own."
+    ),
+]
+SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0)]
+
+
+def _with_errors(posture: "Posture", errors: Path | None, seed: int) -> "Posture":
+    """The posture with one draw of errors, or with the robot's own."""
+    if errors is None:
+        return posture
+    from assembly.statistics.distributions import read_sources
+
+    sources = read_sources(errors, posture.robot)
+    drawn = sources.errors(sources.draw(0, 1, seed)[0])
+    return replace(posture, robot=posture.robot.with_errors(drawn))
+
+
 def parse_scales(text: str) -> list[float]:
     """Factors on the errors, from ``--scale``.
 
@@ -70,6 +91,8 @@ def crosscheck(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -102,7 +125,8 @@ def crosscheck(
 
     The scales are of errors and loads.  Joint clearances are left out on both sides
     unless asked for; energies and springs are then compared instead of poses.  Exit
-    status 1 when a check fails.
+    status 1 when a check fails, or when the robot has neither errors nor a load:
+    nothing is then compared.
     """
     from assembly.effects.acting import act
     from validation.crosscheck import Crosscheck, attempt
@@ -117,7 +141,8 @@ def crosscheck(
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
     def compare(posture: "Posture") -> Crosscheck | PlayCheck:
-        acting = act(posture, wrench, g, covariates)
+        given = _with_errors(posture, errors, seed)
+        acting = act(given, wrench, g, covariates)
         at, pushes = acting.posture, acting.load.tolist()
         weight = None if acting.gravity is None else acting.gravity.tolist()
         if clearances:
@@ -166,6 +191,8 @@ def validity(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
     load: LoadOption = None,
     gravity: GravityOption = None,
     solids: Annotated[
@@ -180,13 +207,17 @@ def validity(
 
     In position, rotation and energy: linear closures, beams instead of solids, weight
     at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
-    or 1 % is marked.
+    or 1 % is marked.  Exit status 1 when there is nothing to compare: a robot without
+    errors and load.
     """
     from validation.assumptions import assumption_costs, costs_table, costs_text
+    from validation.validity import Cost
 
-    posture = posture_of(robot, pose, joint)
+    posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     costs = assumption_costs(posture, wrench, g, solids)
     write_json(costs_table(posture, costs), json)
     if json != "-":
         print(costs_text(posture, costs))
+    if not any(isinstance(cost, Cost) for cost in costs.values()):
+        raise typer.Exit(1)

@@ -161,15 +161,14 @@ class Crosscheck:
                 self.scales, values, FLOOR[name], 2.0, SLOPE_TOLERANCE
             )
             for name, values in self.differences.items()
-            if not math.isnan(self.slopes[name])
         }
         limits = {f"limit of {name}": check for name, check in self.limits.items()}
         shares = {
             f"{name} that finite rotations do not explain": Check(
-                share, EXPLAINED_TOLERANCE
+                share, EXPLAINED_TOLERANCE, signal=not math.isnan(share)
             )
             for name, share in self.unexplained.items()
-            if self.links == "spring" and not math.isnan(share)
+            if self.links == "spring"
         }
         return slopes | limits | shares
 

@@ -67,8 +67,13 @@ def spring_limits(
                 )
     ours = np.array([pair.linear_energy for pair in pairs])
     theirs = np.array([pair.simulated.rigid_energy for pair in pairs])
-    least = float((stiff * screw**2).max())
+    least = energy_floor(robot)
     return limits | {"energy": limit_difference(scales, ours, theirs, 2, least)}
+
+
+def energy_floor(robot: Robot) -> float:
+    """[J] energies below it are noise: :data:`FLOOR` in the stiffest spring."""
+    return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
 def limit_difference(
@@ -87,12 +92,15 @@ def limit_difference(
         least_size: relative to which, at least, in the unit of the values at scale 1.
 
     Returns:
-        [-] the difference; at most the bound if only noise is left.
+        [-] the difference; at most the bound if only noise is left.  There is a signal
+        where the bound on our largest value is above the noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
-    size = max(np.abs(ours * weight).max(), floor / bound, least_size, 1e-300)
-    return Check(limit / size, bound, max(0.0, change - 2 * floor) / size)
+    largest = np.abs(ours * weight).max()
+    size = max(largest, floor / bound, least_size, 1e-300)
+    unsure = max(0.0, change - 2 * floor) / size
+    return Check(limit / size, bound, unsure, signal=not largest < size)
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
@@ -159,9 +167,12 @@ def slope_check(
 
     Returns:
         The difference, not known to what leaving out the largest scale changes; from
-        two scales alone nothing can be held against it.
+        two scales alone nothing can be held against it.  Without two values above the
+        floor there is no slope, and no signal.
     """
     slope = fit_slope(scales, values, floor)
+    if math.isnan(slope):
+        return Check(math.nan, bound, signal=False)
     fewer = fit_slope(scales[1:], values[1:], floor)
     change = abs(slope - fewer) if not math.isnan(fewer) else math.inf
     value = abs(slope - expected)

@@ -12,6 +12,11 @@ from validation.crosscheck import Crosscheck, attempt
 from validation.playcheck import PlayCheck
 
 Answer = Crosscheck | PlayCheck
+_VERDICTS = {
+    "passed": "passed",
+    "not decided": "NOT DECIDED",
+    "no signal": "NOT CHECKED, nothing stands out of the noise",
+}
 
 
 def check_poses(
@@ -76,7 +81,9 @@ def poses_text(rows: list[dict[str, Any]]) -> str:
         slope = row.get("slope")
         known = slope is not None and np.isfinite(slope)
         said = f"slope {slope:.4f}, " if known else ""
-        verdict = {True: "passed", False: "FAILED", None: "not checked"}[row["passed"]]
+        verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
+        if row["passed"] is None:
+            verdict = "not checked"
         status = "" if row["status"] == "ok" else f" ({row['status']})"
         lines.append(f"{where}: {said}{verdict}{status}")
     found = poses_table(rows)

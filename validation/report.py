@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.zone import ASSEMBLABLE
 from stiffness.reading import BadInput
 from stiffness.screws import SCREW
 from stiffness.writing import write_json
+from validation.headline import verdict, worst_play
 from validation.html import (
     html_figure,
     html_image,
@@ -18,7 +20,22 @@ from validation.html import (
     html_table,
     png_bytes,
 )
-from validation.study import StudyResults
+from validation.study import StudyResults, points_solved
+from validation.verdict import verdict_text
+
+_PLAY_OF = {
+    "frozen": "anywhere while no deformation changes",
+    "free": "anywhere, and compliant joints turn about their own axis",
+    "budget": "anywhere, and springs too, with 5 % more than the least energy",
+}
+# of the maps: key, name, factor
+_MAPPED = (
+    ("margin", "zone margin, eq. (21)", 1.0),
+    ("margin_free", "zone margin, compliant joints free", 1.0),
+    ("energy", "energy, eq. (22) [J]", 1.0),
+    ("rotation_error", "largest turn, eq. (27) [mrad], play anywhere", 1e3),
+    ("translation_error", "largest shift, eq. (27) [mm], play anywhere", 1e3),
+)
 
 
 def write_study(results: StudyResults) -> Path:
@@ -57,6 +74,9 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "errors": results.study.errors,
         "links": results.study.source,
         "passed": results.passed,
+        "verdicts": results.verdicts,
+        "unchecked": results.unchecked,
+        "worst_play": worst_play(results),
         "solution": results.solution,
         "error": results.error,
         "reference": results.reference,
@@ -75,12 +95,18 @@ def map_summary(maps: Any) -> dict[str, Any]:
     """Least, median and largest value of each map, and the counts of the statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
-    for key in ("margin", "margin_free", "energy"):
-        values = maps[key].values[np.isfinite(maps[key].values)]
+    found = {key: maps[key].values for key in ("margin", "margin_free", "energy")}
+    for key in ("rotation_error", "translation_error"):
+        found[key] = maps[key].sel(bound="upper").values
+    for key, values in found.items():
+        values = values[~np.isnan(values)] if "error" in key else (
+            values[np.isfinite(values)]
+        )  # fmt: skip
         if len(values):
             summary[key] = [values.min(), float(np.median(values)), values.max()]
-    share = (maps["margin_free"] <= 1 + 1e-6).sum() / (maps["status"] == "ok").sum()
-    return summary | {"share_assemblable_free": float(share)}
+    solved = points_solved(maps)
+    share = int((maps["margin_free"] <= ASSEMBLABLE).sum()) / solved if solved else None
+    return summary | {"share_assemblable_free": share}
 
 
 def report_page(results: StudyResults) -> str:
@@ -93,6 +119,7 @@ def report_page(results: StudyResults) -> str:
         f"{html.escape(study.errors)}; link stiffness: {study.source}. "
         f"forcefit {version('forcefit')}. SI units, screws [R T], wrenches [M F].</p>",
         _verdict(results),
+        _unchecked(results),
         _solution(results),
     ]
     if results.reference is not None:
@@ -115,35 +142,12 @@ def _verdict(results: StudyResults) -> str:
     return f"<p class='verdict {kind}'>{html.escape(verdict(results))}</p>"
 
 
-def verdict(results: StudyResults) -> str:
-    """What the study found, in three sentences.
-
-    Args:
-        results: of :func:`validation.study.run_study`.
-
-    Returns:
-        Plain text.
-    """
-    solution = results.solution
-    if solution["status"] != "ok":
-        return f"No answer at this pose: {solution['status']}, {solution['reason']}."
-    zone = solution["zone"]
-    if zone["assemblable"] or zone["assemblable_free"]:
-        goes = "It goes together by its clearances alone"
-        goes += "" if zone["assemblable"] else " if its compliant joints turn freely"
-    else:
-        goes = f"It goes together only by force: {solution['energy']:.4g} J"
-        if zone["margin_free"] is not None:
-            goes += f", its play being {zone['margin_free']:.3g} times too small"
-    screw = solution["platform_screw"]
-    ends = (
-        f"The platform ends up {1e3 * np.linalg.norm(screw[3:]):.3g} mm and "
-        f"{1e3 * np.linalg.norm(screw[:3]):.3g} mrad from its nominal pose."
-    )
-    checks = [c for c in (results.reference, results.crosscheck) if c is not None]
-    how = "passed" if results.passed else "did not all pass"
-    said = f"Independent checks of these numbers: {len(checks)}; they {how}."
-    return f"{goes}. {ends} {said if checks else ''}".strip()
+def _unchecked(results: StudyResults) -> str:
+    """What could not be checked, and why."""
+    if not results.unchecked:
+        return ""
+    rows = [[name, why] for name, why in results.unchecked.items()]
+    return "<h2>What could not be checked</h2>" + html_table(["check", "why"], rows)
 
 
 def _solution(results: StudyResults) -> str:
@@ -160,7 +164,8 @@ def _solution(results: StudyResults) -> str:
     if solution["status"] == "ok":
         rows.append(["energy, eq. (22) [J]", f"{solution['energy']:.9g}"])
         for name, value in zip(SCREW, solution["platform_screw"], strict=True):
-            rows.append([f"platform error {name} [rad, m]", f"{value:.6e}"])
+            quantity = f"platform error {name} [rad, m], play at least energy"
+            rows.append([quantity, f"{value:.6e}"])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {key}", f"{value:.2e}"])
         rows += _linearisation_rows(solution["linearisation_error"])
@@ -195,13 +200,11 @@ def _pose_error(results: StudyResults) -> str:
         row = [reading]
         for key in ("rotation", "translation"):
             row += [f"{1e3 * found[key][side]:.6g}" for side in ("lower", "upper")]
-        rows.append(row)
-    head = ["reading", "rotation >=", "<= [mrad]", "translation >=", "<= [mm]"]
+        rows.append([*row, _PLAY_OF[reading]])
+    head = ["reading", "rotation >=", "<= [mrad]", "translation >=", "<= [mm]", "play"]
     return (
         "<p>Largest error of the platform's pose, problem (27), between certified "
-        "bounds. Frozen: deformations stay as they are. Free: compliant joints also "
-        "turn about their own axis. Budget: all that closes with 5 % more energy.</p>"
-        + html_table(head, rows)
+        "bounds.</p>" + html_table(head, rows)
     )
 
 
@@ -209,7 +212,7 @@ def _wrenches(results: StudyResults) -> str:
     """Wrench through each elastic link."""
     frames = results.solution["frames"]
     rows = [
-        [html.escape(f.name), *(f"{v:.4g}" for v in frames[f.name]["wrench"])]
+        [f.name, *(f"{v:.4g}" for v in frames[f.name]["wrench"])]
         for f in results.robot.frames
         if f.link is not None
     ]
@@ -224,12 +227,18 @@ def _reference(results: StudyResults) -> str:
     """The printed problems solved again."""
     reference, solution = results.reference, results.solution
     assert reference is not None
+    if "reason" in reference:
+        return (
+            "<h2>The same problems as printed, in cvxpy</h2>"
+            f"<p>Not compared: {html.escape(reference['reason'])}</p>"
+        )
     ours = {"energy": solution["energy"], "margin": solution["zone"]["margin"]}
     ours["margin_free"] = solution["zone"]["margin_free"]
     rows = [
-        [k, _number(ours[k], 10), _number(reference[k], 10), f"{d:.1e}"]
+        [k, _number(ours[k], 10), _number(reference[k], 10),
+         "nothing to compare" if np.isnan(d) else f"{d:.1e}"]
         for k, d in reference["relative_difference"].items()
-    ]
+    ]  # fmt: skip
     return (
         "<h2>The same problems as printed, in cvxpy</h2>"
         "<p>Every screw of every frame a variable, every constraint an equation of the "
@@ -282,21 +291,26 @@ def _maps(results: StudyResults) -> str:
 
     summary = map_summary(results.maps)
     rows = [
-        [key, *(f"{v:.4g}" for v in summary[key])]
-        for key in ("margin", "margin_free", "energy")
+        [said, *(f"{factor * v:.4g}" for v in summary[key])]
+        for key, said, factor in _MAPPED
         if key in summary
     ]
-    said = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
-    share = 100 * summary["share_assemblable_free"]
+    said = html.escape(", ".join(f"{k}: {v}" for k, v in summary["status"].items()))
+    share = summary["share_assemblable_free"]
+    if share is None:
+        return f"<h2>Over the workspace</h2><p>{said}. No point has an answer.</p>"
     axes = [d for d in results.maps["energy"].dims if results.maps.sizes[d] > 1]
     picture = ""
     if len(axes) == 2:
-        picture = html_figure(map_figure(results.maps), "Maps over the grid.")
+        picture = html_figure(
+            map_figure(results.maps),
+            "Maps over the grid; the platform's errors are the bounds of (27), play "
+            "anywhere.",
+        )
     return (
-        f"<h2>Over the workspace</h2><p>{html.escape(said)}. Assembles rigidly with "
-        f"compliant joints free at {share:.1f} % of the points.</p>"
-        + html_table(["", "least", "median", "largest"], rows)
-        + picture
+        f"<h2>Over the workspace</h2><p>{said}. Assembles rigidly with "
+        f"compliant joints free at {100 * share:.1f} % of the points with an answer."
+        "</p>" + html_table(["", "least", "median", "largest"], rows) + picture
     )
 
 
@@ -308,7 +322,10 @@ def _picture(results: StudyResults) -> str:
     plotter = robot_plotter(results.answer)
     pixels = plotter.screenshot(return_img=True)
     plotter.close()
-    caption = "Nominal (grey) and forced robot; the exaggeration is on the picture."
+    caption = (
+        "Nominal (grey) and forced robot, its play at least energy; the exaggeration "
+        "is on the picture."
+    )
     return "<h2>The forced robot</h2>" + html_image(png_bytes(pixels), caption)
 
 
@@ -330,11 +347,20 @@ def _crosscheck(results: StudyResults) -> str:
         head + "The same forced assembly, without "
         "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
         "A linearised model must differ from it by the square of the errors' size: "
-        f"slope 2. Measured: {check.slope:.3f}.</p>"
+        f"slope 2. {_slope_text(check.slope)} {html.escape(verdict_text(check))}.</p>"
         + html_table(check.header(), check.rows())
-        + html_figure(slope_figure(check), "Difference of the platform's pose.")
+        + html_figure(
+            slope_figure(check), "Difference of the platform's pose, without play."
+        )
         + closing
     )
+
+
+def _slope_text(slope: float) -> str:
+    """The slope measured, if there is one."""
+    if np.isnan(slope):
+        return "Nothing separates the two here, so there is no slope."
+    return f"Measured: {slope:.3f}."
 
 
 def _left_out() -> str:

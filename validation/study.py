@@ -4,6 +4,7 @@ A study file is TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` 
 Everything in it is read and checked before any work begins.
 """
 
+import os.path
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +25,7 @@ from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.sweep import sweep_poses
 from assembly.sweeps.targets import parse_grid
 from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput, Table, read_toml
+from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.surface import UNITS
 from validation.crosscheck import Crosscheck, try_crosscheck
 from validation.multibody.simulation import (
@@ -32,6 +33,8 @@ from validation.multibody.simulation import (
     closing_sequence,
     without_clearance,
 )
+from validation.printed import compare_printed
+from validation.verdict import SCALES, check_scales, verdict
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
@@ -53,6 +56,7 @@ class Study:
         grid: axes of the maps by pose component; empty for none.
         scales: of the errors in the cross-check; empty for none.
         checks: names of the checks to run.
+        asked: those of them that the file asks for by name, by a grid or by scales.
         folder: to write.
     """
 
@@ -66,6 +70,7 @@ class Study:
     grid: dict[str, NDArray]
     scales: tuple[float, ...]
     checks: tuple[str, ...]
+    asked: tuple[str, ...]
     folder: Path
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -81,8 +86,7 @@ class StudyResults:
         solution: keys of ``assembly solve`` at the study's pose.
         answer: the assembly behind it, None if it cannot be assembled.
         error: bounds of (27) by reading, as ``assembly error`` gives them.
-        reference: energy, pose error and margins by the transcription in cvxpy, and
-            the largest relative differences.
+        reference: of :func:`validation.printed.compare_printed`.
         stiffness: by frame: K_E of the beam and of the finite elements.
         maps: data set over the grid.
         crosscheck: against the multibody simulation.
@@ -106,13 +110,52 @@ class StudyResults:
     __repr__, _repr_html_ = short_repr, html_table
 
     @property
+    def verdicts(self) -> dict[str, str]:
+        """Of each independent check that was to be run: passed, failed, or what else.
+
+        ``"no signal"`` where there was nothing to compare, ``"not run"`` where there is
+        no assembly to check.
+        """
+        independent = ("reference", "crosscheck")
+        found = {n: "not run" for n in independent if n in self.study.checks}
+        if self.reference is not None:
+            found["reference"] = self.reference["verdict"]
+        if self.crosscheck is not None:
+            found["crosscheck"] = verdict(self.crosscheck)
+        elif self.crosscheck_failure:
+            found["crosscheck"] = "no answer"
+        return found
+
+    @property
+    def unchecked(self) -> dict[str, str]:
+        """What could not be checked, and why."""
+        silent = "its errors ask nothing of its springs and play at this pose"
+        if not self.robot.errors.any():
+            silent = "the robot has no geometric errors; [errors] would give it some"
+        why = {"not run": "there is no assembly to check", "no signal": silent}
+        found = {k: why[v] for k, v in self.verdicts.items() if v in why}
+        if self.reference is not None and "reason" in self.reference:
+            found["reference"] = self.reference["reason"]
+        if self.crosscheck_failure:
+            found["crosscheck"] = self.crosscheck_failure
+        if self.maps is not None and not points_solved(self.maps):
+            found["maps"] = "none of the grid's points has an answer"
+        return found
+
+    @property
     def passed(self) -> bool:
-        """Whether every check that was run holds."""
+        """Whether the answer is proved and every check holds.
+
+        A check that found nothing to compare does not hold if it was asked for, or if
+        no other one ran.
+        """
+        found, missing = self.verdicts, self.unchecked
+        ran = [v for v in found.values() if v != "no signal"]
         return (
             self.solution["status"] == "ok"
-            and (self.reference is None or self.reference["passed"])
-            and (self.crosscheck is None or self.crosscheck.passed)
-            and not self.crosscheck_failure
+            and all(v == "passed" for v in ran)
+            and (bool(ran) or not found)
+            and not set(missing) & set(self.study.asked)
         )
 
 
@@ -131,14 +174,16 @@ def read_study(path: Path | str, folder: Path | None = None) -> Study:
     """
     path = Path(path)
     root = read_toml(path)
-    name = root.text("robot")
-    robot = load_robot(name if name in BUILT_IN else path.parent / name)
+    robot = _robot(root, path.parent)
     robot, errors = _errors(root, robot)
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
     grid = root.text("grid", " ").strip()
+    by_key = {"maps": "grid", "crosscheck": "scales"}
+    asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
-    checks = _checks(root, bool(meshes), bool(grid), bool(scales))
+    checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
+    wanted = tuple(c for c in checks if c in named | asked_by_key)
     asked = root.text("output", f"{path.stem}_study")
     title = root.text("title", f"{robot.name}: forced assembly")
     root.finish()
@@ -147,12 +192,23 @@ def read_study(path: Path | str, folder: Path | None = None) -> Study:
     except BadInput as error:
         raise root.bad("", str(error)) from None
     folder = folder or Path(asked)
-    if folder.exists() and not folder.is_dir():
+    if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"{folder}: found a file, expected a folder or nothing")
     return Study(
         title, robot, errors, source, meshes, accuracy, pose, axes, scales, checks,
-        folder,
+        wanted, folder,
     )  # fmt: skip
+
+
+def _robot(root: Table, folder: Path) -> Robot:
+    """The robot: built in, or a file beside the study's."""
+    name = root.text("robot", expected="a built-in robot or a robot file")
+    if name in BUILT_IN:
+        return load_robot(name)
+    if not os.path.isfile(folder / name):
+        found = f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+        raise root.bad("robot", f"{found}{nearest(name, BUILT_IN)}")
+    return load_robot(folder / name)
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
@@ -209,7 +265,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
     meshes: dict[str, MeshLink] = {}
     if table.has("surface"):
         surface = Path(root.file).parent / table.text("surface")
-        if not surface.is_file():
+        if not os.path.isfile(surface):
             raise table.bad("surface", f"no such file: {surface}")
         beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
         wanted = _frames(table, robot, [f.name for f in beams])
@@ -239,25 +295,37 @@ def _pose(root: Table) -> dict[str, float]:
 
 def _scales(root: Table) -> tuple[float, ...]:
     """Scales of the cross-check."""
-    value = root.get("scales", [1.0, 0.5, 0.25, 0.125])
+    if not root.has("scales"):
+        return SCALES
+    value = root.get("scales")
     if not isinstance(value, list) or len(value) > 20:
         raise root.bad("scales", "expected a list of factors")
-    return tuple(root.array("scales", (len(value),), "-", np.array(value, dtype=float)))
+    if not value:
+        return ()
+    try:
+        given = root.array("scales", (len(value),), "-").tolist()
+        return tuple(check_scales(given))
+    except BadInput as error:
+        said = str(error).removeprefix(f"{root.file}: ")
+        raise root.bad("", said.replace("scale:", "scales:")) from None
 
 
-def _checks(root: Table, meshes: bool, grid: bool, scales: bool) -> tuple[str, ...]:
-    """Checks to run: those asked for, else all that the file gives the input of."""
+def _checks(
+    root: Table, meshes: bool, grid: bool, scales: bool
+) -> tuple[tuple[str, ...], set[str]]:
+    """Checks to run, all that the file gives the input of; and those it names."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
-        return tuple(c for c in _CHECKS if possible.get(c, True))
+        return tuple(c for c in _CHECKS if possible.get(c, True)), set()
     table = root.table("checks")
+    named = {c for c in _CHECKS if table.has(c)}
     chosen = tuple(c for c in _CHECKS if table.boolean(c, possible.get(c, True)))
     for check in chosen:
         if not possible.get(check, True):
             need = {"stiffness": "[links] surface", "maps": "grid"}.get(check, "scales")
             raise table.bad(check, f'this check needs "{need}" in the study file')
     table.finish()
-    return chosen
+    return chosen, named
 
 
 def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResults:
@@ -287,7 +355,9 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     progress("assembly", 1, 1)
     reference = None
     if "reference" in wanted and answer is not None:
-        reference = _compare_reference(posture, answer, solution["zone"], progress)
+        progress("reference", 0, 1)
+        reference = compare_printed(posture, answer, solution["zone"])
+        progress("reference", 1, 1)
     maps = None
     if "maps" in wanted:
         maps = sweep_poses(
@@ -303,6 +373,11 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         study, robot, solution, answer, error or {}, reference, stiffness, maps, check,
         failure.get("reason", ""), closing,
     )  # fmt: skip
+
+
+def points_solved(maps: Any) -> int:
+    """Number of a grid's points that have an answer."""
+    return int((maps["status"] == "ok").sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:
@@ -346,41 +421,3 @@ def _beams(frame: Frame) -> dict[str, NDArray]:
         name: np.linalg.inv(link_compliance(replace(frame, link=link)))
         for name, link in links.items()
     }
-
-
-def _compare_reference(
-    posture: Posture, answer: Assembly, zone: dict[str, Any], progress: Progress
-) -> dict[str, Any]:
-    """The printed problems in cvxpy, and the largest relative differences."""
-    from assembly.reference import reference_energy, reference_margin
-
-    progress("reference", 0, 3)
-    energy, screw = reference_energy(posture)
-    progress("reference", 1, 3)
-    margins = {}
-    for done, key in enumerate(("rigid", "free"), 2):
-        margins[key] = reference_margin(posture, key)
-        progress("reference", done, 3)
-    ours = {"rigid": zone["margin"], "free": zone["margin_free"]}
-    scale = max(answer.energy, 1e-6 * answer.energy_without_play)
-    difference = {
-        "energy": abs(energy - answer.energy) / scale,
-        "margin": _relative(ours["rigid"], margins["rigid"]),
-        "margin_free": _relative(ours["free"], margins["free"]),
-    }
-    return {
-        "energy": energy,
-        "platform_screw": screw,
-        "margin": margins["rigid"],
-        "margin_free": margins["free"],
-        "relative_difference": difference,
-        "tolerance": 1e-6,
-        "passed": max(difference.values()) < 1e-6,
-    }
-
-
-def _relative(a: float | None, b: float | None) -> float:
-    """Relative difference of two margins; zero if neither exists."""
-    if a is None or b is None:
-        return 0.0 if a is b else np.inf
-    return abs(a - b) / max(abs(a), abs(b), 1e-12)

@@ -13,11 +13,13 @@ disc and cone       a pin in two bushes, :mod:`validation.bushes`
 
 A cost is a difference of the platform's pose and a relative difference of the energy.
 It counts where it exceeds one per cent or 20 um, the paper's robot's own target.
+Where neither model stores energy or moves the platform there is nothing to compare.
 
 Poses are compared at the solution of least energy.  Where play that no load takes up
 leaves a flat valley, that pose is one of many; ``docs/validity.md`` says where.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -31,6 +33,7 @@ from assembly.load import forces_on
 from assembly.posture import Posture
 from assembly.robot import MatrixLink
 from validation.bushes import solve_bushes
+from validation.limits import FLOOR, HALVES, energy_floor
 from validation.spread_weight import energy_between_ends, half_weights
 
 POSITION_LIMIT = 20e-6  # [m]
@@ -39,7 +42,7 @@ ENERGY_LIMIT = 0.01  # [-]
 
 @dataclass(frozen=True)
 class Cost:
-    """What an assumption costs.
+    """What an assumption costs; NaN where both models give nothing but rounding.
 
     Attributes:
         rotation: [rad] by which the platform's orientation is off.
@@ -56,6 +59,11 @@ class Cost:
         """Whether it costs more than one per cent or 20 um."""
         return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
 
+    @property
+    def known(self) -> bool:
+        """Whether there was anything to compare."""
+        return not (math.isnan(self.position) and math.isnan(self.energy))
+
 
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
@@ -71,14 +79,21 @@ def cost_between(
         The cost.  Without loads, energies below 1e-6 of what closing without play
         would take count as that: inside an assembly zone both are rounding.
     """
-    screw = model.platform_screw - better.platform_screw
     energy = better.energy + missing
     least = 0.0 if model.forces else 1e-6 * model.energy_without_play
-    scale = max(energy, least, 1e-300)
+    stored = max(energy, model.energy, 1e6 * least) > energy_floor(model.posture.robot)
+    moved = np.abs([model.platform_screw, better.platform_screw]).max(axis=0)
+    turn, shift = (
+        float(np.linalg.norm((model.platform_screw - better.platform_screw)[half]))
+        for half in HALVES.values()
+    )
+    nothing = not stored and all(
+        (moved[half] < FLOOR[name]).all() for name, half in HALVES.items()
+    )
     return Cost(
-        float(np.linalg.norm(screw[:3])),
-        float(np.linalg.norm(screw[3:])),
-        abs(model.energy - energy) / scale,
+        math.nan if nothing else turn,
+        math.nan if nothing else shift,
+        abs(model.energy - energy) / max(energy, least) if stored else math.nan,
     )
 
 

@@ -4,6 +4,9 @@ At large errors and few scales a limit is not known to its bound: what looks wro
 be of higher order, and what is wrong may hide behind it.  Then smaller scales are
 added, each half of the last, until every check is decided: a wrong term of first order
 stays, all others fade.  Nothing fails on fewer than four scales.
+
+Where a quantity does not stand out of the noise of either model (a robot without errors
+and load) nothing was compared: such a check does not hold, it has not run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +21,7 @@ from stiffness.reading import BadInput
 from validation.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
+NO_SIGNAL = "not checked, nothing to compare"
 _FEWEST, _MOST = 4, 6  # scales on which a check may fail; at which none is added
 
 
@@ -29,17 +33,26 @@ class Check:
         value: best estimate, >= 0.
         bound: on it.
         unsure: what the value is not known to.
+        signal: whether what is compared stands out of the noise.
     """
 
     value: float
     bound: float
     unsure: float = 0.0
+    signal: bool = True
 
     @property
     def verdict(self) -> str:
-        """``"ok"``, ``"fails"``, or ``"undecided"`` if it is not known well enough."""
+        """Whether it holds.
+
+        ``"ok"``; ``"fails"``; ``"undecided"`` if it is not known well enough; ``"no
+        signal"`` if there is nothing that it could be about.
+        """
         if self.value - self.unsure > self.bound:
             return "fails"
+        if not self.signal and not max(self.value, self.unsure) > self.bound:
+            return "no signal"
+        # a value that is not a number is not known
         known = self.value <= self.bound and self.unsure <= self.bound
         return "ok" if known else "undecided"
 
@@ -86,13 +99,21 @@ Answer = TypeVar("Answer", bound=Comparison)
 
 
 def verdict(answer: Comparison) -> str:
-    """``"passed"``, ``"failed"``, or ``"not decided"`` on the scales there are."""
+    """What was found on the scales there are.
+
+    Args:
+        answer: of a comparison.
+
+    Returns:
+        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` where no check
+        had anything to compare.
+    """
     found = {check.verdict for check in answer.checks.values()}
-    if found <= {"ok"}:
-        return "passed"
     if "fails" in found and len(answer.pairs) >= _FEWEST:
         return "failed"
-    return "not decided"
+    if found & {"fails", "undecided"}:
+        return "not decided"
+    return "passed" if "ok" in found else "no signal"
 
 
 def compare_scales(
@@ -171,6 +192,7 @@ def comparison_table(answer: Comparison, more: Mapping[str, Any]) -> dict[str, A
                 "value": check.value,
                 "tolerance": check.bound,
                 "uncertainty": check.unsure,
+                "verdict": check.verdict,
                 "passed": check.verdict == "ok",
             }
             for name, check in answer.checks.items()
@@ -194,11 +216,27 @@ def comparison_text(lines: list[str], answer: Comparison) -> str:
     lines = lines + ["  ".join(f"{cell:>26}" for cell in row) for row in table]
     words = {"ok": "ok", "fails": "FAILS", "undecided": "NOT DECIDED"}
     for name, check in answer.checks.items():
-        word = words[check.verdict]
-        lines.append(f"{name}: {check.value:.1e} (bound {check.bound:g}) {word}")
+        said = f"{check.value:.1e} (bound {check.bound:g})"
+        word = words.get(check.verdict)
+        lines.append(f"{name}: {NO_SIGNAL if word is None else f'{said} {word}'}")
     added = len(answer.pairs) - answer.asked
     if added:
         lines.append(f"scales added to tell: {added}")
-    ends = {"passed": "passed", "failed": "FAILED", "not decided": "NOT DECIDED: the "
-            "errors are too large for these scales; ask for smaller ones"}  # fmt: skip
-    return "\n".join([*lines, ends[verdict(answer)]])
+    return "\n".join([*lines, verdict_text(answer)])
+
+
+def verdict_text(answer: Comparison) -> str:
+    """The verdict in a few words; what it does not rest on is counted."""
+    ends = {
+        "passed": "passed",
+        "failed": "FAILED",
+        "not decided": "NOT DECIDED: the errors are too large for these scales; ask "
+        "for smaller ones",
+        "no signal": "NOT CHECKED: nothing stands out of the noise; a robot without "
+        "errors and load compares zero with zero",
+    }
+    found = verdict(answer)
+    idle = sum(check.verdict == "no signal" for check in answer.checks.values())
+    if found == "passed" and idle:
+        return f"passed; {idle} of {len(answer.checks)} checks had nothing to compare"
+    return ends[found]

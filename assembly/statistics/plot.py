@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.statistics.estimates import most_probable, quantile
+from stiffness.message import plot_label
 
 if TYPE_CHECKING:
     import xarray
@@ -74,7 +75,7 @@ def histogram_figure(data: "xarray.Dataset") -> "Figure":
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     figure.suptitle(
-        f"{data.attrs.get('robot', '')}: {data.sizes['draw']} draws, "
+        f"{plot_label(str(data.attrs.get('robot', '')))}: {data.sizes['draw']} draws, "
         f"seed {data.attrs.get('seed', '')}"
     )
     return figure
@@ -137,7 +138,8 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
             panel.barh(np.arange(bars), value, width, xerr=off, color=colour,
                        error_kw={"lw": 0.8, "ecolor": "black"},
                        label=key.replace("_index", ""))  # fmt: skip
-        panel.set_yticks(np.arange(bars), one["group"].values[order], fontsize=8)
+        groups = [plot_label(str(name)) for name in one["group"].values[order]]
+        panel.set_yticks(np.arange(bars), groups, fontsize=8)
         panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:
@@ -179,7 +181,8 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
             panel.barh(np.arange(len(rows)) + 0.3, alike, 0.15, color="darkorange",
                        label="scaled alike")  # fmt: skip
         panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
-        panel.set_yticks(np.arange(len(rows)), data["class"].values[rows], fontsize=8)
+        classes = [plot_label(str(name)) for name in data["class"].values[rows]]
+        panel.set_yticks(np.arange(len(rows)), classes, fontsize=8)
         panel.set(xlabel=f"tolerance, plus or minus [{shown}]", xscale="log")
         if len(rows):
             panel.set_xlim(value.min() / 3, 2 * most.max())
@@ -188,5 +191,6 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
             panel.annotate(f" {one:.3g}", (one, i), va="center", fontsize=8)
         if not len(rows):
             panel.set_axis_off()
-    figure.suptitle(str(data.attrs.get("said", "")).replace("; ", "\n"), fontsize=9)
+    said = plot_label(str(data.attrs.get("said", ""))).replace("; ", "\n")
+    figure.suptitle(said, fontsize=9)
     return figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.message import plot_label
 from stiffness.reading import BadInput, nearest, quoted
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def figure_of(
         raise BadInput("figure: found a single point; expected an axis or two")
     figure = map_figure(view) if len(dims) == 2 else path_figure(view)
     if note:
-        figure.text(0.995, 0.995, note, ha="right", va="top", fontsize=8)
+        figure.text(0.995, 0.995, plot_label(note), ha="right", va="top", fontsize=8)
     return figure
 
 
@@ -260,7 +261,7 @@ def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) ->
 def _axis_name(data: "xarray.Dataset", name: str) -> str:
     """Name and unit of an axis."""
     unit = data[name].attrs.get("units")
-    return f"{name} [{unit}]" if unit else name
+    return plot_label(f"{name} [{unit}]" if unit else name)
 
 
 def _counts(data: "xarray.Dataset") -> str:
@@ -279,4 +280,4 @@ def _caption(data: "xarray.Dataset") -> str:
         })  # fmt: skip
         more = f" and {len(kinds) - 6} more" if len(kinds) > 6 else ""
         said += f"\nx: singularities near by ({'; '.join(kinds[:6])}{more})"
-    return said
+    return plot_label(said)

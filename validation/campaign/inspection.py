@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
+from numpy.typing import NDArray
+
+from assembly.predict import predict
 from stiffness.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.campaign.counts import (
@@ -21,6 +24,7 @@ from validation.campaign.measuring_order import Revisits, revisits
 from validation.campaign.remark import CAREFUL, LOST, Remark
 from validation.campaign.repeats import RepeatNoise, repeat_noise
 from validation.campaign.separability import Separability, compare_signatures
+from validation.diagnosis.signatures import conditions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +39,7 @@ class Inspection:
         signatures: of the library's effects.
         separability: their angles.
         remarks: sentences, those on what is lost first.
+        open: (R,) bool, rows where the robot's declared play leaves its pose free.
     """
 
     campaign: Campaign
@@ -44,6 +49,7 @@ class Inspection:
     signatures: DesignSignatures
     separability: Separability
     remarks: tuple[Remark, ...]
+    open: NDArray
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -74,6 +80,7 @@ class Inspection:
                 "shared": self.separability.shared,
             },
             "remarks": [asdict(r) for r in self.remarks],
+            "open": [i for i, free in zip(c.ids, self.open, strict=True) if free],
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
@@ -125,6 +132,7 @@ def inspect_campaign(
         signatures=signatures,
         separability=compare_signatures(signatures.columns, signatures.nuisance),
         remarks=tuple(remarks),
+        open=predict(conditions_of(campaign)).open,
     )
 
 

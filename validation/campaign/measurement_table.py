@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from assembly.posture import POSE
 from assembly.robot import Robot
-from stiffness.reading import BadInput, nearest, quoted, read_text
+from stiffness.message import BadInput, describe, nearest, printable, quoted
+from stiffness.reading import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
 
@@ -86,11 +87,12 @@ def read_table(path: Path, robot: Robot, dialect: Dialect) -> MeasurementTable:
                 f"{path}: line {line}: found {len(row)} cells, expected {len(header)} "
                 f"as in the header{_dialect_hint(row, len(header), dialect)}"
             )
-    ids = _labels(path, [row[header.index("id")] for row in rows], lines)
+    ids = tuple(row[header.index("id")] for row in rows)
     table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect)
     for k, name in enumerate(header):
         if name != "id":
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
+    _check_labels(table)  # after the numbers: a table of another dialect is that first
     return table
 
 
@@ -104,9 +106,23 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
             if row:  # not a blank line
                 lines.append(reader.line_num)
                 rows.append([cell.strip() for cell in row])
+                _check_printable(path, reader.line_num, rows)
     except csv.Error as error:
         raise BadInput(f"{path}: line {reader.line_num}: not CSV: {error}") from None
     return lines, rows
+
+
+def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
+    """Refuse control characters, NUL among them, in the last row read."""
+    header, row = rows[0], rows[-1]
+    for k, cell in enumerate(row):
+        if not cell.isprintable() and not printable(cell):
+            named = len(rows) > 1 and k < len(header)
+            column = quoted(header[k]) if named else f"column {k + 1}"
+            raise BadInput(
+                f"{path}: line {line}, {column}: found {describe(cell)}, expected text "
+                "without line breaks and control characters"
+            )
 
 
 def _header(path: Path, names: list[str], robot: Robot, dialect: Dialect) -> list[str]:
@@ -165,19 +181,19 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
     return ""
 
 
-def _labels(path: Path, labels: list[str], lines: list[int]) -> tuple[str, ...]:
-    """The ids, if each is there and is its own."""
+def _check_labels(table: MeasurementTable) -> None:
+    """Refuse an id that is missing or another row's."""
     seen: dict[str, int] = {}
-    for label, line in zip(labels, lines, strict=True):
+    for label, line in zip(table.ids, table.lines, strict=True):
+        where = f"{table.file}: line {line}, id"
         if not label:
-            raise BadInput(f"{path}: line {line}, id: empty; expected a label")
+            raise BadInput(f"{where}: empty; expected a label")
         if label in seen:
             raise BadInput(
-                f"{path}: line {line}, id: found {quoted(label)}, already the label of "
+                f"{where}: found {quoted(label)}, already the label of "
                 f"line {seen[label]}; expected another"
             )
         seen[label] = line
-    return tuple(labels)
 
 
 def _numbers(
@@ -206,7 +222,14 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
     """What a cell that is no number may have been meant to be."""
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
-        return f'; for decimals with "{other}" say [table] decimal = "{other}"'
+        written = quoted(cell.replace(other, dialect.decimal))
+        said = f'decimal = "{other}" in campaign.toml'
+        if other == dialect.delimiter:  # in quotes: the comma cannot part cells too
+            said = f'delimiter = ";", {said} and part cells by ";"'
+        return (
+            f'; a decimal "{other}" is not read here: write {written}, or say [table] '
+            f"{said}"
+        )
     if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:
         taken = name.startswith(("meas.", "sigma."))
         return "; leave the cell empty if it was not measured" if taken else ""

@@ -70,6 +70,8 @@ class Diagnosis:
         split: which rows were kept aside.
         outliers: (R,) bool, rows left out of everything.
         conditions: the campaign's, as declared and registered.
+        open: (R,) bool, rows where play leaves the pose free, in the declared model or
+            with the effects found; see :class:`assembly.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
         residual_after: (R, 6) [rad, m] reading minus the best set's model.
         screen: the scored hypotheses of the last round.
@@ -93,6 +95,7 @@ class Diagnosis:
     split: Split
     outliers: NDArray
     conditions: Conditions
+    open: NDArray
     residual_before: NDArray
     residual_after: NDArray
     screen: Screen
@@ -173,7 +176,8 @@ def _judge(
     probability = inclusion(found.screen, found.sets)
     best = named(found.screen, found.sets[0])
     linear = here if finite else replace(here, second_order=0.0)
-    before = measured - predict(linear).deviation
+    declared_model = predict(linear)
+    before = measured - declared_model.deviation
     if not finite and not found.sets[0].members:
         gain = np.sum(whiten(fitting, before[used]) ** 2) - found.fit.rss
         sets, probability = linear_or_finite(sets, probability, float(gain))
@@ -183,7 +187,9 @@ def _judge(
             found, best = replace(found, fit=fit), (FINITE,)
     said, claimed = verdict(sets, probability, lack.significant)
     after = apply_effects(here, found.fit.effects)
-    residual_after = measured - predict(after).deviation
+    explained = predict(after)
+    residual_after = measured - explained.deviation
+    open_ = declared_model.open | explained.open
     left: tuple[Trend, ...] = ()
     if said == "outside_library":
         left = tuple(trends(fitting, here.take(used), residual_after[used]))
@@ -207,7 +213,7 @@ def _judge(
         campaign, said, found.fit, claimed, probability, sets, best, lack,
         declared, _errors(campaign, before, held),
         _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
-        parts, outliers, here, before, residual_after, found.screen,
+        parts, outliers, here, open_, before, residual_after, found.screen,
         found.sets[0], left, further,
     )  # fmt: skip
 

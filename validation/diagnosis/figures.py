@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.message import plot_label
 from validation.campaign.separability import Separability, compare_signatures
 from validation.diagnosis.diagnose import Diagnosis
 
@@ -105,7 +106,7 @@ def covariate_figure(found: Diagnosis) -> "Figure":
             z = np.sqrt(np.nanmean((residual / found.campaign.sigma) ** 2, axis=1))
             panel.plot(values[kept], z[kept], ".", ms=4, color=color, label=label)
         panel.axhline(1.0, color="0.5", lw=0.8)
-        panel.set(xlabel=name, yscale="log")
+        panel.set(xlabel=plot_label(name), yscale="log")
     for panel in panels[len(varied) :]:
         panel.set_axis_off()
     panels[0].set_ylabel("residual / sigma")

@@ -4,6 +4,7 @@ import html
 from pathlib import Path
 
 from stiffness.reading import BadInput
+from validation.campaign.text import open_text
 from validation.diagnosis.diagnose import Diagnosis
 from validation.diagnosis.figures import (
     confounding_figure,
@@ -82,7 +83,7 @@ def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
     if tally is not None:
         parts += [
             "<h2>How often this is right</h2>",
-            f"<p>{calibration_text(tally)}</p>",
+            f"<p>{html.escape(calibration_text(tally))}</p>",
         ]
     return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
 
@@ -149,4 +150,9 @@ def _noise(found: Diagnosis) -> list[str]:
         f"<p>What is left is {lack.rms:.2f} of the stated sigma (probability "
         f"{lack.probability:.2g} by chance); {repeats}.</p>",
         f"<p>Left out as outliers: {html.escape(', '.join(far)) or 'none'}.</p>",
+        *(
+            [f"<p>{html.escape(open_text(found.open))}.</p>"]
+            if found.open.any()
+            else []
+        ),
     ]

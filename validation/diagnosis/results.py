@@ -6,6 +6,7 @@ from typing import Any
 
 from assembly.effects import LIBRARY
 from assembly.robot import Robot
+from validation.campaign.text import open_text
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.verdict import Calibration
@@ -51,6 +52,9 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
         },
         "outliers": [
             i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
+        ],
+        "open": [
+            i for i, free in zip(found.campaign.ids, found.open, strict=True) if free
         ],
         "structure": [
             {"against": t.against, "share": t.share, "probability": t.probability}
@@ -121,13 +125,12 @@ def _next(found: Diagnosis) -> dict[str, Any] | None:
 
 def sentence(found: Diagnosis) -> str:
     """What may be said, and no more."""
-    kept = (
-        f"on rows kept aside the residual is {found.before.normalised:.2f} sigma before"
-    )
+    where = _judged_on(found)
+    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
     if found.verdict == "none_needed":
         return (
             "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({found.before.normalised:.2f} sigma on rows kept aside)."
+            f"can tell ({found.before.normalised:.2f} sigma on {where})."
         )
     if found.verdict == "explained":
         names = " and ".join(found.claimed)
@@ -145,6 +148,12 @@ def sentence(found: Diagnosis) -> str:
         "No effect of the library explains the residual: at best "
         f"{found.lack.rms:.2f} sigma are left, which vary with {seen}."
     )
+
+
+def _judged_on(found: Diagnosis) -> str:
+    """Which rows the errors before and after are of."""
+    aside = ~found.split.fitted
+    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
 
 
 def calibration_text(tally: Calibration) -> str:
@@ -173,7 +182,8 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     lines += ["", "sets of effects, by probability:"]
     for names, p in found.alternatives:
         lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    lines += ["", f"{'rows kept aside':<20}{'before':>12}{'after':>12}{'noise':>12}"]
+    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
+    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
         row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
         if name == "normalised":
@@ -185,6 +195,8 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
     if far:
         lines += ["", f"left out as outliers: {', '.join(far)}"]
+    if found.open.any():
+        lines += ["", open_text(found.open)]
     for trend in found.trends:
         lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
     if found.next is not None:
