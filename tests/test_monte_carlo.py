@@ -16,13 +16,15 @@ from assembly.posture import place_robot
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.distributions import tolerance_sources
-from assembly.statistics.estimates import summarise
-from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.plot import (
     allocation_figure,
     histogram_figure,
     tornado_figure,
 )
+from assembly.statistics.quantities import parse_limit
+from assembly.statistics.summary import summarise
 from assembly.sweeps.sweep import journal_path
 from stiffness.reading import BadInput
 

@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.statistics.estimates import most_probable, quantile
+from assembly.statistics.play import PLAY
+from assembly.statistics.quantities import POSE_ERRORS
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
 KINDS = ("histogram", "tornado", "allocation")
+_MARGINS = ("margin", "margin_free")
 _SCALES = {
     "rotation": (1e3, "mrad"), "translation": (1e3, "mm"), "energy": (1.0, "J"),
     "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
@@ -71,11 +74,18 @@ def histogram_figure(data: "xarray.Dataset") -> "Figure":
     panels = figure.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
     for panel, name in zip(panels, names, strict=False):
         _histogram(panel, name, solved[name].values)
+        if name in POSE_ERRORS:
+            panel.set_title(f"play {data.attrs['play']}", fontsize=9)
+        if name in _MARGINS:
+            half = quantile(np.nan_to_num(data[name].values, nan=np.inf), 0.5)["value"]
+            said = f"median of all {data.sizes['draw']} draws: {half:.3g}"
+            panel.set_title(said, fontsize=9)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     figure.suptitle(
-        f"{data.attrs.get('robot', '')}: {data.sizes['draw']} draws, "
-        f"seed {data.attrs.get('seed', '')}"
+        f"{data.attrs.get('robot', '')}: of the {solved.sizes['draw']} of "
+        f"{data.sizes['draw']} draws that assemble, seed {data.attrs.get('seed', '')}"
+        f"\npose errors: play {data.attrs['play']}: {PLAY[data.attrs['play']]}"
     )
     return figure
 
@@ -139,6 +149,8 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
                        label=key.replace("_index", ""))  # fmt: skip
         panel.set_yticks(np.arange(bars), one["group"].values[order], fontsize=8)
         panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
+        if name in POSE_ERRORS:
+            panel.set_title(f"play {data.attrs['play']}", fontsize=9)
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:
         panel.set_axis_off()
