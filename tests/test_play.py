@@ -23,7 +23,7 @@ def generators(count, seed=3):
     return [draw_generator(seed, draw, 9) for draw in range(count)]
 
 
-def walked(rows, starts, count=4000, start=None):
+def walked(rows, starts, count=1500, start=None):
     """Many points, by default from the middle; all must be mixed."""
     starts = np.array(starts)
     u = np.zeros((count, starts[-1])) if start is None else np.tile(start, (count, 1))
@@ -105,7 +105,7 @@ def test_a_thin_segment_between_long_sides_is_uniform_along_all():
 
 
 def test_the_diagnosis_knows_independent_draws_and_a_slow_walk():
-    """AR(1) of correlation r has (1 - r) / (1 + r) of its draws' worth (Gelman 11.5)."""
+    """AR(1) of correlation r is worth (1 - r) / (1 + r) of its draws."""
     rng = np.random.default_rng(1)
     x = rng.normal(size=(4, 20_000))
     r_hat, effective = diagnose(x)
@@ -143,26 +143,26 @@ def near_the_edge(margin):
     return prepare_energies(posture), errors
 
 
-@pytest.mark.parametrize("margin", [0.5, 0.9, 0.99])
+@pytest.mark.parametrize("margin", [0.9, pytest.param(0.99, marks=pytest.mark.slow)])
 def test_near_the_edge_of_a_zone_longer_walks_change_no_distribution(margin):
-    """All mixed; and eight mixed walks in a row end nowhere else."""
+    """All mixed; and four mixed walks in a row end nowhere else."""
     one, errors = near_the_edge(margin)
-    found = one.solve(np.repeat(errors[None], 300, axis=0))
-    some, mixed = settle_play(one, found, "uniform", generators(300, 3))
+    found = one.solve(np.repeat(errors[None], 200, axis=0))
+    some, mixed = settle_play(one, found, "uniform", generators(200, 3))
     assert mixed.all()
-    more = [settle_longer(one, found, rng) for rng in generators(300, 4)]
+    more = [settle_longer(one, found, rng) for rng in generators(200, 4)]
     for a, b in zip(some.T, np.array(more).T, strict=True):
         assert stats.ks_2samp(a, b).pvalue > 1e-3
 
 
 def settle_longer(one, found, rng):
-    """Platform screw after eight mixed walks, one from where the other ended."""
+    """Platform screw after four mixed walks, one from where the other ended."""
     free = ~loaded_clearances(one, found)[0]
     rows = play_rows(one, ~free)[:, free]
     Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
     to_screw = np.ascontiguousarray(one.screws[:, : len(free)][:, free])
     u = found.clearances[0][free].copy()
-    for _ in range(8):
+    for _ in range(4):
         settle_uniformly(Z, free_starts(one, free), to_screw, u, rng)
     return found.platform_screw[0] + to_screw @ (u - found.clearances[0][free])
 

@@ -85,10 +85,10 @@ def _ellipsoid(Z: NDArray, starts: NDArray, u: NDArray) -> tuple[bool, NDArray]:
         Whether there is one; the axes, each a column.
     """
     nu, n = Z.shape
-    y, rho = np.zeros(n), 0.0
+    y = np.zeros(n)
     H, g, M = np.empty((n, n)), np.empty(n), np.zeros((nu, n))
     most = _largest(starts, u)
-    rho = 1.0 if most < 0.9 else 1.1 * most
+    rho = 1.0 if most < 0.95 else 1.1 * most
     for _ in range(_NEWTON):
         H[:], g[:] = 0.0, 0.0
         for k in range(len(starts) - 1):
