@@ -104,6 +104,67 @@ def test_a_run_that_was_killed_goes_on_and_ends_the_same(
             np.testing.assert_array_equal(found[name], whole[name])
 
 
+def test_a_kill_while_importance_is_found_loses_no_draw(
+    experiment, small_blocks, tmp_path
+):
+    """The whole file, importance too, ends in the same bytes."""
+    groups = (16, "kind")
+    path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
+    run_draws(experiment, 100, whole, importance=groups)
+    total = []
+
+    def kill(done, all_):
+        total.append(all_)
+        if done > 200:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        run_draws(experiment, 100, path, progress=kill, importance=groups)
+    assert total[0] > 200
+    assert not path.exists()
+    seen = []
+    run_draws(experiment, 100, path, progress=lambda d, n: seen.append(d),
+              importance=groups)  # fmt: skip
+    assert seen[0] > 200
+    assert path.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["statistics", "tolerances"])
+def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path):
+    """SIGKILL at growing times; what was computed is never computed again."""
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "plan.toml").write_text(
+        'yield = 0.9\ndraws = 200\n' + PLAN.replace(
+            "margin_free = 1.0", "margin_free = 2.0\ntranslation = 8e-4"
+        )
+    )  # fmt: skip
+    arguments = {
+        "statistics": ["--errors", "errors.toml", "--draws", "6000", "--importance",
+                       "64"],
+        "tolerances": ["--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml",
+                       "--fresh", "100"],
+    }[command]  # fmt: skip
+    base = ["assembly", command, "irsbot2", *arguments]
+    done = run(*base, "-o", "whole.nc", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
+    for wait in range(3, 60):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "forcefit", *base, "-o", "killed.nc"],
+            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            assert process.wait(wait) == 0
+            break
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if path.exists():  # killed once it was written, perhaps
+            break
+    assert path.read_bytes() == whole
+
+
 def test_another_seed_does_not_go_on_from_this_ones_journal(
     experiment, small_blocks, tmp_path
 ):

@@ -19,13 +19,15 @@ from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics import verification
 from assembly.statistics.allocation import allocate
 from assembly.statistics.distributions import tolerance_sources
-from assembly.statistics.requirement import Plan
+from assembly.statistics.replay import journalled
+from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.responses import respond
 from assembly.statistics.tolerance_file import read_plan
 from assembly.statistics.tolerances import (
     allocation_of,
     allocation_text,
     grid_postures,
+    identity_of,
     present_errors,
     present_text,
 )
@@ -35,6 +37,7 @@ from assembly.statistics.worst_case import (
     random_corners,
     worst_corner,
 )
+from assembly.sweeps.sweep import journal_path
 from assembly.zone import zone_margin
 from stiffness.reading import BadInput
 from tests.robots_for_tests import NUMBERS, irsbot2_with
@@ -85,6 +88,46 @@ def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
     assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
     assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
     assert found.verification["verdict"] == "no draw failed"
+
+
+def test_an_allocation_that_was_killed_asks_again_and_ends_the_same(tmp_path):
+    """Killed at its 5th and 9th result; each is computed once, all in all."""
+    robot = two_bars()
+    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
+                    asked_yield=0.9, draws=500)  # fmt: skip
+    postures, path = [place_robot(robot)], tmp_path / "t.nc"
+    whose, counted = identity_of(postures, plan, 50), []
+
+    class Killed(Exception):
+        pass
+
+    def counting(self, *given):
+        counted.append(len(given))
+        if len(counted) in {5, 9}:
+            raise Killed
+        return original(self, *given)
+
+    original = Requirement._quantities
+    plain = allocate(postures, plan, fresh=50)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Requirement, "_quantities", counting)
+        for _ in range(2):
+            with pytest.raises(Killed), journalled(path, whose) as replay:
+                allocate(postures, plan, fresh=50, replay=replay)
+            assert journal_path(path).exists()
+        with journalled(path, whose) as replay:
+            found = allocate(postures, plan, fresh=50, replay=replay)
+    with pytest.MonkeyPatch.context() as patch:
+        once = []
+        patch.setattr(
+            Requirement, "_quantities",
+            lambda self, *given: once.append(1) or original(self, *given),
+        )  # fmt: skip
+        allocate(postures, plan, fresh=50)
+    assert len(counted) == len(once) + 2
+    assert not journal_path(path).exists()
+    np.testing.assert_array_equal(found.tolerances, plain.tolerances)
+    assert found.verification == plain.verification
 
 
 def test_logarithmic_costs_share_the_play_by_the_costs_themselves():

@@ -172,16 +172,22 @@ def tolerances(
     """Say how much tighter errors must be; with a plan, how loose they may be.
 
     Without --plan the robot's own errors are judged: the factor on all of them at which
-    it goes together everywhere, and which errors it owes its margin to.
+    it goes together everywhere, and which errors it owes its margin to.  With OUTPUT,
+    what is computed is kept in OUTPUT.journal: the same command goes on from there
+    after a kill and ends in the same file.
     """
+    from dataclasses import replace
+
     from assembly.robots import load_robot
     from assembly.statistics.allocation import allocate
     from assembly.statistics.plot import allocation_figure
+    from assembly.statistics.replay import journalled
     from assembly.statistics.tolerance_file import read_plan
     from assembly.statistics.tolerances import (
         allocation_of,
         allocation_text,
         grid_postures,
+        identity_of,
         present_errors,
         present_text,
         tolerance_dataset,
@@ -195,11 +201,11 @@ def tolerances(
     for path in filter(None, (output, figure)):
         check_writable(path)
     machine = load_robot(robot)
-    asked = None if plan is None else read_plan(plan, machine)
+    asked = None if plan is None else replace(read_plan(plan, machine), play=play)
     postures = grid_postures(machine, grid)
     results: dict = {"robot": machine.name, "postures": len(postures)}
     said = []
-    with progress_bars() as update:
+    with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
                 postures, compliant, lambda d, n: update("present errors", d, n)
@@ -211,12 +217,14 @@ def tolerances(
                 "geometric_error, or ask for tolerances with --plan"
             )
         if asked is not None:
-            answer = allocate(postures, asked, fresh, update)
-            results["allocation"] = allocation_of(answer)
-            said.append(allocation_text(results["allocation"]))
-            data = tolerance_dataset(answer)
-            if output is not None:
-                save_dataset(data, output)
+            whose = identity_of(postures, asked, fresh)
+            with journalled(output, whose) as replay:
+                answer = allocate(postures, asked, fresh, update, replay)
+                results["allocation"] = allocation_of(answer)
+                said.append(allocation_text(results["allocation"]))
+                data = tolerance_dataset(answer)
+                if output is not None:
+                    save_dataset(data, output)
             if figure is not None:
                 save_figure(allocation_figure(data), figure)
     write_json(results, json)

@@ -7,14 +7,18 @@ change of the program, it is computed again.
 """
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.sweeps.journal import Journal
+from assembly.sweeps.journal import Journal, open_journal
+from assembly.sweeps.sweep import journal_path
 
 RECORD = np.dtype("u1")
 _DIGEST = 32
@@ -61,3 +65,27 @@ class Replay:
         record = np.frombuffer(digest.digest() + content.getvalue(), dtype=RECORD)
         self.journal.add(number, record, {})
         return found
+
+
+@contextmanager
+def journalled(
+    path: Path | None, whose: dict[str, Any]
+) -> Generator[Replay, None, None]:
+    """Results kept beside a file until it is written.
+
+    Args:
+        path: of the file; None to keep nothing.
+        whose: what must be the same for two computations to share results.
+
+    Yields:
+        Where results are kept; the journal goes when the block ends without an error.
+
+    Raises:
+        BadInput: the journal is of something else, or cannot be written.
+    """
+    if path is None:
+        yield Replay()
+        return
+    journal = open_journal(journal_path(path), whose, RECORD)
+    yield Replay(journal)
+    journal.path.unlink(missing_ok=True)

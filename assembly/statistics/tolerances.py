@@ -5,6 +5,7 @@ grid, the errors a robot has now, results as plain values and as a data set.
 """
 
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from assembly.solvers.conic import SolverFailed
 from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.allocation import Allocation
 from assembly.statistics.play import PLAY
+from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
 from assembly.sweeps.sweep import robot_hash
 from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
@@ -47,6 +49,21 @@ def grid_postures(robot: Robot, grid: str) -> list[Posture]:
     if not reached:
         raise BadInput(f"grid: no posture is reached; the first: {reasons[0]}")
     return reached
+
+
+def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
+    """What must be the same for two allocations to share what they computed."""
+    arrays = [p.transforms for p in postures]
+    for one in (plan, plan.sources):
+        arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
+    digest = sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
+    return {
+        "robot_sha256": robot_hash(plan.sources.robot),
+        "plan_and_postures_sha256": digest.hexdigest(),
+        "limits": str(dict(plan.limits)), "cost": plan.cost, "play": plan.play,
+        "yield": plan.asked_yield, "draws": plan.draws, "seed": plan.seed,
+        "fresh": fresh, "program": f"forcefit {version('forcefit')}",
+    }  # fmt: skip
 
 
 def present_errors(
