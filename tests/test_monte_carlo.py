@@ -149,7 +149,7 @@ def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path
     done = run(*base, "-o", "whole.nc", folder=tmp_path)
     assert done.returncode == 0, done.stderr
     path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
-    for wait in range(3, 60):
+    for wait in range(4, 90, 6):
         process = subprocess.Popen(
             [sys.executable, "-m", "forcefit", *base, "-o", "killed.nc"],
             cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
