@@ -17,6 +17,7 @@ from assembly.statistics.importance import (
     source_groups,
 )
 from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.play import PLAY
 from assembly.statistics.summary import summarise, summary_text
 
 
@@ -134,6 +135,26 @@ def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
     name, _, gain = lines[first + 1].split()[:3]
     assert (name, lines[first + 2].split()[0]) == ("one.TX", "two.TX")
     assert float(gain) == pytest.approx(0.9, rel=0.05)
+
+
+def test_random_play_is_not_taken_for_importance():
+    """A free disc of 0.1 mm of play at a driven arm's pin; the tip follows its error.
+
+    One um for each um whatever is assumed of play, which alone moves it by up to 100.
+    """
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=1e-4)),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
+    for play in PLAY:
+        experiment = Experiment(home_posture(robot), sources, play=play, margins=False)
+        said = summarise(run_draws(experiment, 20, importance=(500, "source")))
+        found = said["importance"]["platform"]["tip.TX"]
+        assert found["translation_gain"] == pytest.approx(1.0, rel=0.1)
+        expected = "worst" if play == "worst" else "least"
+        assert said["importance"]["play"] == expected
 
 
 def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):

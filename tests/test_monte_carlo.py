@@ -223,6 +223,8 @@ def test_the_commands_from_files_to_figures(tmp_path):
     assert said["draws"] == 200
     assert 0 < said["within_limits"]["probability"] < 1
     assert len(said["safety"]) == 4
+    assert said["play"] == said["quantities"]["translation"]["play"] == "worst"
+    assert "link_a.TX" in said["importance"]["platform"]
     done = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
         "--plan", "plan.toml", "--fresh", 50, "-o", "t.nc", "--json", "t.json",
@@ -232,7 +234,11 @@ def test_the_commands_from_files_to_figures(tmp_path):
     found = json.loads((tmp_path / "t.json").read_text())["allocation"]
     assert found["worst"]["margin_free"]["proven"] == pytest.approx(1, rel=1e-3)
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
-        assert len(histogram_figure(data).axes) == 8
+        figure = histogram_figure(data)
+        assert len(figure.axes) == 8
+        assert "pose errors: play worst: play anywhere" in figure.get_suptitle()
+        assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
+        assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
         assert len(tornado_figure(data).axes) == 6
     with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
         allocation_figure(data)

@@ -64,23 +64,14 @@ class Design:
     def __len__(self) -> int:
         return len(self.A) * (len(self.groups) + 2)
 
-    def rows(self, first: int, count: int) -> tuple[NDArray, NDArray]:
-        """Some of the rows, and whose other random numbers each of them shares.
-
-        Args:
-            first: row.
-            count: how many.
-
-        Returns:
-            (count, m), and (count,) numbers below 2 k: those of a row of A also belong
-            to the rows made from it, as if they were one more group.
-        """
+    def rows(self, first: int, count: int) -> NDArray:
+        """(count, m) rows from ``first`` on."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
             some = np.flatnonzero(matrix == g + 2)
             rows[np.ix_(some, columns)] = self.B[np.ix_(base[some], columns)]
-        return rows, base + len(self.A) * (matrix == 1)
+        return rows
 
 
 def sobol_importance(
@@ -104,8 +95,7 @@ def sobol_importance(
     """
     A, B = (sample(stream, count) for stream in STREAMS)
     design = Design(A, B, groups)
-    rows, _ = design.rows(0, len(design))
-    return sobol_indices(design, evaluate(rows), level)
+    return sobol_indices(design, evaluate(design.rows(0, len(design))), level)
 
 
 def sobol_indices(design: Design, results: NDArray, level: float = 0.95) -> Importance:

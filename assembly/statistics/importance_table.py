@@ -8,6 +8,7 @@ the platform's vector, so a platform that follows an error has a gain of 1.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +52,36 @@ def importance_design(experiment: Experiment, count: int, by: str) -> Design:
     sources = experiment.sources
     A, B = (sources.draw(0, count, experiment.seed, stream) for stream in STREAMS)
     return Design(A, B, source_groups(sources, by))
+
+
+def importance_rows(
+    experiment: Experiment, design: Design, first: int, count: int
+) -> NDArray:
+    """Answers to some rows of a design.
+
+    Random play is not the errors' doing, and would drown what is: it is then left
+    where the solution leaves it.
+
+    Args:
+        experiment: what is asked.
+        design: what is drawn.
+        first: row of it.
+        count: how many.
+
+    Returns:
+        (count,) of the experiment's record type.
+    """
+    asked = replace(experiment, play=importance_play(experiment))
+    found = asked.answer(design.rows(first, count), range(count))
+    rows = np.zeros(count, dtype=experiment.record_type)
+    for name in found.dtype.names or ():
+        rows[name] = found[name]
+    return rows
+
+
+def importance_play(experiment: Experiment) -> str:
+    """What the importance of an experiment's errors assumes of play."""
+    return "worst" if experiment.play == "worst" else "least"
 
 
 def importance_dataset(
@@ -98,7 +129,11 @@ def importance_dataset(
         "component": ["rotation", "translation"],
         "error_unit": ("group", _units(experiment.sources, design)),
     }  # fmt: skip
-    return xarray.Dataset(data, labels, {"importance_draws": len(design.A)})
+    said = {
+        "importance_draws": len(design.A),
+        "importance_play": importance_play(experiment),
+    }
+    return xarray.Dataset(data, labels, said)
 
 
 def _parts(
@@ -159,7 +194,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         for g, group in enumerate(groups)
     }  # fmt: skip
     return {
-        "base_draws": int(data.attrs["importance_draws"]), "quantities": quantities,
+        "base_draws": int(data.attrs["importance_draws"]),
+        "play": str(data.attrs["importance_play"]), "quantities": quantities,
         "platform": moved,
     }  # fmt: skip
 
@@ -167,7 +203,10 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 def importance_text(report: Mapping[str, Any]) -> str:
     """The same as a table: errors that move the platform most come first."""
     said = report["quantities"]
-    lines = [f"importance of the errors, {report['base_draws']} base draws:"]
+    lines = [
+        f"importance of the errors, {report['base_draws']} base draws, play "
+        f"{report['play']} in the shares, least in what moves the platform:"
+    ]
     for name, one in said.items():
         if "reason" in one:
             lines.append(f"{name}: {one['reason']}")

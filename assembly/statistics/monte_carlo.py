@@ -19,7 +19,11 @@ from threadpoolctl import threadpool_limits
 
 from assembly.posture import POSE
 from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance_table import importance_dataset, importance_design
+from assembly.statistics.importance_table import (
+    importance_dataset,
+    importance_design,
+    importance_rows,
+)
 from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
 from assembly.sweeps.dataset import save_dataset
@@ -72,7 +76,7 @@ def run_draws(
         if block < drawn:
             return experiment.solve(*spans[block])
         assert design is not None
-        return experiment.answer(*design.rows(*spans[block]))
+        return importance_rows(experiment, design, *spans[block])
 
     kept: dict[int, NDArray] = {}
     journal = None

@@ -150,7 +150,7 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
         panel.set_yticks(np.arange(bars), one["group"].values[order], fontsize=8)
         panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
         if name in POSE_ERRORS:
-            panel.set_title(f"play {data.attrs['play']}", fontsize=9)
+            panel.set_title(f"play {data.attrs['importance_play']}", fontsize=9)
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:
         panel.set_axis_off()
