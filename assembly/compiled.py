@@ -13,7 +13,7 @@ from typing import Any
 from numba import njit
 from numba.core import event
 
-kernel = partial(njit, cache=True, error_model="numpy")
+kernel = partial(njit, cache=True, error_model="numpy", nogil=True)
 part = partial(kernel, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 

@@ -27,7 +27,7 @@ OWNERS = {
     "xarray": (
         "assembly/sweeps/dataset.py",
         "assembly/statistics/monte_carlo.py",
-        "assembly/statistics/importance.py",
+        "assembly/statistics/importance_table.py",
         "assembly/statistics/tolerances.py",
         "assembly/tables.py",
         "stiffness/library.py",

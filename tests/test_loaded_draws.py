@@ -15,7 +15,8 @@ from assembly.robots import load_robot
 from assembly.solvers.one_posture import prepare_energies
 from assembly.statistics.cli import app
 from assembly.statistics.distributions import draw_generator, tolerance_sources
-from assembly.statistics.monte_carlo import Experiment, run_draws
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.play import settle_play
 from stiffness.reading import BadInput
 from tests.robots_for_tests import random_robot
@@ -101,7 +102,9 @@ def test_play_that_is_left_does_no_work_on_the_load(play, load):
     robot = load_robot("3rrr")
     one = prepare_energies(home_posture(robot), load)
     found = one.solve(some_errors(robot) / 50)
-    settled = settle_play(one, found, play, [draw_generator(1, d, 1) for d in range(8)])
+    generators = [draw_generator(1, d, 1) for d in range(8)]
+    settled, mixed = settle_play(one, found, play, generators)
+    assert mixed.all()
     moved = settled - found.platform_screw
     assert np.abs(moved).max() > 3e-5
     assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()

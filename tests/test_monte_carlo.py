@@ -16,13 +16,15 @@ from assembly.posture import place_robot
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.distributions import tolerance_sources
-from assembly.statistics.estimates import summarise
-from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.plot import (
     allocation_figure,
     histogram_figure,
     tornado_figure,
 )
+from assembly.statistics.quantities import parse_limit
+from assembly.statistics.summary import summarise
 from assembly.sweeps.sweep import journal_path
 from stiffness.reading import BadInput
 
@@ -102,6 +104,67 @@ def test_a_run_that_was_killed_goes_on_and_ends_the_same(
             np.testing.assert_array_equal(found[name], whole[name])
 
 
+def test_a_kill_while_importance_is_found_loses_no_draw(
+    experiment, small_blocks, tmp_path
+):
+    """The whole file, importance too, ends in the same bytes."""
+    groups = (16, "kind")
+    path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
+    run_draws(experiment, 100, whole, importance=groups)
+    total = []
+
+    def kill(done, all_):
+        total.append(all_)
+        if done > 200:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        run_draws(experiment, 100, path, progress=kill, importance=groups)
+    assert total[0] > 200
+    assert not path.exists()
+    seen = []
+    run_draws(experiment, 100, path, progress=lambda d, n: seen.append(d),
+              importance=groups)  # fmt: skip
+    assert seen[0] > 200
+    assert path.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["statistics", "tolerances"])
+def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path):
+    """SIGKILL at growing times; what was computed is never computed again."""
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "plan.toml").write_text(
+        'yield = 0.9\ndraws = 200\n' + PLAN.replace(
+            "margin_free = 1.0", "margin_free = 2.0\ntranslation = 8e-4"
+        )
+    )  # fmt: skip
+    arguments = {
+        "statistics": ["--errors", "errors.toml", "--draws", "6000", "--importance",
+                       "64"],
+        "tolerances": ["--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml",
+                       "--fresh", "100"],
+    }[command]  # fmt: skip
+    base = ["assembly", command, "irsbot2", *arguments]
+    done = run(*base, "-o", "whole.nc", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
+    for wait in range(4, 90, 6):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "forcefit", *base, "-o", "killed.nc"],
+            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            assert process.wait(wait) == 0
+            break
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if path.exists():  # killed once it was written, perhaps
+            break
+    assert path.read_bytes() == whole
+
+
 def test_another_seed_does_not_go_on_from_this_ones_journal(
     experiment, small_blocks, tmp_path
 ):
@@ -160,6 +223,8 @@ def test_the_commands_from_files_to_figures(tmp_path):
     assert said["draws"] == 200
     assert 0 < said["within_limits"]["probability"] < 1
     assert len(said["safety"]) == 4
+    assert said["play"] == said["quantities"]["translation"]["play"] == "worst"
+    assert "link_a.TX" in said["importance"]["platform"]
     done = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
         "--plan", "plan.toml", "--fresh", 50, "-o", "t.nc", "--json", "t.json",
@@ -169,7 +234,11 @@ def test_the_commands_from_files_to_figures(tmp_path):
     found = json.loads((tmp_path / "t.json").read_text())["allocation"]
     assert found["worst"]["margin_free"]["proven"] == pytest.approx(1, rel=1e-3)
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
-        assert len(histogram_figure(data).axes) == 8
+        figure = histogram_figure(data)
+        assert len(figure.axes) == 8
+        assert "pose errors: play worst: play anywhere" in figure.get_suptitle()
+        assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
+        assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
         assert len(tornado_figure(data).axes) == 6
     with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
         allocation_figure(data)

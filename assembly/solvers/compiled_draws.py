@@ -21,7 +21,7 @@ _PROJECTIONS, _INWARDS = 30, 0.8
 _MARGIN_GAP = 1e-8  # as in assembly.solvers.compiled_zone
 
 
-@kernel(nogil=True)
+@kernel
 def least_energies(
     solvers: ConeSolvers, Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
     cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
@@ -109,7 +109,7 @@ def least_energies(
         road[point] = SOLVED if fine else UNCERTIFIED
 
 
-@part(nogil=True)
+@part
 def _within(
     Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
 ) -> bool:
@@ -154,7 +154,7 @@ def _within(
     return False
 
 
-@kernel(nogil=True)
+@kernel
 def least_margins(
     solvers: ConeSolvers, B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
     bound: NDArray, pulls: NDArray,

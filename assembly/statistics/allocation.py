@@ -18,20 +18,10 @@ from numpy.typing import NDArray
 from assembly.posture import Posture
 from assembly.statistics.cutting_planes import cut_planes
 from assembly.statistics.least_cost import least_cost
-from assembly.statistics.requirement import (
-    FRESH,
-    SCALING,
-    TRAINING,
-    Plan,
-    Requirement,
-)
-from assembly.statistics.scaling import (
-    Samples,
-    draw_samples,
-    fit,
-    with_worst_corners,
-)
-from assembly.statistics.verification import prove_worst, verify_yield
+from assembly.statistics.replay import Replay
+from assembly.statistics.requirement import SCALING, TRAINING, Plan, Requirement
+from assembly.statistics.scaling import draw_samples, fit, with_worst_corners
+from assembly.statistics.verification import prove_worst, verify
 from stiffness.display import html_table, short_repr
 
 if TYPE_CHECKING:
@@ -39,7 +29,6 @@ if TYPE_CHECKING:
 
 
 _MORE_TO_SCALE = 4  # times the draws that shape the tolerances: one number costs little
-_MOST_VERIFICATIONS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +77,7 @@ def allocate(
     plan: Plan,
     fresh: int = 2000,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    replay: Replay | None = None,
 ) -> Allocation:
     """Find the cheapest tolerances that meet a plan over postures, and verify them.
 
@@ -96,30 +86,31 @@ def allocate(
         plan: what is asked.
         fresh: draws, none of which was used before, to verify with; 0 for none.
         progress: called with what is done, how far, and of how much.
+        replay: keeps what is computed, to go on from after a kill.
 
     Returns:
         The tolerances.
 
     Raises:
-        BadInput: an error is taken up by nothing, or even the tightest tolerances
-            violate a limit.
+        BadInput: an error is taken up by nothing, or perfect parts or even the
+            tightest tolerances violate a limit.
     """
-    work = Requirement(postures, plan)
+    replay = replay or Replay()
+    work = Requirement(postures, plan, replay)
+    work.check_perfect_parts()
     driver = work
     if not work.convex:
         # nothing convex is limited: the energy gives a shape to start from
         typical = _typical_energy(work)
-        driver = Requirement(postures, replace(plan, limits={"energy": typical}))
+        driver = Requirement(
+            postures, replace(plan, limits={"energy": typical}), replay
+        )
     driver.check_taken_up()
     shape, bound, cuts = cut_planes(driver, progress)
     t, alike = _fit_all(work, shape, progress)
     check: dict[str, Any] = {}
-    for again in range(_MOST_VERIFICATIONS if fresh else 0):
-        stream = FRESH + again
-        check = verify_yield(work, t, fresh, progress, stream)
-        if check["verdict"] != "contradicted":
-            break
-        t = _tightened(work, t, fresh, stream)
+    if fresh:
+        t, check = verify(work, t, fresh, progress)
     answer = Allocation(
         plan, t, plan.price(t), alike, plan.price(alike),
         bound if work.is_convex else np.nan, cuts, verification=check,
@@ -146,12 +137,6 @@ def _fit_all(
         samples = draw_samples(work, SCALING, _MORE_TO_SCALE)
     t, alike = fit(work, samples, t), fit(work, samples, shape)
     return min((t, alike), key=work.plan.price), alike
-
-
-def _tightened(work: Requirement, t: NDArray, fresh: int, stream: int) -> NDArray:
-    """Tolerances scaled until draws that contradicted them fit."""
-    allowed = int((1.0 - work.plan.asked_yield) * fresh)
-    return fit(work, Samples(work.plan.draws_of(stream, fresh), allowed), t)
 
 
 def _typical_energy(work: Requirement) -> float:

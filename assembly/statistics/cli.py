@@ -4,6 +4,8 @@ Importing this module adds them to the application.
 """
 
 import sys
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -26,6 +28,14 @@ from assembly.cli import (
 from stiffness.message import BadInput, nearest
 from stiffness.writing import check_writable, write_json
 
+PlayOption = Annotated[
+    str,
+    typer.Option(
+        help="What is assumed of play where a pose error is judged: worst (anywhere, "
+        "the largest error counts) | uniform | contact | least (as it is solved)."
+    ),
+]
+
 
 @app.command()
 def statistics(
@@ -37,9 +47,7 @@ def statistics(
     gravity: GravityOption = None,
     draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
-    play: Annotated[
-        str, typer.Option(help="Where play sits: least | uniform | contact.")
-    ] = "least",
+    play: PlayOption = "worst",
     limit: Annotated[
         list[str] | None,
         typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
@@ -73,18 +81,14 @@ def statistics(
     from there after a kill and ends in the same file.
     """
     from assembly.statistics.distributions import read_sources
-    from assembly.statistics.estimates import summarise, summary_text
-    from assembly.statistics.importance import importance_dataset
-    from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
-    from assembly.statistics.play import PLAY
+    from assembly.statistics.experiment import Experiment, precision_for
+    from assembly.statistics.monte_carlo import run_draws
     from assembly.statistics.plot import histogram_figure
-    from assembly.sweeps.dataset import save_dataset
+    from assembly.statistics.quantities import parse_limit
+    from assembly.statistics.summary import summarise, summary_text
 
-    for option, word, valid in (
-        ("--play", play, PLAY), ("--by", by, ("source", "frame", "kind"))
-    ):  # fmt: skip
-        if word not in valid:
-            raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
+    _check_play(play)
+    _check_word("--by", by, ("source", "frame", "kind"))
     if not 0 < confidence < 1:
         raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
@@ -98,35 +102,47 @@ def statistics(
     experiment = Experiment(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
+        precision=precision_for(limits),
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
-    try:
-        with progress_bars() as update:
-            data = run_draws(
-                experiment, draws, output, workers, lambda d, n: update("draws", d, n)
-            )
-            if importance is not None:
-                shares = importance_dataset(
-                    experiment, importance, by, confidence,
-                    lambda d, n: update("importance", d, n),
-                )  # fmt: skip
-                data = data.merge(shares, combine_attrs="no_conflicts")
-                if output is not None:
-                    save_dataset(data, output)
-    except KeyboardInterrupt:
-        kept = f"; finished draws are kept in {output}.journal" if output else ""
-        print(f"forcefit: interrupted{kept}", file=sys.stderr)
-        raise typer.Exit(130) from None
+    with _interruptible(output), progress_bars() as update:
+        data = run_draws(
+            experiment, draws, output, workers, lambda d, n: update("draws", d, n),
+            None if importance is None else (importance, by), confidence,
+        )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
     summary = {
-        "robot": posture.robot.name, "pose": posture.pose(), "seed": seed, "play": play,
+        "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
         **summarise(data, limits, yield_strength, confidence),
     }  # fmt: skip
     write_json(summary, json)
     if json != "-":
         print(summary_text(summary))
+
+
+def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
+    """Refuse what is none of a few words."""
+    if word not in valid:
+        raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
+
+
+def _check_play(play: str) -> None:
+    from assembly.statistics.play import PLAY
+
+    _check_word("--play", play, tuple(PLAY))
+
+
+@contextmanager
+def _interruptible(output: Path | None) -> Generator[None, None, None]:
+    """Ctrl-C ends with exit status 130 and says what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = f"; what is finished is kept in {output}.journal" if output else ""
+        print(f"forcefit: interrupted{kept}", file=sys.stderr)
+        raise typer.Exit(130) from None
 
 
 @app.command()
@@ -141,6 +157,7 @@ def tolerances(
     compliant: Annotated[
         str, typer.Option(help="Present errors: compliant joints free | rigid.")
     ] = "free",
+    play: PlayOption = "worst",
     fresh: Annotated[
         int, typer.Option(help="New draws that verify the answer.", min=0)
     ] = 2000,
@@ -155,35 +172,40 @@ def tolerances(
     """How tight errors must be; with a plan, how loose they may be.
 
     Without --plan the robot's own errors are judged: the factor on all of them at which
-    it goes together everywhere, and which errors it owes its margin to.
+    it goes together everywhere, and which errors it owes its margin to.  With OUTPUT,
+    what is computed is kept in OUTPUT.journal: the same command goes on from there
+    after a kill and ends in the same file.
     """
+    from dataclasses import replace
+
     from assembly.robots import load_robot
     from assembly.statistics.allocation import allocate
     from assembly.statistics.plot import allocation_figure
+    from assembly.statistics.replay import journalled
     from assembly.statistics.tolerance_file import read_plan
     from assembly.statistics.tolerances import (
         allocation_of,
         allocation_text,
         grid_postures,
+        identity_of,
         present_errors,
         present_text,
         tolerance_dataset,
     )
     from assembly.sweeps.dataset import save_dataset
 
-    if compliant not in {"free", "rigid"}:
-        hint = nearest(compliant, ("free", "rigid"))
-        raise BadInput(f'--compliant: found "{compliant[:60]}"{hint}')
+    _check_play(play)
+    _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure):
         raise BadInput("tolerances: --output and --figure need a --plan")
     for path in filter(None, (output, figure)):
         check_writable(path)
     machine = load_robot(robot)
-    asked = None if plan is None else read_plan(plan, machine)
+    asked = None if plan is None else replace(read_plan(plan, machine), play=play)
     postures = grid_postures(machine, grid)
     results: dict = {"robot": machine.name, "postures": len(postures)}
     said = []
-    with progress_bars() as update:
+    with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
                 postures, compliant, lambda d, n: update("present errors", d, n)
@@ -195,12 +217,14 @@ def tolerances(
                 "geometric_error, or ask for tolerances with --plan"
             )
         if asked is not None:
-            answer = allocate(postures, asked, fresh, update)
-            results["allocation"] = allocation_of(answer)
-            said.append(allocation_text(results["allocation"]))
-            data = tolerance_dataset(answer)
-            if output is not None:
-                save_dataset(data, output)
+            whose = identity_of(postures, asked, fresh)
+            with journalled(output, whose) as replay:
+                answer = allocate(postures, asked, fresh, update, replay)
+                results["allocation"] = allocation_of(answer)
+                said.append(allocation_text(results["allocation"]))
+                data = tolerance_dataset(answer)
+                if output is not None:
+                    save_dataset(data, output)
             if figure is not None:
                 save_figure(allocation_figure(data), figure)
     write_json(results, json)

@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.statistics.requirement import TRAINING, Plan, Requirement
-from assembly.statistics.responses import respond
-from assembly.statistics.worst_case import CORNERS, random_corners, worst_corner
+from assembly.statistics.worst_case import CORNERS, random_corners
 from stiffness.reading import BadInput
 
 _TOLERANCE = 1e-3  # of a limit: by how much the programme may still violate it
@@ -109,8 +108,8 @@ def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
         limit = plan.limits[key]
         if plan.asked_yield == 1.0:
             corners = random_corners(CORNERS, len(spread), plan.seed)
-            for one in ready:
-                worst = worst_corner(one, plan.sources, spread, corners)
+            for i in range(len(ready)):
+                worst = work.worst_corner(key, i, t, corners)
                 slopes = plan.gather(worst.slopes * worst.signs)
                 if worst.value > limit * (1 + _TOLERANCE):
                     yield _plane(slopes, worst.value, t, limit)
@@ -118,8 +117,8 @@ def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
         draws = plan.draws_of(TRAINING, plan.draws)
         values = np.full(len(draws), -np.inf)
         slopes = np.zeros_like(draws)
-        for one in ready:
-            here, there = respond(one, plan.sources, draws * spread)
+        for i in range(len(ready)):
+            here, there = work.respond(key, i, draws * spread)
             higher = here > values
             values[higher], slopes[higher] = here[higher], (there * draws)[higher]
         tail = np.argsort(values)[-max(1, round((1 - plan.asked_yield) * len(draws))) :]

@@ -5,6 +5,10 @@ without all others.  Sobol's indices by Saltelli's design take (groups + 2) time
 draws; where a result is linear in the errors they are known in closed form,
 ``a_i^2 var_i / sum_j a_j^2 var_j``, and both are the same.
 
+A draw without an answer leaves out what it would be compared with, and is counted.
+Errors of the draws that are left are no longer independent, so where more than a few
+are left out there are no indices, and a reason.
+
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
     (b for the first index, f for the total one: Jansen's).
@@ -12,21 +16,15 @@ Sources:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.statistics.distributions import ErrorSources
-from assembly.statistics.monte_carlo import Experiment
 
-if TYPE_CHECKING:
-    import xarray
-
-_STREAMS = (2, 3)  # of random numbers, see assembly.statistics.distributions
-_CHUNK = 4096  # rows evaluated at a time
+STREAMS = (2, 3)  # of random numbers, see assembly.statistics.distributions
+MOST_FAILED = 0.05  # of the draws compared: more, and errors depend on each other
 _RESAMPLES = 200
-QUANTITIES = ("energy", "margin_free", "rotation", "translation", "force", "stress")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +36,42 @@ class Importance:
         first: (s, d, 3) share explained alone: value, lower, upper.
         total: (s, d, 3) share that involves the group: likewise.
         variance: (s,) of the results.
+        failed: (s, d) share of the base draws left out, for one of the three draws
+            compared has no answer; the indices are NaN beyond :data:`MOST_FAILED`.
     """
 
     groups: tuple[str, ...]
     first: NDArray
     total: NDArray
     variance: NDArray
+    failed: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Saltelli's rows: A, B, and A with the columns of each group from B.
+
+    Attributes:
+        A: (k, m) independent draws of the numbers.
+        B: (k, m) others.
+        groups: name and columns of each of d groups.
+    """
+
+    A: NDArray
+    B: NDArray
+    groups: Sequence[tuple[str, NDArray]]
+
+    def __len__(self) -> int:
+        return len(self.A) * (len(self.groups) + 2)
+
+    def rows(self, first: int, count: int) -> NDArray:
+        """(count, m) rows from ``first`` on."""
+        matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
+        rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
+        for g, (_, columns) in enumerate(self.groups):
+            some = np.flatnonzero(matrix == g + 2)
+            rows[np.ix_(some, columns)] = self.B[np.ix_(base[some], columns)]
+        return rows
 
 
 def sobol_importance(
@@ -52,62 +80,71 @@ def sobol_importance(
     groups: Sequence[tuple[str, NDArray]],
     count: int,
     level: float = 0.95,
-    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Importance:
     """Sobol's indices of any function of independent numbers.
 
     Args:
-        evaluate: (k, m) numbers to (k, s) results.
+        evaluate: (k, m) numbers to (k, s) results, NaN without an answer.
         sample: stream and count to (count, m) independent draws of the numbers.
         groups: name and columns of each group of numbers.
         count: base draws; (groups + 2) times as many are evaluated.
         level: of confidence of the bootstrap intervals.
-        progress: called with evaluations done and their number.
 
     Returns:
         The indices; NaN for a result that does not vary.
     """
-    A, B = (sample(stream, count) for stream in _STREAMS)
-    mixed = [A, B]
-    for _, columns in groups:
-        part = A.copy()
-        part[:, columns] = B[:, columns]
-        mixed.append(part)
-    total, done, found = len(mixed) * count, 0, []
-    for rows in mixed:
-        pieces = []
-        for first in range(0, count, _CHUNK):
-            pieces.append(evaluate(rows[first : first + _CHUNK]))
-            done += len(pieces[-1])
-            progress(done, total)
-        found.append(np.concatenate(pieces).T)
-    names = tuple(name for name, _ in groups)
-    return _indices(names, np.array(found), level)
+    A, B = (sample(stream, count) for stream in STREAMS)
+    design = Design(A, B, groups)
+    return sobol_indices(design, evaluate(design.rows(0, len(design))), level)
 
 
-def _indices(groups: tuple[str, ...], f: NDArray, level: float) -> Importance:
-    """Estimates and bootstrap intervals from results f (d + 2, s, k) of A, B, mixed."""
-    count = f.shape[-1]
-    spread = f[:2].transpose(1, 0, 2).reshape(f.shape[1], -1).var(axis=1)
-    varies = spread > 1e-24 * (f[0] ** 2).mean(axis=1)
-    g = f - f[:2].mean(axis=(0, 2))[:, None]
-    alone = (g[1] * (g[2:] - g[0])).reshape(-1, count)
-    left = (0.5 * (g[2:] - g[0]) ** 2).reshape(-1, count)
-    squares, means = 0.5 * (g[0] ** 2 + g[1] ** 2), 0.5 * (g[0] + g[1])
+def sobol_indices(design: Design, results: NDArray, level: float = 0.95) -> Importance:
+    """Sobol's indices from the results of a design.
+
+    Args:
+        design: of k base draws and d groups.
+        results: (k (d + 2), s) in the order of its rows; not finite without an answer.
+        level: of confidence of the bootstrap intervals.
+
+    Returns:
+        The indices; NaN for a result that does not vary, or lacks too many answers.
+    """
+    d, s, count = len(design.groups), results.shape[1], len(design.A)
+    f = results.reshape(d + 2, count, s)
+    names = tuple(name for name, _ in design.groups)
+    first, total = np.full((s, d, 3), np.nan), np.full((s, d, 3), np.nan)
+    variance, failed = np.full(s, np.nan), np.ones((s, d))
     rng = np.random.default_rng(1)
     weights = rng.multinomial(count, np.full(count, 1 / count), _RESAMPLES) / count
     weights = np.vstack([np.full(count, 1 / count), weights])
-    variance = weights @ squares.T - (weights @ means.T) ** 2
+    for q in range(s):
+        answered = np.isfinite(f[:, :, q])
+        both = f[:2, :, q][answered[:2]]
+        failed[q] = 1.0 - (answered[0] & answered[1] & answered[2:]).mean(axis=1)
+        if len(both) < 2:
+            continue
+        variance[q] = both.var()
+        if not variance[q] > 1e-24 * (both**2).mean():
+            continue
+        for g in np.flatnonzero(failed[q] <= MOST_FAILED).tolist():
+            kept = answered[0] & answered[1] & answered[g + 2]
+            some = weights[:, kept] / weights[:, kept].sum(axis=1, keepdims=True)
+            three = f[[0, 1, g + 2]][:, kept, q] - both.mean()
+            first[q, g], total[q, g] = _shares(three, some, level)
+    return Importance(names, first, total, variance, failed)
+
+
+def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
+    """(3,) first and (3,) total index from results (3, k) of A, B and mixed."""
+    alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
+    mean = weights @ (f[0] + f[1]) / 2
+    variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
     tail = [(1 - level) / 2, (1 + level) / 2]
-    answers = []
-    for products in (alone, left):
-        sums = (weights @ products.T).reshape(len(weights), len(groups), -1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            shares = np.moveaxis(sums / variance[:, None], 2, 0)
-        shares[~varies] = np.nan
-        bounds = np.quantile(shares[:, 1:], tail, axis=1)
-        answers.append(np.stack([shares[:, 0], *bounds], axis=-1))
-    return Importance(groups, answers[0], answers[1], spread)
+    found = []
+    for product in (alone, left):
+        shares = (weights @ product) / variance
+        found.append(np.array([shares[0], *np.quantile(shares[1:], tail)]))
+    return found[0], found[1]
 
 
 def linear_importance(
@@ -152,64 +189,3 @@ def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
         keys.append({"source": label, "frame": frame, "kind": kind}[by])
     names = list(dict.fromkeys(keys))
     return [(n, np.flatnonzero([k == n for k in keys])) for n in names]
-
-
-def importance_dataset(
-    experiment: Experiment,
-    count: int,
-    by: str = "source",
-    level: float = 0.95,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> "xarray.Dataset":
-    """Which sources the results of an experiment owe their variance to.
-
-    Args:
-        experiment: what is drawn and asked.
-        count: base draws; (groups + 2) times as many are solved.
-        by: see :func:`source_groups`.
-        level: of confidence of the intervals.
-        progress: called with draws done and their number.
-
-    Returns:
-        Data set ``first_index``, ``total_index`` over ``quantity``, ``group`` and
-        ``estimate`` (value, lower, upper), to be merged with the draws'.
-    """
-    import xarray
-
-    sources = experiment.sources
-    names = [q for q in QUANTITIES if q != "margin_free" or experiment.margins]
-    if not experiment.links:
-        names.remove("stress")
-
-    def evaluate(values: NDArray) -> NDArray:
-        rows = experiment.answer(values, range(len(values)))
-        screws = rows["platform_screw"]
-        sizes = {
-            "rotation": np.sqrt((screws[:, :3] ** 2).sum(axis=1)),
-            "translation": np.sqrt((screws[:, 3:] ** 2).sum(axis=1)),
-        }
-        columns = [
-            sizes[n] if n in sizes
-            else rows[n].max(axis=1) if rows[n].ndim == 2 else rows[n]
-            for n in names
-        ]  # fmt: skip
-        return np.stack(columns, axis=1)
-
-    found = sobol_importance(
-        evaluate, lambda stream, k: sources.draw(0, k, experiment.seed, stream),
-        source_groups(sources, by), count, level, progress,
-    )  # fmt: skip
-    dims = ("quantity", "group", "estimate")
-    meaning = {
-        "first_index": "share of the variance that a group explains alone",
-        "total_index": "share of the variance that involves a group",
-    }
-    data = {
-        key: (dims, values, {"units": "1", "long_name": meaning[key]})
-        for key, values in (("first_index", found.first), ("total_index", found.total))
-    }
-    labels = {
-        "quantity": names, "group": list(found.groups),
-        "estimate": ["value", "lower", "upper"],
-    }  # fmt: skip
-    return xarray.Dataset(data, labels, {"importance_draws": count})

@@ -84,7 +84,7 @@ def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
 def _planes(work: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
     """(G,) each: a.t' <= 1 keeps the samples within the limits near t."""
     values = samples.values * work.plan.spread(t)
-    shares = work.shares(values)
+    shares = work.shares(values)[1]
     if work.plan.asked_yield == 1.0:
         order = np.argsort(shares, axis=None)[::-1][:_PLANES]
         places, draws = np.unravel_index(order, shares.shape)

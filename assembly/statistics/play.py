@@ -1,12 +1,14 @@
 """Where the play of an assembled robot may sit, and what its platform then does.
 
 Least energy holds the clearances that carry load at their bound; what the others may
-do without changing any spring is a convex set.  Its points are drawn
+do without changing any spring is a convex set.  What is assumed of it is one of
 
 ======== =====================================================================
-least    not at all: as the solution of (22) leaves it
-uniform  uniformly over the set (hit-and-run): nothing is known of the play
+worst    anywhere: the largest pose errors count, see
+         :mod:`assembly.statistics.worst_play`
+uniform  uniformly over the set (billiards): nothing is known of the play
 contact  pushed by a wrench of random direction on the platform until it is taken up
+least    as the solution of (22) leaves it: one possible place of many
 ======== =====================================================================
 """
 
@@ -19,62 +21,101 @@ from assembly.nominal import size_of
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.one_posture import Draws, OnePosture
 
-PLAY = ("least", "uniform", "contact")
-STEPS = 400  # of a walk; twice as many change no quantile, see tests/test_play.py
+PLAY = {
+    "worst": "play anywhere it may be, the largest pose errors count, eq. (27)",
+    "uniform": "play uniform over all places it may be",
+    "contact": "play pushed in a random direction until taken up",
+    "least": "play where the solution leaves it, one possible place of many",
+}
+PLAY_STREAM = 1  # of random numbers; 0 is the errors'
 
 
 def settle_play(
-    one: OnePosture, found: Draws, play: str, generators: Sequence[np.random.Generator],
-    steps: int = STEPS,
-) -> NDArray:  # fmt: skip
+    one: OnePosture, found: Draws, play: str, generators: Sequence[np.random.Generator]
+) -> tuple[NDArray, NDArray]:
     """Platform screws with the play somewhere in its set.
 
     Args:
         one: the posture.
         found: of :meth:`~assembly.solvers.one_posture.OnePosture.solve`, k draws.
-        play: one of :data:`PLAY`.
+        play: one of :data:`PLAY` but the worst.
         generators: of random numbers, one for each draw.
-        steps: of each walk.
 
     Returns:
         (k, 6) [rad, m]; NaN where a draw has no answer in unit cones (the bound of a
-        passive joint's own motion mattered).
+        passive joint's own motion mattered).  (k,) bool: False where uniform play was
+        not mixed when the longest walks ended, see
+        :func:`assembly.statistics.uniform_play.settle_uniformly`.
 
     Raises:
         ValueError: ``play`` is something else.
     """
-    if play not in PLAY:
-        raise ValueError(f"play is {play!r}, expected one of {PLAY}")
+    if play not in PLAY or play == "worst":
+        valid = tuple(name for name in PLAY if name != "worst")
+        raise ValueError(f"play is {play!r}, expected one of {valid}")
+    mixed = np.ones(len(found.energy), dtype=bool)
     if play == "least" or not len(one.G.T):
-        return found.platform_screw
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.statistics.hit_and_run import hit_and_run, push_all
-
+        return found.platform_screw, mixed
     u = found.clearances.copy()
     loaded = loaded_clearances(one, found)
     nu = u.shape[1]
     solved = ~np.isnan(u).any(axis=1)
-    to_platform = one.screws[:, :nu]
     patterns, which = np.unique(loaded, axis=0, return_inverse=True)
+    settle = _uniformly if play == "uniform" else _at_contact
     for i, pattern in enumerate(patterns):
         some = np.flatnonzero((which.ravel() == i) & solved)
-        rows, free = play_rows(one, pattern), ~pattern
-        here = np.ascontiguousarray(u[some])
-        if play == "uniform":
-            for v, k in zip(here, some.tolist(), strict=True):
-                hit_and_run(rows, one.starts, free, v, steps, generators[k])
-        else:
-            size = size_of(one.posture.robot)
-            scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
-            wrench = [generators[k].normal(size=6) * scale for k in some.tolist()]
-            pushes, ends = np.array(wrench) @ to_platform, np.empty_like(here)
-            push_all(cone_solvers(), rows, one.starts, free, here, pushes, ends)
-            for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
-                ends[k] = _push_slowly(one, rows, free, here[k], pushes[k])
-            here = ends
-        u[some] = here
-    moved = (u - found.clearances) @ to_platform.T
-    return found.platform_screw + moved
+        u[some], mixed[some] = settle(
+            one, pattern, u[some], [generators[k] for k in some.tolist()]
+        )
+    moved = (u - found.clearances) @ one.screws[:, :nu].T
+    return found.platform_screw + moved, mixed
+
+
+def _uniformly(
+    one: OnePosture, loaded: NDArray, u: NDArray,
+    generators: Sequence[np.random.Generator],
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Clearances uniform over their set, and whether they are mixed."""
+    from assembly.statistics.uniform_play import settle_uniformly
+
+    free = ~loaded
+    rows = play_rows(one, loaded)[:, free]
+    # all directions that the rows, which are orthonormal, leave
+    Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
+    to_screw = np.ascontiguousarray(one.screws[:, : len(free)][:, free])
+    starts, mixed = free_starts(one, free), np.ones(len(u), dtype=bool)
+    u = u.copy()
+    for i, rng in enumerate(generators):
+        v = u[i, free].copy()
+        mixed[i] = settle_uniformly(Z, starts, to_screw, v, rng)
+        u[i, free] = v
+    return u, mixed
+
+
+def _at_contact(
+    one: OnePosture, loaded: NDArray, u: NDArray,
+    generators: Sequence[np.random.Generator],
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Clearances pushed by a random wrench until they are taken up."""
+    from assembly.solvers.cone_solvers import cone_solvers
+    from assembly.statistics.push import push_all
+
+    rows, free = play_rows(one, loaded), ~loaded
+    size = size_of(one.posture.robot)
+    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+    wrenches = np.array([rng.normal(size=6) * scale for rng in generators])
+    pushes = wrenches.reshape(-1, 6) @ one.screws[:, : u.shape[1]]
+    here, ends = np.ascontiguousarray(u), np.empty_like(u)
+    push_all(cone_solvers(), rows, one.starts, free, here, pushes, ends)
+    for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
+        ends[k] = _push_slowly(one, rows, free, here[k], pushes[k])
+    return ends, np.ones(len(u), dtype=bool)
+
+
+def free_starts(one: OnePosture, free: NDArray) -> NDArray:
+    """(cones + 1,) first column of each cone that is free among those that are."""
+    sizes = np.diff(one.starts)[free[one.starts[:-1]]]
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
 def _push_slowly(

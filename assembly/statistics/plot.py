@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.statistics.estimates import most_probable, quantile
+from assembly.statistics.play import PLAY
+from assembly.statistics.quantities import POSE_ERRORS
 from stiffness.message import plot_label
 
 if TYPE_CHECKING:
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KINDS = ("histogram", "tornado", "allocation")
+_MARGINS = ("margin", "margin_free")
 _SCALES = {
     "rotation": (1e3, "mrad"), "translation": (1e3, "mm"), "energy": (1.0, "J"),
     "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
@@ -72,11 +75,19 @@ def histogram_figure(data: "xarray.Dataset") -> "Figure":
     panels = figure.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
     for panel, name in zip(panels, names, strict=False):
         _histogram(panel, name, solved[name].values)
+        if name in POSE_ERRORS:
+            panel.set_title(f"play {data.attrs['play']}", fontsize=9)
+        if name in _MARGINS:
+            half = quantile(np.nan_to_num(data[name].values, nan=np.inf), 0.5)["value"]
+            said = f"median of all {data.sizes['draw']} draws: {half:.3g}"
+            panel.set_title(said, fontsize=9)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     figure.suptitle(
-        f"{plot_label(str(data.attrs.get('robot', '')))}: {data.sizes['draw']} draws, "
+        f"{plot_label(str(data.attrs.get('robot', '')))}: "
+        f"of the {solved.sizes['draw']} of {data.sizes['draw']} draws that assemble, "
         f"seed {data.attrs.get('seed', '')}"
+        f"\npose errors: play {data.attrs['play']}: {PLAY[data.attrs['play']]}"
     )
     return figure
 
@@ -141,6 +152,8 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
         groups = [plot_label(str(name)) for name in one["group"].values[order]]
         panel.set_yticks(np.arange(bars), groups, fontsize=8)
         panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
+        if name in POSE_ERRORS:
+            panel.set_title(f"play {data.attrs['importance_play']}", fontsize=9)
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:
         panel.set_axis_off()

@@ -1,8 +1,8 @@
 """What tolerances must meet: limits at every posture, always or with a yield."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from assembly.posture import Posture
 from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.distributions import ErrorSources
-from assembly.statistics.monte_carlo import Experiment
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.statistics.replay import Replay
 from assembly.statistics.responses import respond
+from assembly.statistics.worst_case import Corner, worst_corner
 from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
+_SHARP = 1e-4  # of a limit on a pose error: how far its bounds may be apart
+_CHUNK = 512  # draws solved and kept together
 TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 
 
@@ -38,6 +43,8 @@ class Plan:
             limit at every posture.
         draws: training draws at every posture.
         seed: of all draws.
+        play: what is assumed of it where a pose error is limited, one of
+            :data:`assembly.statistics.play.PLAY`.
     """
 
     sources: ErrorSources
@@ -51,6 +58,12 @@ class Plan:
     asked_yield: float = 1.0
     draws: int = 1000
     seed: int = 1
+    play: str = "worst"
+
+    @property
+    def limits_pose(self) -> bool:
+        """Whether a pose error is limited, so that it matters where play sits."""
+        return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -80,20 +93,30 @@ class Requirement:
     Attributes:
         postures: the workspace.
         plan: what is asked.
+        replay: keeps what was computed.
     """
 
     postures: Sequence[Posture]
     plan: Plan
+    replay: Replay = field(default_factory=Replay)
 
     __repr__, _repr_html_ = short_repr, html_table
 
     @cached_property
     def experiments(self) -> list[Experiment]:
         """Everything but the margins, at each posture."""
-        sources, stress = self.plan.sources, "stress" in self.plan.limits
+        plan = self.plan
+        rotation, translation = (
+            _SHARP * plan.limits.get(key, np.inf) for key in POSE_ERRORS
+        )
         found = [
-            Experiment(p, sources, margins=False, stress=stress) for p in self.postures
-        ]
+            Experiment(
+                p, plan.sources, margins=False, stress="stress" in plan.limits,
+                play=plan.play if plan.limits_pose else "least",
+                precision=(rotation, translation),
+            )
+            for p in self.postures
+        ]  # fmt: skip
         for key in self.plan.limits:
             if not key.startswith("margin"):
                 found[0].check_limits([key])
@@ -124,38 +147,104 @@ class Requirement:
         """Limit and posture of every row of :meth:`shares`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
-    def shares(self, values: NDArray) -> NDArray:
+    def shares(self, values: NDArray) -> tuple[NDArray, NDArray]:
         """Every limited quantity over its limit, for given errors.
 
         Args:
             values: (k, m) [rad or m].
 
         Returns:
-            (limits x postures, k), see :attr:`places`; inf where there is no answer.
+            (limits x postures, k) lower and upper bounds, see :attr:`places`; they
+            differ for pose errors with the worst play only, inf without an answer.
         """
-        found = {}
-        for key, ready in self.ready.items():
-            if key.startswith("margin"):
-                for i, one in enumerate(ready):
-                    found[key, i] = respond(one, self.plan.sources, values)[0]
-        others = any(not key.startswith("margin") for key in self.plan.limits)
-        for i, one in enumerate(self.experiments if others else ()):
-            rows = one.answer(values, range(len(values)))
-            screws = rows["platform_screw"]
-            found |= {
-                ("rotation", i): np.linalg.norm(screws[:, :3], axis=1),
-                ("translation", i): np.linalg.norm(screws[:, 3:], axis=1),
-                ("stress", i): rows["stress"].max(axis=1, initial=0.0),
-            }
-            found |= {(key, i): rows[key] for key in ("energy", "force", "moment")}
-        shares = np.array([found[p] / self.plan.limits[p[0]] for p in self.places])
-        return np.where(np.isnan(shares), np.inf, shares)
+        chunks = [self._some_shares(values, i) for i in range(0, len(values), _CHUNK)]
+        lower, upper = (np.concatenate(c, axis=1) for c in zip(*chunks, strict=True))
+        return lower, upper
+
+    def _some_shares(self, values: NDArray, first: int) -> tuple[NDArray, NDArray]:
+        """A chunk of them, posture by posture."""
+        some = values[first : first + _CHUNK]
+        rows = np.arange(first, first + len(some))
+        keys = list(self.plan.limits)
+        limits = np.array([[self.plan.limits[key]] for key in keys])
+        both = [
+            self.replay.recall(partial(self._quantities, i, some, rows), some, rows, i)
+            for i in range(len(self.postures))
+        ]
+        # (bounds, limits, postures, k) with the postures of a limit side by side
+        shares = np.stack([np.array(b) / limits for b in both], axis=2)
+        shares = np.where(np.isnan(shares), np.inf, shares)
+        lower, upper = shares.reshape(2, -1, len(some))
+        return lower, upper
+
+    def _quantities(
+        self, i: int, values: NDArray, rows: NDArray
+    ) -> tuple[NDArray, NDArray]:
+        """(limits, k) lower and upper bounds of what is limited, at posture i."""
+        keys = list(self.plan.limits)
+        drawn = None
+        if any(not key.startswith("margin") for key in keys):
+            drawn = self.experiments[i].answer(values, rows)
+        bounds = np.empty((2, len(keys), len(values)))
+        for k, key in enumerate(keys):
+            if drawn is None or key.startswith("margin"):
+                bounds[:, k] = respond(self.ready[key][i], self.plan.sources, values)[0]
+                continue
+            found = drawn[key].max(axis=1) if key == "stress" else drawn[key]
+            lower = f"{key}_lower"
+            known = drawn.dtype.names or ()
+            bounds[:, k] = drawn[lower] if lower in known else found, found
+        return bounds[0], bounds[1]
 
     def share_slopes(self, place: int, values: NDArray) -> NDArray:
         """(k, m) slopes of a row of :meth:`shares` with each error."""
         key, i = self.places[place]
-        slopes = respond(self.ready[key][i], self.plan.sources, values, key)[1]
-        return slopes / self.plan.limits[key]
+        return self.respond(key, i, values)[1] / self.plan.limits[key]
+
+    def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
+        """A limited quantity at posture i and its slopes with each error."""
+        size, slopes = self.replay.recall(
+            lambda: respond(
+                self.ready[key][i], self.plan.sources, values, key, self.plan.play
+            ),
+            values, key, i,
+        )  # fmt: skip
+        return size, slopes
+
+    def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
+        """The worst corner of tolerances (G,) that is found at posture i."""
+        spread = self.plan.spread(t)
+
+        def climb() -> tuple:
+            found = worst_corner(
+                self.ready[key][i], self.plan.sources, spread, corners, key,
+                self.plan.play,
+            )  # fmt: skip
+            return found.value, found.signs, found.slopes
+
+        value, signs, slopes = self.replay.recall(climb, spread, corners, key, i)
+        return Corner(float(value), signs, slopes)
+
+    def check_perfect_parts(self) -> None:
+        """Refuse limits on pose errors that play alone exceeds, without any error.
+
+        Raises:
+            BadInput: there is one; it says how far the worst play reaches.
+        """
+        if self.plan.play != "worst" or not self.plan.limits_pose:
+            return
+        lower, _ = self.shares(np.zeros((1, len(self.plan.sources))))
+        worst = int(lower[:, 0].argmax())
+        key, i = self.places[worst]
+        if lower[worst, 0] > 1.0 and key in POSE_ERRORS:
+            limit, unit = self.plan.limits[key], UNITS[key]
+            at = self.postures[i].pose().items()
+            where = ", ".join(f"{k} = {v:.4g}" for k, v in at if abs(v) > 1e-9)
+            raise BadInput(
+                f"limit {key}: even perfect parts reach {limit * lower[worst, 0]:.4g} "
+                f"{unit} by play alone at {where or 'the origin'}; expected at most "
+                f"{limit:g} {unit} (or --play least, if play stays as it is solved)"
+            )
 
     def check_taken_up(self) -> None:
         """Refuse errors that neither play nor springs take up anywhere.

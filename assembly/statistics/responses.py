@@ -6,17 +6,20 @@ from numpy.typing import NDArray
 from assembly.link_stress import LinkStress, stressed_links
 from assembly.solvers.one_posture import Draws, OnePosture
 from assembly.solvers.posture_margins import PostureMargins
-from assembly.statistics.distributions import ErrorSources
+from assembly.statistics.distributions import ErrorSources, draw_generator
+from assembly.statistics.play import PLAY_STREAM, settle_play
+from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
+from assembly.statistics.worst_play import bound_play, play_pulls
 
 _STEP = 1e-6  # of a wrench, to differentiate a formula of stress
-_PARTS = {"moment": slice(0, 3), "force": slice(3, 6), "rotation": slice(0, 3),
-          "translation": slice(3, 6)}  # fmt: skip
+_SHARP = 1e-9  # [rad or m] asked of the largest pose errors
+_PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
 def respond(
     ready: PostureMargins | OnePosture, sources: ErrorSources, values: NDArray,
-    key: str = "energy",
+    key: str = "energy", play: str = "worst",
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """A quantity for given errors, and its slopes with each of them.
 
@@ -26,6 +29,10 @@ def respond(
         values: (k, m) [rad or m].
         key: which quantity, of a posture prepared for energies: energy [J], force [N],
             moment [N m], stress [Pa], rotation [rad] or translation [m].
+        play: what is assumed of it where that is a pose error, one of
+            :data:`assembly.statistics.play.PLAY`.  With the worst, the value is the
+            largest found and the slopes are its own; of uniform play and play at
+            contact the slopes are those of the solution, which know nothing of it.
 
     Returns:
         (k,) and (k, m); NaN where there is no answer.
@@ -38,17 +45,42 @@ def respond(
     wrenches = ready.wrenches(found.multipliers)
     if key == "energy":
         return found.energy, -wrenches[:, sources.frame, sources.component]
-    quantity = _of_screw if key in {"rotation", "translation"} else _of_wrenches
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    solved = np.flatnonzero(np.isfinite(found.energy))
+    # without clearances in unit cones nothing tells which of them are used up
+    known = np.isfinite(found.energy) & np.isfinite(found.clearances).all(axis=1)
+    solved = np.flatnonzero(known)
     if len(solved):
         some = _rows(found, solved)
-        size[solved], by_wrench, by_screw = quantity(
-            ready, key, wrenches[solved], some.platform_screw
-        )
-        slopes[solved] = solution_slopes(ready, some, by_wrench, by_screw)
+        if key in POSE_ERRORS:
+            size[solved], by_screw, by_play = _of_pose(
+                ready, some, errors[solved], key, play, solved
+            )
+            by_wrench = np.zeros_like(wrenches[solved])
+        else:
+            size[solved], by_wrench = _of_wrenches(ready, key, wrenches[solved])
+            by_screw, by_play = np.zeros_like(some.platform_screw), None
+        slopes[solved] = solution_slopes(ready, some, by_wrench, by_screw, by_play)
     return size, slopes[:, sources.frame, sources.component]
+
+
+def _of_pose(
+    ready: OnePosture, found: Draws, errors: NDArray, key: str, play: str,
+    numbers: NDArray,
+) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
+    """Size of a pose error, and its slopes with the platform's screw and the play."""
+    part = 3 * POSE_ERRORS.index(key)
+    if play == "worst":
+        sharp = (_SHARP, np.inf) if key == "rotation" else (np.inf, _SHARP)
+        bounds, screws = bound_play(ready, found, errors, sharp)
+        which = POSE_ERRORS.index(key)
+        by_screw, pulls = play_pulls(ready, found, key, screws[:, which])
+        return bounds[:, which, 0], by_screw, -pulls
+    generators = [draw_generator(1, i, PLAY_STREAM) for i in numbers.tolist()]
+    screws, _ = settle_play(ready, found, play, generators)
+    slopes = np.zeros_like(screws)
+    size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])
+    return size, slopes, None
 
 
 def _rows(found: Draws, rows: NDArray) -> Draws:
@@ -56,32 +88,23 @@ def _rows(found: Draws, rows: NDArray) -> Draws:
     return Draws(*(getattr(found, name)[rows] for name in Draws.__dataclass_fields__))
 
 
-def _of_screw(
-    ready: OnePosture, key: str, wrenches: NDArray, screws: NDArray
-) -> tuple[NDArray, NDArray, NDArray]:
-    """Size of a part of the platform's screw, and its slopes with everything."""
-    slopes = np.zeros_like(screws)
-    size, slopes[:, _PARTS[key]] = _size(screws[:, _PARTS[key]])
-    return size, np.zeros_like(wrenches), slopes
-
-
 def _of_wrenches(
-    ready: OnePosture, key: str, wrenches: NDArray, screws: NDArray
-) -> tuple[NDArray, NDArray, NDArray]:
-    """The largest moment, force or stress, and its slopes with everything."""
+    ready: OnePosture, key: str, wrenches: NDArray
+) -> tuple[NDArray, NDArray]:
+    """The largest moment, force or stress, and its slopes with the wrenches."""
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
         sizes, own = _size(wrenches[:, :, _PARTS[key]])
         worst = sizes.argmax(axis=1)
         slopes[draws, worst, _PARTS[key]] = own[draws, worst]
-        return sizes[draws, worst], slopes, np.zeros_like(screws)
+        return sizes[draws, worst], slopes
     links = stressed_links(ready.posture.robot)
     peaks = np.stack([link.peak(wrenches[:, link.row]) for link in links], axis=1)
     worst = peaks.argmax(axis=1)
     for i, link in enumerate(links):
         some = np.flatnonzero(worst == i)
         slopes[some, link.row] = _stress_slopes(link, wrenches[some, link.row])
-    return peaks[draws, worst], slopes, np.zeros_like(screws)
+    return peaks[draws, worst], slopes
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from assembly.statistics.estimates import proportion
 from assembly.statistics.requirement import Requirement
-from assembly.statistics.worst_case import CORNERS, random_corners, worst_corner
+from assembly.statistics.worst_case import CORNERS, random_corners
 from stiffness.reading import BadInput
 
 _FINE = 1e-4  # of the limits: how nearly the samples are to use them up
@@ -61,13 +61,8 @@ def with_worst_corners(work: Requirement, samples: Samples, t: NDArray) -> Sampl
     Returns:
         With the corners that were not among them.
     """
-    plan = work.plan
-    spread = plan.spread(t)
     start = np.vstack([samples.values[: CORNERS // 2], samples.values[-CORNERS // 2 :]])
-    found = [
-        worst_corner(one, plan.sources, spread, start, key).signs
-        for key, ready in work.ready.items() for one in ready
-    ]  # fmt: skip
+    found = [work.worst_corner(key, i, t, start).signs for key, i in work.places]
     new = [
         signs for signs in np.unique(found, axis=0)
         if not (samples.values == signs).all(axis=1).any()
@@ -97,7 +92,7 @@ def fit(
     last = np.nan, np.nan
     for _ in range(_MOST_TRIALS):
         tried = np.clip(factor * t, plan.least, plan.most)
-        shares = work.shares(samples.values * plan.spread(tried)).max(axis=0)
+        shares = work.shares(samples.values * plan.spread(tried))[1].max(axis=0)
         # the largest share of all samples but those that may fail
         share = float(np.partition(shares, -1 - samples.allowed)[-1 - samples.allowed])
         fits = share <= 1.0 + 1e-9

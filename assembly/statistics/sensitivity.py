@@ -82,8 +82,9 @@ def margin_slopes(posture: Posture, compliant: str = "free") -> MarginSlopes:
 
 
 def solution_slopes(
-    ready: OnePosture, found: Draws, by_wrench: NDArray, by_screw: NDArray
-) -> NDArray:
+    ready: OnePosture, found: Draws, by_wrench: NDArray, by_screw: NDArray,
+    by_play: NDArray | None = None,
+) -> NDArray:  # fmt: skip
     """How a function of wrenches and platform screw grows with every geometric error.
 
     Args:
@@ -91,6 +92,7 @@ def solution_slopes(
         found: what :meth:`OnePosture.solve` answered to k draws, none under a load.
         by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
         by_screw: (k, 6) and with the platform's screw.
+        by_play: (k, nu) and with the clearances themselves, in units of their cones.
 
     Returns:
         (k, n, 6) slopes with delta l of every frame in its axes; one of several where
@@ -111,6 +113,8 @@ def solution_slopes(
     by_spring = by_multiplier @ ready.closing
     right = np.zeros((k, size))
     across = by_spring @ ready.G + by_screw @ ready.screws[:, :nu]
+    if by_play is not None:
+        across += by_play
     right[:, :nu] = np.einsum("kij,kj->ki", P, across)
     right[:, nu:] = by_multiplier @ ready.over
     x = np.einsum("kij,kj->ki", np.linalg.pinv(K, _RANK, hermitian=True), right)

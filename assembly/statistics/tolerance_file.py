@@ -10,7 +10,7 @@ import numpy as np
 from assembly.draw import frames_named
 from assembly.robot import Robot
 from assembly.statistics.distributions import KINDS, ErrorSources
-from assembly.statistics.monte_carlo import UNITS, limit_names
+from assembly.statistics.quantities import UNITS, limit_names
 from assembly.statistics.requirement import COSTS, Plan
 from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW

@@ -5,6 +5,7 @@ grid, the errors a robot has now, results as plain values and as a data set.
 """
 
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from assembly.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.allocation import Allocation
+from assembly.statistics.play import PLAY
+from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
 from assembly.sweeps.sweep import robot_hash
 from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
@@ -46,6 +49,21 @@ def grid_postures(robot: Robot, grid: str) -> list[Posture]:
     if not reached:
         raise BadInput(f"grid: no posture is reached; the first: {reasons[0]}")
     return reached
+
+
+def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
+    """What must be the same for two allocations to share what they computed."""
+    arrays = [p.transforms for p in postures]
+    for one in (plan, plan.sources):
+        arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
+    digest = sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
+    return {
+        "robot_sha256": robot_hash(plan.sources.robot),
+        "plan_and_postures_sha256": digest.hexdigest(),
+        "limits": str(dict(plan.limits)), "cost": plan.cost, "play": plan.play,
+        "yield": plan.asked_yield, "draws": plan.draws, "seed": plan.seed,
+        "fresh": fresh, "program": f"forcefit {version('forcefit')}",
+    }  # fmt: skip
 
 
 def present_errors(
@@ -137,6 +155,7 @@ def allocation_of(answer: Allocation) -> dict[str, Any]:
         "price_bound": answer.price_bound, "cuts": answer.cuts,
         "worst": {k: {"found": a, "proven": b} for k, (a, b) in answer.worst.items()},
         "proven_scale": answer.proven_scale, "verification": answer.verification,
+        "play": plan.play if plan.limits_pose else None,
     }  # fmt: skip
 
 
@@ -154,6 +173,8 @@ def allocation_text(found: dict[str, Any]) -> str:
         scale, unit = scales[one["unit"]]
         said = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
         lines.append(said + (" (the loosest allowed)" if one["at_loosest"] else ""))
+    if found["play"]:
+        lines.append(f"pose errors: play {found['play']}: {PLAY[found['play']]}")
     lines.append(_price_text(found))
     for key, worst in found["worst"].items():
         proven = (
@@ -172,9 +193,20 @@ def allocation_text(found: dict[str, Any]) -> str:
         lines.append(
             f"{check['draws']} fresh draws at all postures: yield "
             f"{one['probability']:.4f} ({one['lower']:.4f} to {one['upper']:.4f}), "
-            f"asked {found['yield']:g}: {check['verdict']}"
+            f"asked {found['yield']:g}: {check['verdict']}{_looks_text(check)}"
         )
     return "\n".join(lines)
+
+
+def _looks_text(check: dict[str, Any]) -> str:
+    """How often was looked, and what its intervals are worth for that."""
+    left = check["yield"]["undecided"]
+    undecided = f", {left} draws undecided" if left else ""
+    return (
+        f" (look {check['look']} of at most {check['most_looks']}, each at "
+        f"{check['confidence_of_a_look']:.2%}: {check['confidence']:.0%} for "
+        f"all{undecided})"
+    )
 
 
 def _price_text(found: dict[str, Any]) -> str:
@@ -212,7 +244,7 @@ def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
         "program": f"forcefit {version('forcefit')}", "seed": plan.seed,
         "yield": plan.asked_yield, "cost_law": plan.cost, "price": answer.price,
         "price_alike": answer.price_alike, "price_bound": answer.price_bound,
-        "said": said,
+        "said": said, "play": found["play"] or "",
         "verified_yield": check["yield"]["probability"] if check else float("nan"),
         **limits,
     })  # fmt: skip

@@ -43,7 +43,7 @@ class Corner:
 
 def worst_corner(
     ready: PostureMargins | OnePosture, sources: ErrorSources, tolerances: NDArray,
-    corners: NDArray, key: str = "energy",
+    corners: NDArray, key: str = "energy", play: str = "worst",
 ) -> Corner:  # fmt: skip
     """Climb from corner to corner; the best end of all.
 
@@ -53,6 +53,7 @@ def worst_corner(
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
         key: which quantity, see :func:`assembly.statistics.responses.respond`.
+        play: see there.
 
     Returns:
         The worst corner found.
@@ -66,7 +67,7 @@ def worst_corner(
         ])
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
     for _ in range(_STEPS):
-        values, slopes = respond(ready, sources, signs * tolerances, key)
+        values, slopes = respond(ready, sources, signs * tolerances, key, play)
         i = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[i] > best.value:
             best = Corner(float(values[i]), signs[i].copy(), slopes[i].copy())

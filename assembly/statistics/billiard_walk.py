@@ -1,0 +1,124 @@
+"""Flights of a billiard ball through the set where play may sit; compiled.
+
+Sources:
+    Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.compiled import kernel, part
+
+FLIGHT = 2.0  # mean time; Dikin's ellipsoid is crossed in about one
+MIRRORS = 20  # of a flight at most, for each dimension
+_OUT = 0.9
+
+
+@kernel
+def begin_apart(
+    M: NDArray, starts: NDArray, u: NDArray, rng: np.random.Generator, walks: NDArray
+) -> None:
+    """Begin walks most of the way to the boundary in random directions.
+
+    Args:
+        M: (nu, n) axes of Dikin's ellipsoid.
+        starts: (cones + 1,) first column of each cone, and nu.
+        u: (nu,) its centre.
+        rng: of random numbers.
+        walks: (chains, nu) to fill.
+    """
+    for chain in range(len(walks)):
+        way = _direction(M, rng)
+        reach, _ = _until(starts, u, way, np.inf)
+        for c in range(len(u)):
+            walks[chain, c] = u[c] + _OUT * reach * way[c]
+
+
+@kernel
+def walk(
+    M: NDArray, gram: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
+    every: int, rng: np.random.Generator, trace: NDArray,
+) -> None:  # fmt: skip
+    """Walk on; u moves, and its platform screw is kept every so many flights.
+
+    Args:
+        M: (nu, n) axes of Dikin's ellipsoid.
+        gram: (nu, nu) M M^T.
+        starts: (cones + 1,) first column of each cone, and nu.
+        to_screw: (6, nu) [rad, m] what u does to the platform.
+        u: (nu,) where the walk is, overwritten.
+        every: how many flights.
+        rng: of random numbers.
+        trace: (kept, 6) [rad, m] overwritten with the screws.
+    """
+    for k in range(len(trace)):
+        for _ in range(every):
+            _fly(M, gram, starts, u, rng)
+        for a in range(6):
+            trace[k, a] = 0.0
+            for c in range(len(u)):
+                trace[k, a] += to_screw[a, c] * u[c]
+
+
+@part
+def _fly(
+    M: NDArray, gram: NDArray, starts: NDArray, u: NDArray, rng: np.random.Generator
+) -> None:
+    """A straight flight in a random direction, mirrored wherever it meets a bound.
+
+    The ellipsoid is a ball to it: u = M y, mirrored at normals M_k^T u_k of y; M M^T is
+    all that needs.
+    """
+    w, left = _direction(M, rng), FLIGHT * rng.standard_exponential()
+    v = u.copy()
+    for _ in range(MIRRORS * (M.shape[1] + 1)):
+        reach, wall = _until(starts, v, w, left)
+        for c in range(len(v)):
+            v[c] += reach * w[c]
+        if wall < 0:
+            for c in range(len(v)):
+                u[c] = v[c]
+            return
+        left -= reach
+        first, end = starts[wall], starts[wall + 1]
+        across, size = 0.0, 0.0
+        for a in range(first, end):
+            across += v[a] * w[a]
+            for b in range(first, end):
+                size += v[a] * gram[a, b] * v[b]
+        for a in range(first, end):
+            turn = 2.0 * across / size * v[a]
+            for c in range(len(w)):
+                w[c] -= turn * gram[a, c]
+    # too many mirrors, as in a corner: it stays, so that the way back is as likely
+
+
+@part
+def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
+    """(nu,) random, of Dikin's ellipsoid."""
+    nu, n = M.shape
+    w = np.zeros(nu)
+    for i in range(n):
+        speed = rng.standard_normal()
+        for c in range(nu):
+            w[c] += speed * M[c, i]
+    return w
+
+
+@part
+def _until(starts: NDArray, v: NDArray, w: NDArray, left: float) -> tuple[float, int]:
+    """How far along w from v until a bound is met, and whose; -1 if none before."""
+    reach, wall = left, -1
+    for k in range(len(starts) - 1):
+        ww, vw, vv = 0.0, 0.0, 0.0
+        for c in range(starts[k], starts[k + 1]):
+            ww += w[c] * w[c]
+            vw += v[c] * w[c]
+            vv += v[c] * v[c]
+        if not ww > 1e-300:
+            continue
+        # a point on the boundary may lie outside by rounding
+        root = np.sqrt(vw * vw + ww * max(0.0, 1.0 - vv))
+        if root - vw < reach * ww:
+            reach, wall = (root - vw) / ww, k
+    return reach, wall

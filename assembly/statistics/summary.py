@@ -1,0 +1,239 @@
+"""What the draws of an experiment say, each number with what it is based on.
+
+Yields count all draws.  Energies, wrenches and pose errors exist only for the draws
+that assemble, so each of them says of how many; margins exist for all, and are given
+for all as well.  What is assumed of play stands beside every pose error.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.statistics.estimates import (
+    bracketed,
+    mean,
+    most_probable,
+    proportion,
+    quantile,
+)
+from assembly.statistics.importance_table import importance_report, importance_text
+from assembly.statistics.play import PLAY
+from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.zone import ASSEMBLABLE
+from stiffness.reading import BadInput
+
+if TYPE_CHECKING:
+    import xarray
+
+QUANTILES = (0.05, 0.5, 0.95, 0.99)
+_ROUNDING = 1e-18  # of the largest value: nothing
+_MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
+_WORDS = {
+    "forced": "goes together, by force if need be",
+    "rigid": "goes together by play alone, compliant joints rigid",
+    "rigid_compliant_free": "goes together by play alone, compliant joints free",
+}
+
+
+def summarise(
+    data: "xarray.Dataset",
+    limits: Mapping[str, float] | None = None,
+    strength: float | None = None,
+    level: float = 0.95,
+) -> dict[str, Any]:
+    """What the draws of :func:`assembly.statistics.monte_carlo.run_draws` say.
+
+    Args:
+        data: the draws.
+        limits: by quantity; a draw meets them if none is exceeded.
+        strength: [Pa] yield strength of the links.
+        level: of confidence of all intervals.
+
+    Returns:
+        ``draws`` and how many of them are ``assembled``; ``play`` and what it means;
+        ``assembles`` (with any energy, rigidly in both readings), ``exceeds`` and
+        ``within_limits`` with the probabilities among all draws; mean, quantiles and
+        most probable value of every quantity among those that assemble, of margins
+        also among all; mean, covariance and most probable platform screw.
+
+    Raises:
+        BadInput: a limit's quantity was not computed.
+    """
+    limits = dict(limits or {})
+    if strength is not None:
+        limits.setdefault("stress", strength)
+    count, play = data.sizes["draw"], str(data.attrs["play"])
+    solved = data["status"].values == 0
+    report: dict[str, Any] = {
+        "draws": count, "assembled": int(solved.sum()), "confidence": level,
+        "play": play, "play_means": PLAY[play],
+        "assembles": {"forced": proportion(int(solved.sum()), count, level)},
+        "duality_gap": float(np.nanmax(data["duality_gap"].values, initial=0.0)),
+    }  # fmt: skip
+    for key, name in _MARGINS.items():
+        if key in data:
+            inside = int((data[key].values <= ASSEMBLABLE).sum())
+            report["assembles"][name] = proportion(inside, count, level)
+    if "play_mixed" in data:
+        unmixed = int((data["play_mixed"].values[solved] == 0).sum())
+        report["play_not_mixed"] = unmixed
+    report |= _yields(data, solved, limits, level)
+    report["quantities"] = {
+        key: _described(data, key, solved, level)
+        for key in UNITS
+        if key in data and data[key].dims[0] == "draw" and data[key].size
+        and key not in {"duality_gap", "platform_screw"} and not key.endswith("_lower")
+    }  # fmt: skip
+    screws = data["platform_screw"].values[solved]
+    screws = screws[np.isfinite(screws).all(axis=1)]
+    if len(screws) > 1:
+        report["platform_screw"] = {
+            "play": "least" if play == "worst" else play, "draws": len(screws),
+            "mean": screws.mean(axis=0), "covariance": np.cov(screws.T),
+            "most_probable": [most_probable(part, level) for part in screws.T],
+        }  # fmt: skip
+    if strength is not None:
+        largest = data["stress"].values[solved].max(axis=0, initial=0.0)
+        report["safety"] = strength / np.maximum(largest, 1e-300)
+    if "total_index" in data:
+        report["importance"] = importance_report(data)
+    return report
+
+
+def _yields(
+    data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
+) -> dict[str, Any]:
+    """How often each limit, and any of them, is exceeded; a bracket decides or not."""
+    count = len(solved)
+    met, failed, exceeds = solved.copy(), ~solved, {}
+    for key, limit in limits.items():
+        if key not in data or not data[key].size:
+            raise BadInput(f"limit {key}: not among what was computed")
+        values, lower = _worst(data, key), f"{key}_lower"
+        over = ~(values <= limit)
+        # of a largest pose error the draws hold two bounds, of all others one value
+        least = data[lower].values if lower in data else values
+        surely = ~solved | (least > limit)
+        met &= ~over
+        failed |= surely
+        exceeds[key] = {
+            "limit": limit, "unit": UNITS[key],
+            **bracketed(int(surely.sum()), int((~over).sum()), count, level),
+        }  # fmt: skip
+        if key in POSE_ERRORS:
+            exceeds[key]["play"] = data.attrs["play"]
+    said: dict[str, Any] = {"exceeds": exceeds}
+    if limits:
+        found = bracketed(int(met.sum()), int(failed.sum()), count, level)
+        said["within_limits"] = found
+        if set(POSE_ERRORS) & set(limits):
+            found["play"] = data.attrs["play"]
+    return said
+
+
+def _worst(data: "xarray.Dataset", key: str) -> NDArray:
+    """(k,) a quantity of every draw; of all links the most stressed."""
+    values = np.asarray(data[key].values, dtype=float)
+    return values.max(axis=1) if values.ndim == 2 else values
+
+
+def _described(
+    data: "xarray.Dataset", key: str, solved: NDArray, level: float
+) -> dict[str, Any]:
+    """Mean, quantiles and most probable value of sizes, 0 if that is half of them."""
+    every = _worst(data, key)
+    values = every[solved]
+    finite = values[np.isfinite(values)]
+    said: dict[str, Any] = {
+        "unit": UNITS[key], "of": len(every), "assembled": int(solved.sum()),
+        "draws": len(finite),
+    }  # fmt: skip
+    if key in POSE_ERRORS:
+        said["play"] = str(data.attrs["play"])
+    if key in _MARGINS:
+        every = np.where(np.isnan(every), np.inf, every)
+        said["all_draws"] = {
+            "infinite": proportion(int(np.isinf(every).sum()), len(every), level),
+            "quantiles": {str(q): quantile(every, q, level) for q in QUANTILES},
+        }
+    if len(finite) < 2:
+        return said
+    # what fits by play alone stores nothing: a point of its own, up to rounding
+    zero = finite <= _ROUNDING * finite.max()
+    often = dict.fromkeys(("value", "lower", "upper"), 0.0)
+    if zero.sum() <= len(finite) / 2:
+        often = most_probable(finite[~zero], level, positive=True)
+    return said | {
+        "zero": proportion(int(zero.sum()), len(finite), level),
+        "mean": mean(finite, level),
+        "quantiles": {str(q): quantile(finite, q, level) for q in QUANTILES},
+        "most_probable": often,
+    }
+
+
+def summary_text(summary: Mapping[str, Any]) -> str:
+    """What :func:`summarise` says, for people."""
+    draws, assembled = summary["draws"], summary["assembled"]
+    lines = [
+        f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
+        f"pose errors: play {summary['play']}: {summary['play_means']}",
+    ]
+    if summary.get("play_not_mixed"):
+        lines.append(
+            f"warning: in {summary['play_not_mixed']} draws uniform play is not mixed "
+            "when its walk ends: their pose errors are too narrow"
+        )
+    lines += [f"{_WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
+    for key, found in summary["exceeds"].items():
+        limit = _named(found["limit"], found["unit"])
+        lines.append(f"{_titled(key, found)} above {limit}: {_share(found)}")
+    if "within_limits" in summary:
+        found = summary["within_limits"]
+        lines.append(f"{_titled('yield', found)}, all limits met: {_share(found)}")
+    lines.append(f"of the {assembled} of {draws} draws that assemble:")
+    if not assembled:
+        lines[-1] += " nothing to say"
+    for key, found in summary["quantities"].items():
+        if "mean" in found:
+            often = _named(found["most_probable"]["value"], found["unit"])
+            lines.append(
+                f"  {_titled(key, found)}: most probable {often}, "
+                f"{_quantiles_text(found['quantiles'])}"
+            )
+    lines += [
+        f"{key} of all {draws} draws: "
+        f"{_quantiles_text(found['all_draws']['quantiles'])}"
+        for key, found in summary["quantities"].items() if "all_draws" in found
+    ]  # fmt: skip
+    if "importance" in summary:
+        lines.append(importance_text(summary["importance"]))
+    return "\n".join(lines)
+
+
+def _titled(name: str, found: Mapping[str, Any]) -> str:
+    """A name with what is assumed of play, where that matters."""
+    return f"{name} [play {found['play']}]" if "play" in found else name
+
+
+def _share(found: Mapping[str, float]) -> str:
+    """A probability with its interval, and what it leaves open."""
+    low, high = found["lower"], found["upper"]
+    said = f"{found['probability']:.5g} ({low:.5g} to {high:.5g})"
+    left = found.get("undecided", 0)
+    return said + (f", {left} draws undecided" if left else "")
+
+
+def _named(value: float, unit: str) -> str:
+    """A number with its unit."""
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _quantiles_text(found: Mapping[str, Mapping[str, float]]) -> str:
+    """Median and the value that 95 % stay below."""
+    half, high = found["0.5"], found["0.95"]
+    return (
+        f"median {half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), "
+        f"95 % below {high['value']:.4g} ({high['lower']:.4g} to {high['upper']:.4g})"
+    )
