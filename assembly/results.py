@@ -101,8 +101,7 @@ def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
         "clearance_excess": answer.clearance_excess(),
         "duality_gap": answer.duality_gap(),
         "relative_gap": answer.relative_gap(),
-        "screw": vars(answer.screw_bound),
-    }
+    } | {f"screw_{name}": value for name, value in vars(answer.screw_bound).items()}
     return {
         **_screws_and_wrenches(answer),
         "certificate": certificate,
@@ -392,7 +391,7 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
-        _screw_bound_text(certificate["screw"]),
+        _screw_bound_text(certificate),
         *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
@@ -403,10 +402,15 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
     return [f"note: {remark}" for remark in remarks]
 
 
-def _screw_bound_text(bound: dict[str, float]) -> str:
+def _screw_bound_text(bound: dict[str, Any]) -> str:
     """How far any platform screw of least energy may be from the one told."""
-    wrong = 1e3 * bound["rotation_error"], 1e6 * bound["translation_error"]
-    loose = 1e3 * bound["rotation_open"], 1e6 * bound["translation_open"]
+    wrong, loose = (
+        (
+            1e3 * bound[f"screw_rotation_{kind}"],
+            1e6 * bound[f"screw_translation_{kind}"],
+        )
+        for kind in ("error", "open")
+    )
     text = f"platform error proved to {wrong[0]:.1e} mrad, {wrong[1]:.1e} um"
     if max(loose) > 1e-9:
         text += (
