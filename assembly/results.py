@@ -404,14 +404,12 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
 
 def _screw_bound_text(bound: dict[str, Any]) -> str:
     """How far any platform screw of least energy may be from the one told."""
-    wrong, loose = (
-        (
-            1e3 * bound[f"screw_rotation_{kind}"],
-            1e6 * bound[f"screw_translation_{kind}"],
-        )
+    halves = ("rotation", 1e3), ("translation", 1e6)
+    (turn, shift), loose = (
+        [scale * bound[f"screw_{half}_{kind}"] for half, scale in halves]
         for kind in ("error", "open")
     )
-    text = f"platform error proved to {wrong[0]:.1e} mrad, {wrong[1]:.1e} um"
+    text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
     if max(loose) > 1e-9:
         text += (
             "; at the same energy play leaves open up to "
