@@ -383,7 +383,7 @@ def error(
     for key, value in options.items():
         if not 0 < value <= LARGEST_LENGTH:
             option = "--" + key.replace("_", "-")
-            expected = f"a number > 0 and at most {LARGEST_LENGTH:g}"
+            expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
     acting = act(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),

@@ -102,8 +102,7 @@ def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
         "clearance_excess": answer.clearance_excess(),
         "duality_gap": answer.duality_gap(),
         "relative_gap": answer.relative_gap(),
-        "screw": vars(answer.screw_bound),
-    }
+    } | {f"screw_{name}": value for name, value in vars(answer.screw_bound).items()}
     return {
         **_screws_and_wrenches(answer),
         "certificate": certificate,
@@ -384,7 +383,7 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
-        _screw_bound_text(certificate["screw"]),
+        _screw_bound_text(certificate),
         *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
@@ -395,11 +394,14 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
     return [f"note: {remark}" for remark in remarks]
 
 
-def _screw_bound_text(bound: dict[str, float]) -> str:
+def _screw_bound_text(bound: dict[str, Any]) -> str:
     """How far any platform screw of least energy may be from the one told."""
-    wrong = 1e3 * bound["rotation_error"], 1e6 * bound["translation_error"]
-    loose = 1e3 * bound["rotation_open"], 1e6 * bound["translation_open"]
-    text = f"platform error proved to {wrong[0]:.1e} mrad, {wrong[1]:.1e} um"
+    halves = ("rotation", 1e3), ("translation", 1e6)
+    (turn, shift), loose = (
+        [scale * bound[f"screw_{half}_{kind}"] for half, scale in halves]
+        for kind in ("error", "open")
+    )
+    text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
     if max(loose) > 1e-9:
         text += (
             "; at the same energy play leaves open up to "

@@ -87,7 +87,7 @@ def bound_screw(answer: Assembly) -> ScrewBound:
     most = _heights(within_bounds(answer, "elastic", kept, whole))
     flat = _heights(within_bounds(answer, "elastic", kept, valley))
     with np.errstate(invalid="ignore"):
-        rest = np.where(np.isinf(most), 0.0, np.maximum(most - flat, 0.0))
+        rest = np.where(np.isinf(flat), 0.0, np.maximum(most - flat, 0.0))
     halves = [np.linalg.norm(v[half]) for v in (most, flat, rest)
               for half in (slice(0, 3), slice(3, 6))]  # fmt: skip
     return ScrewBound(*(float(v) for v in halves))

@@ -8,8 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from assembly.energy import CannotAssemble, solve_assembly
+from assembly.exact import solve_exact
 from assembly.flexibility import flexibility
 from assembly.load import row_forces
+from assembly.pose_error import bound_pose_error
 from assembly.posture import Posture, home_posture, place_many, place_robot
 from assembly.reference import reference_energy
 from assembly.resting_play import without_play
@@ -340,6 +342,13 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
         assert batch.energy[0] == pytest.approx(
             solve_assembly(second).energy, rel=1e-7, abs=scale
         )
+        if load is None:
+            error, same = (bound_pose_error(a, "free") for a in (answer, other))
+            assert error.translation_error == pytest.approx(
+                same.translation_error, abs=1e-6
+            )
+            exact = [solve_exact(p).energy for p in (first, second)]
+            assert exact[0] == pytest.approx(exact[1], rel=1e-6, abs=scale)
         tight = without_play(one), without_play(two)
         rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
                 for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
