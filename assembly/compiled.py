@@ -1,8 +1,9 @@
 """How loops are compiled: once on each machine, by numba, which keeps them on disk.
 
-``kernel`` is for functions that Python calls, ``part`` for those that only other
-compiled ones call: without the wrappers for Python there is less to compile.  Whoever
-waits for the first compilation is told so, once, on stderr.
+They have one signature each, so that processes that compile at once write the same.
+Assignments to slices, array expressions and sums bring numba's broadcasting along and
+take several times as long to compile as loops (:mod:`assembly.solvers.vectors`).
+Whoever waits for the first compilation is told so, once, on stderr.
 """
 
 import multiprocessing
@@ -14,7 +15,6 @@ from numba import njit
 from numba.core import event
 
 kernel = partial(njit, cache=True, error_model="numpy", nogil=True)
-part = partial(kernel, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 class _Announcement(event.Listener):

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
 _ROUNDED = 1e-5  # scaled residual accepted where it cannot be made smaller
@@ -55,7 +55,7 @@ def follow_all(
     return ends, progress
 
 
-@part
+@kernel
 def _follow(
     parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
     platform: int, start: NDArray, pose: NDArray, held: NDArray, size: float,
@@ -98,7 +98,7 @@ def _follow(
     return done
 
 
-@part
+@kernel
 def _newton(
     parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
     platform: int, begin: NDArray, pose: NDArray, held: NDArray, size: float,
@@ -166,7 +166,7 @@ def forward(
     return R, p
 
 
-@part
+@kernel
 def _equations(
     kinds: NDArray, carries: NDArray, pairs: NDArray, platform: int, R: NDArray,
     p: NDArray, pose: NDArray, free: NDArray, unit: NDArray, size: float, r: NDArray,
@@ -213,7 +213,7 @@ def _equations(
                 J[row + k, i] = 0.0
 
 
-@part
+@kernel
 def _move(
     kind: int, R: NDArray, origin: NDArray, point: NDArray, factor: float, size: float,
     J: NDArray, row: int, column: int,
@@ -231,7 +231,7 @@ def _move(
             J[row + 3 + k, column] = factor * R[k, 2] / size
 
 
-@part
+@kernel
 def _largest(v: NDArray) -> float:
     """Largest absolute component; not a number if one is none."""
     largest = 0.0
@@ -243,7 +243,7 @@ def _largest(v: NDArray) -> float:
     return largest
 
 
-@part
+@kernel
 def _least_step(J: NDArray, r: NDArray) -> NDArray:
     """Least-squares solution of J x = r, of least norm by damping at rounding level."""
     n = J.shape[1]
@@ -281,7 +281,7 @@ def _least_step(J: NDArray, r: NDArray) -> NDArray:
     return x
 
 
-@part
+@kernel
 def _times_transposed(A: NDArray, B: NDArray) -> NDArray:
     """A B^T of 3 by 3 matrices."""
     C = np.zeros((3, 3))
@@ -292,7 +292,7 @@ def _times_transposed(A: NDArray, B: NDArray) -> NDArray:
     return C
 
 
-@part
+@kernel
 def rotation_log(R: NDArray) -> NDArray:
     """Rotation vector of a rotation matrix, by its quaternion."""
     # the quaternion's largest component first, so that nothing cancels:
@@ -325,7 +325,7 @@ def rotation_log(R: NDArray) -> NDArray:
     return turn
 
 
-@part
+@kernel
 def _rotation_exp(x: float, y: float, z: float) -> NDArray:
     """Rotation matrix of a rotation vector (Rodrigues)."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -336,7 +336,7 @@ def _rotation_exp(x: float, y: float, z: float) -> NDArray:
     return _turned(x, y, z, a, b)
 
 
-@part
+@kernel
 def _inverse_left_jacobian(r: NDArray) -> NDArray:
     """Change of a rotation vector per small turn in fixed axes."""
     # Chirikjian, Stochastic Models, Information Theory, and Lie Groups 2, section 10.7
@@ -347,7 +347,7 @@ def _inverse_left_jacobian(r: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-@part
+@kernel
 def _turned(x: float, y: float, z: float, a: float, b: float) -> NDArray:
     """1 + a S + b S S with S the matrix of the cross product with (x, y, z)."""
     A = np.empty((3, 3))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.compiled_reduction import (
     Structure,
     eliminate_springs,
@@ -181,7 +181,7 @@ def _certify(
     return UNCERTIFIED
 
 
-@part
+@kernel
 def _complementary(
     s: Structure, P: NDArray, errors: NDArray, multipliers: NDArray, motions: NDArray
 ) -> tuple[float, float]:
@@ -219,7 +219,7 @@ def _complementary(
     return total, cost
 
 
-@part
+@kernel
 def _minimise(
     solvers: ConeSolvers, s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray,
     y: NDArray,
@@ -248,7 +248,7 @@ def _minimise(
     return road
 
 
-@part
+@kernel
 def small_answer(
     solvers: ConeSolvers, Gt: NDArray, h: NDArray, starts: NDArray, relative: float,
     absolute: float, u: NDArray, y: NDArray,
@@ -276,7 +276,7 @@ def small_answer(
     return INTERIOR
 
 
-@part
+@kernel
 def _into_cones(starts: NDArray, u: NDArray) -> None:
     """Cones' vectors shortened to length 1 where rounding made them longer."""
     for c in range(len(starts) - 1):

@@ -8,7 +8,7 @@ any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.compiled_assembly import small_answer
 from assembly.solvers.compiled_zone import farthest, turn_first
 from assembly.solvers.cone_solvers import ConeSolvers
@@ -109,7 +109,7 @@ def least_energies(
         road[point] = SOLVED if fine else UNCERTIFIED
 
 
-@part
+@kernel
 def _within(
     Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
 ) -> bool:

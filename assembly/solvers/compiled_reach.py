@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.compiled_reduction import (
     Structure,
     free_columns,
@@ -122,7 +122,7 @@ def bound_all(
                 copy(search.best, out.translation_screw[i])
 
 
-@part
+@kernel
 def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
     """Which clearances press on their bound, as in :mod:`assembly.pose_error`.
 
@@ -161,7 +161,7 @@ def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
     return decided, loaded
 
 
-@part
+@kernel
 def body_of(
     s: Structure, T: NDArray, mismatch: float, centre: NDArray, clearances: NDArray,
     motions: NDArray, loaded: NDArray, offset: NDArray,
@@ -225,7 +225,7 @@ def body_of(
     return decided, Body(centre, X, B, start, starts[: cones + 1].copy())
 
 
-@part
+@kernel
 def _follow(
     s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
     order: NDArray, rank: int, m: int,
@@ -252,7 +252,7 @@ def _follow(
     return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
 
 
-@part
+@kernel
 def _within_bounds(
     s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
     order: NDArray, rank: int, clearances: NDArray, motions: NDArray, loaded: NDArray,
@@ -286,7 +286,7 @@ def _within_bounds(
     return True
 
 
-@part
+@kernel
 def _move_platform(
     s: Structure, P: NDArray, follow: NDArray, i: int, screw: NDArray
 ) -> None:
@@ -302,7 +302,7 @@ def _move_platform(
         screw[a] *= s.cone_size[i] if a < 3 else s.cone_size[i] * s.size
 
 
-@part
+@kernel
 def _shift(screw: NDArray, offset: NDArray) -> None:
     """Read a screw at another point of the platform."""
     for a in range(3):
@@ -310,7 +310,7 @@ def _shift(screw: NDArray, offset: NDArray) -> None:
         screw[3 + a] += screw[b] * offset[c] - screw[c] * offset[b]
 
 
-@part
+@kernel
 def _into_cones(u: NDArray, starts: NDArray, cones: int) -> None:
     """Cones' vectors shortened to length 1 where rounding made them longer."""
     for c in range(cones):

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
 from assembly.solvers.interior import LANES
 from assembly.solvers.vectors import copy, divide, fill
@@ -95,7 +95,7 @@ def paths_of(T: NDArray, s: Structure) -> NDArray:
     return P
 
 
-@part
+@kernel
 def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
     """Closure columns of the free motions, as rows."""
     F = np.zeros((len(s.free_frame), m))
@@ -109,7 +109,7 @@ def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
     return F
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
     """Orthonormal rows orthogonal to all triangulated ones."""
     count = m - rank
@@ -120,7 +120,7 @@ def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
     return np.ascontiguousarray(Zt[:, :count].T)
 
 
-@part
+@kernel
 def grouped_springs(s: Structure, P: NDArray) -> NDArray:
     """Springs that act together, turned into six: the same sum of squares, no sum."""
     count = len(s.groups) - 1
@@ -146,7 +146,7 @@ def grouped_springs(s: Structure, P: NDArray) -> NDArray:
     return L
 
 
-@part
+@kernel
 def largest_spring(s: Structure, P: NDArray) -> float:
     """Largest entry of the springs' closure columns, for the noise floor."""
     largest = 0.0
@@ -163,7 +163,7 @@ def largest_spring(s: Structure, P: NDArray) -> float:
     return largest
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
     """What row i of Z reads of a screw that enters the closures with these signs."""
     for a in range(6):
@@ -174,7 +174,7 @@ def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
                 part[a] += pattern[k] * Z[i, 6 * k + a]
 
 
-@part
+@kernel
 def spring_rows(s: Structure, Z: NDArray, L: NDArray) -> NDArray:
     """Rows of Z times the closure columns of the grouped springs."""
     Y = np.zeros((len(Z), 6 * len(L)))
@@ -188,7 +188,7 @@ def spring_rows(s: Structure, Z: NDArray, L: NDArray) -> NDArray:
     return Y
 
 
-@part
+@kernel
 def eliminate_springs(
     Z: NDArray, Y: NDArray, diagonal: NDArray, order: NDArray, rank: int
 ) -> None:
@@ -204,7 +204,7 @@ def eliminate_springs(
                 Z[i, a] /= diagonal[i]
 
 
-@part
+@kernel
 def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
     """(m,) what the errors leave open in the closures."""
     closures = s.patterns.shape[1]
@@ -223,7 +223,7 @@ def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
     return known
 
 
-@part
+@kernel
 def rigid_rows(
     s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray, errors: NDArray,
     tolerance: float,
@@ -272,7 +272,7 @@ def rigid_rows(
     return False
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def small_problem(
     s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray
 ) -> tuple[NDArray, NDArray]:
@@ -299,7 +299,7 @@ def small_problem(
     return Gt, h
 
 
-@part
+@kernel
 def moved_by(
     s: Structure, P: NDArray, L: NDArray, u: NDArray, spring: NDArray, known: NDArray,
     screw: NDArray,
@@ -327,7 +327,7 @@ def moved_by(
     return moved
 
 
-@part
+@kernel
 def least_motions(
     F: NDArray, turns: NDArray, diagonal: NDArray, order: NDArray, rank: int,
     moved: NDArray, motions: NDArray,

@@ -11,7 +11,7 @@ where nothing is violated.  Its multipliers n bound the margin from below,
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.compiled_reduction import (
     Structure,
     free_columns,
@@ -95,7 +95,7 @@ def all_margins(
                 road[i] = SOLVED
 
 
-@part
+@kernel
 def largest_clearance(s: Structure, P: NDArray) -> float:
     """Largest entry of the clearances' closure columns, for the noise floor."""
     largest = 0.0
@@ -111,7 +111,7 @@ def largest_clearance(s: Structure, P: NDArray) -> float:
     return largest
 
 
-@part
+@kernel
 def orthonormal_rows(
     rows: NDArray, right: NDArray, largest: float
 ) -> tuple[bool, NDArray, NDArray]:
@@ -146,7 +146,7 @@ def orthonormal_rows(
     return True, B, w
 
 
-@part
+@kernel
 def turn_first(B: NDArray, w: NDArray, size: float) -> None:
     """Combine the rows of B so that the first is along w and the others across it."""
     v = divide(w, size)
@@ -162,7 +162,7 @@ def turn_first(B: NDArray, w: NDArray, size: float) -> None:
         B[0, c] *= sign
 
 
-@part
+@kernel
 def farthest(
     solvers: ConeSolvers, B: NDArray, starts: NDArray
 ) -> tuple[NDArray, NDArray]:

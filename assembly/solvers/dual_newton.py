@@ -21,7 +21,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import part
+from assembly.compiled import kernel
 from assembly.solvers.interior import LANES, add, dot, layers_of
 
 FAST = {"contract", "reassoc"}
@@ -118,7 +118,7 @@ def dual_newton(
     return taken
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _slopes(
     M: NDArray, h: NDArray, push: NDArray, springs: int, layers: NDArray, old: NDArray,
     sigma: float, u: NDArray, y: NDArray, g: NDArray, z: NDArray, B: NDArray,
@@ -192,7 +192,7 @@ def _slopes(
     return smooth, 0.5 * residual, kink, 0.5 * primal
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
     """Lower half of S = B B^T + diag(1 .. 1, 0 .. 0)."""
     for i in range(len(S)):
@@ -203,7 +203,7 @@ def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
             S[i, i] += 1.0
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _solve(S: NDArray, g: NDArray, x: NDArray) -> bool:
     """S x = g by Cholesky, in the lower half of S."""
     r = len(g)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
@@ -102,7 +102,7 @@ def begin(
     return search
 
 
-@part
+@kernel
 def _first_direction(body: Body, search: Search) -> None:
     """Where the body would reach farthest if no closure held it."""
     p, nv = body.rows.shape
@@ -204,7 +204,7 @@ def learn(
     search.bounds[1] = max(search.bounds[1], search.bounds[0])
 
 
-@part
+@kernel
 def _improve(search: Search, screw: NDArray) -> None:
     """Keep a screw that is farther than the best."""
     size = 0.0
@@ -218,7 +218,7 @@ def _improve(search: Search, screw: NDArray) -> None:
         copy(screw, search.best)
 
 
-@part
+@kernel
 def _add_plane(search: Search, direction: NDArray, height: float) -> None:
     """A new plane: of the box, or kept for it, or cut at once."""
     stage = search.counts[0]
@@ -235,7 +235,7 @@ def _add_plane(search: Search, direction: NDArray, height: float) -> None:
         search.counts[2] += 1
 
 
-@part
+@kernel
 def _set_side(search: Search, direction: NDArray, height: float) -> None:
     """A side of the box, if the direction is one of its axes or the opposite."""
     for axis in range(3):
@@ -249,7 +249,7 @@ def _set_side(search: Search, direction: NDArray, height: float) -> None:
             search.heights[0, axis] = -height
 
 
-@part
+@kernel
 def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> None:
     """What a symmetric body's support says of the other side: v turned round."""
     start = body.start
@@ -301,7 +301,7 @@ def choose(search: Search) -> None:
         _towards(search, corner)
 
 
-@part
+@kernel
 def _towards(search: Search, point: NDArray) -> None:
     """Look towards a point."""
     size = np.sqrt(inner(point, point))
@@ -309,7 +309,7 @@ def _towards(search: Search, point: NDArray) -> None:
         search.direction[a] = point[a] / size
 
 
-@part
+@kernel
 def _start_boxing(search: Search) -> None:
     """A box along the best point's direction, its planes not known yet."""
     search.counts[0] = _BOXING

@@ -11,13 +11,13 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import part
+from assembly.compiled import kernel
 from assembly.solvers.interior import LANES
 
 _CLEAR = 10.0  # a pivot within this factor of the threshold decides nothing
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def triangulate(
     F: NDArray, turns: NDArray, diagonal: NDArray, order: NDArray, relative: float,
     floor: float, clean: float,
@@ -89,7 +89,7 @@ def triangulate(
     return p
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def turn_all(F: NDArray, turns: NDArray, rank: int, X: NDArray) -> None:
     """From the triangle's coordinates back: every column x of X becomes Q x."""
     m, count = X.shape
@@ -110,7 +110,7 @@ def turn_all(F: NDArray, turns: NDArray, rank: int, X: NDArray) -> None:
                 row[i] -= weight * dots[i]
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def turn(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
     """From the triangle's coordinates back: x becomes Q x."""
     for step in range(rank - 1, -1, -1):
@@ -123,7 +123,7 @@ def turn(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
             x[a] -= along * own[a]
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def turn_back(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
     """Into the triangle's coordinates: x becomes Q^T x."""
     for step in range(rank):

@@ -20,7 +20,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import part
+from assembly.compiled import kernel
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the way to the nearest cone's boundary
@@ -144,7 +144,7 @@ def interior_point(
     return answer, y[r:].copy(), taken
 
 
-@part
+@kernel
 def layers_of(starts: NDArray) -> tuple[NDArray, NDArray]:
     """Columns sorted into layers, the largest cones first.
 
@@ -170,7 +170,7 @@ def layers_of(starts: NDArray) -> tuple[NDArray, NDArray]:
     return order, layers
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def dot(a: NDArray, b: NDArray) -> float:
     """Inner product of two rows, quick where they end in zeros to a length of LANES.
 
@@ -187,7 +187,7 @@ def dot(a: NDArray, b: NDArray) -> float:
     return total
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def add(weight: float, row: NDArray, total: NDArray) -> None:
     """Add a multiple of a row.
 
@@ -200,7 +200,7 @@ def add(weight: float, row: NDArray, total: NDArray) -> None:
         total[j] += weight * row[j]
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _pull(M: NDArray, y: NDArray, push: NDArray, z1: NDArray) -> None:
     """z1 = M^T y + push."""
     for j in range(len(z1)):
@@ -209,7 +209,7 @@ def _pull(M: NDArray, y: NDArray, push: NDArray, z1: NDArray) -> None:
         add(y[i], M[i], z1)
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _sum(layers: NDArray, a: NDArray, b: NDArray, total: NDArray) -> None:
     """Inner products of a's and b's parts in every cone."""
     for c in range(len(total)):
@@ -223,7 +223,7 @@ def _sum(layers: NDArray, a: NDArray, b: NDArray, total: NDArray) -> None:
             total[c] += x[c] * y[c]
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _scalings(
     layers: NDArray, u: NDArray, z0: NDArray, z1: NDArray, eta: NDArray, w0: NDArray,
     w1: NDArray, l0: NDArray, l1: NDArray, across: NDArray, along: NDArray,
@@ -281,7 +281,7 @@ def _scalings(
     return True
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _fill_system(
     layers: NDArray, M: NDArray, w1: NDArray, eta: NDArray, along: NDArray,
     across: NDArray, sums: NDArray, B: NDArray, S: NDArray, r: int,
@@ -307,7 +307,7 @@ def _fill_system(
         S[i, i] += 1.0
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _cholesky(S: NDArray) -> bool:
     """Factor the lower half in place; rows lost to rounding get a huge pivot.
 
@@ -335,7 +335,7 @@ def _cholesky(S: NDArray) -> bool:
     return True
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _square_scaled(
     layers: NDArray, w1: NDArray, across: NDArray, along: NDArray, sums: NDArray,
     x: NDArray, out: NDArray,
@@ -353,7 +353,7 @@ def _square_scaled(
             found[c] = across[c] * (own[c] - lengthwise) + along[c] * lengthwise
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _direction(
     layers: NDArray, M: NDArray, S: NDArray, eta: NDArray, w0: NDArray, w1: NDArray,
     across: NDArray, along: NDArray, t0: NDArray, t1: NDArray, r0: NDArray, u: NDArray,
@@ -405,7 +405,7 @@ def _direction(
         dz0[c] = r0[c] - part[c] - other[c]
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _corrected(
     layers: NDArray, eta: NDArray, w0: NDArray, w1: NDArray, l0: NDArray, l1: NDArray,
     du: NDArray, dz0: NDArray, dz1: NDArray, target: float, sums: NDArray,
@@ -446,7 +446,7 @@ def _corrected(
             t[c] = (t[c] - t0[c] * scaled[c]) * ll[c]
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _longest(
     layers: NDArray, u: NDArray, du: NDArray, z0: NDArray, z1: NDArray, dz0: NDArray,
     dz1: NDArray, sums: NDArray,
@@ -473,7 +473,7 @@ def _longest(
     return longest
 
 
-@part(fastmath=FAST)
+@kernel(fastmath=FAST)
 def _root(a: float, b: float, c: float) -> float:
     """Smallest t > 0 with a t^2 + 2 b t + c = 0 (c < 0), without cancellation."""
     inside = b * b - a * c

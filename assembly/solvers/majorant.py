@@ -20,13 +20,13 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 
 _LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
 _SWEEPS, _STEPS = 12, 60
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def majorant_bound(
     centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray, w: NDArray
 ) -> float:
@@ -76,7 +76,7 @@ def majorant_bound(
     return constant + largest_on_sphere(Q, linear)
 
 
-@part(fastmath={"contract", "reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def _follow_rows(
     H: NDArray, X: NDArray, start: NDArray, sizes: NDArray, A: NDArray, fixed: NDArray
 ) -> bool:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.vectors import divide, inner
 
@@ -40,7 +40,7 @@ class Body(NamedTuple):
     starts: NDArray
 
 
-@part
+@kernel
 def support(
     solvers: ConeSolvers, body: Body, part: int, direction: NDArray, tolerance: float
 ) -> tuple[float, NDArray, NDArray, NDArray]:
@@ -134,7 +134,7 @@ def screw_at(body: Body, v: NDArray) -> NDArray:
     return screw
 
 
-@part
+@kernel
 def symmetric(body: Body) -> bool:
     """Whether v -> -v leaves the rows satisfied."""
     for i in range(len(body.rows)):

@@ -7,10 +7,10 @@ and its error messages into every kernel that calls it: ten times the code to co
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import part
+from assembly.compiled import kernel
 
 
-@part
+@kernel
 def inner(a: NDArray, b: NDArray) -> float:
     """a.b, summed in order; :func:`assembly.solvers.interior.dot` is the quick one."""
     total = 0.0
@@ -19,21 +19,21 @@ def inner(a: NDArray, b: NDArray) -> float:
     return total
 
 
-@part
+@kernel
 def fill(to: NDArray, value: float) -> None:
     """Set all of a row to a value."""
     for j in range(len(to)):
         to[j] = value
 
 
-@part
+@kernel
 def copy(source: NDArray, to: NDArray) -> None:
     """Copy a row into the first components of another."""
     for j in range(len(source)):
         to[j] = source[j]
 
 
-@part
+@kernel
 def divide(v: NDArray, divisor: float) -> NDArray:
     """(n,) a new row: v / divisor."""
     quotient = np.empty(len(v))

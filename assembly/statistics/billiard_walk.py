@@ -7,7 +7,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel, part
+from assembly.compiled import kernel
 
 FLIGHT = 2.0  # mean time; Dikin's ellipsoid is crossed in about one
 MIRRORS = 20  # of a flight at most, for each dimension
@@ -60,7 +60,7 @@ def walk(
                 trace[k, a] += to_screw[a, c] * u[c]
 
 
-@part
+@kernel
 def _fly(
     M: NDArray, gram: NDArray, starts: NDArray, u: NDArray, rng: np.random.Generator
 ) -> None:
@@ -93,7 +93,7 @@ def _fly(
     # too many mirrors, as in a corner: it stays, so that the way back is as likely
 
 
-@part
+@kernel
 def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
     """(nu,) random, of Dikin's ellipsoid."""
     nu, n = M.shape
@@ -105,7 +105,7 @@ def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
     return w
 
 
-@part
+@kernel
 def _until(starts: NDArray, v: NDArray, w: NDArray, left: float) -> tuple[float, int]:
     """How far along w from v until a bound is met, and whose; -1 if none before."""
     reach, wall = left, -1
