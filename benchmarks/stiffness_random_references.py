@@ -17,7 +17,7 @@ from stiffness_round_references import AXIS, BASE, FREE, TIP, half_section
 from stiffness_round_references import stiffness as round_stiffness
 
 SHRINK = 0.15
-MOST = 60e3  # unknowns of the highest order
+MOST = 50e3  # unknowns of the highest order
 # motions RX .. TZ about a point of the z axis: their own images in x = 0 and in y = 0
 EVEN = {"x": (1, 0, 0, 0, 1, 1), "y": (0, 1, 0, 1, 0, 1)}
 
@@ -88,7 +88,7 @@ def bricks(part, lame):
     mesh = brick_mesh(places, full, 0 if across else 2, mirrors)
     tip = (x[-1], 0, (z[-2] + z[-1]) / 2) if across else center_of_tip(part)
     cells = int(full.sum())
-    order = next((p for p in (5, 4) if 3 * cells * p**3 < MOST), 4) + (least > 1)
+    order = next((p for p in (5, 4) if 3 * cells * p**3 < MOST), 4)
     found = [by_symmetry(mesh, p, mirrors, tip, lame) for p in (order - 1, order)]
     return *found, 0.3
 
@@ -99,8 +99,10 @@ def graded(places, thin, wide, cut, least):
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
         whole = cut and k == 0  # nothing happens at the cut
         size = (b - a) / (1 if whole else 2)
-        layers = max(least, round(np.log(size / (SHRINK * thin)) / -np.log(SHRINK)))
-        ends = [size * SHRINK**n for n in range(layers, 0, -1)]
+        # layers at free edges decay like exp(-pi s / thin): several cells within them
+        layers = max(least, round(np.log(size / (SHRINK * thin)) / np.log(4)))
+        ends = [size * (0.25 if layers > 2 else SHRINK) ** n
+                for n in range(layers, 0, -1)]  # fmt: skip
         low, high = a + (0 if whole else ends[-1]), b - ends[-1]
         parts = max(1, int(np.ceil((high - low) / (1.3 * max(wide, thin)))))
         inside = np.linspace(low, high, parts + 1)
