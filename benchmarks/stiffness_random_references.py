@@ -1,4 +1,4 @@
-"""K_E of the parts of ``stiffness_random_parts.py`` by NGSolve (``pip install ngsolve``).
+"""K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
 
 Bodies of revolution by Fourier modes in their half section, order 8; what is made of
 bricks by bricks that shrink geometrically toward every edge, a half or a quarter of the
@@ -63,7 +63,7 @@ def round_part(part, lame):
 
 
 def bricks(part, lame):
-    """A half (y > 0) or, where x has it too, a quarter; the highest order affordable."""
+    """A half (y > 0) or, where x has it too, a quarter, as high an order as pays."""
     x, y, z = part.planes
     mirrors = "xy" if np.allclose(x, -np.array(x[::-1])) else "y"
     thin = min(np.diff(p).min() for p in part.planes)
@@ -78,7 +78,9 @@ def bricks(part, lame):
         cut = axis in mirrors
         if cut:
             half = len(places) // 2
-            kept = np.take(kept, np.arange(half - 1, len(places) - 1), "xyz".index(axis))
+            kept = np.take(
+                kept, np.arange(half - 1, len(places) - 1), "xyz".index(axis)
+            )
             places = [0.0, *places[half:]]
         lines.append(graded(places, thin, wide, cut, least))
     owner = [np.repeat(np.arange(len(parts)), parts) for _, parts in lines]

@@ -20,7 +20,6 @@ from stiffness.link import LinkStiffness, scaled
 from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, screw_map
 
-
 _MUCH_BETTER = 0.25  # of the largest difference, and no less than the mesh's error
 _TURNS = {90: "a quarter", 180: "half a turn", 270: "three quarters"}
 
@@ -55,8 +54,10 @@ class Comparison:
 
     @property
     def better_turn(self) -> tuple[int, float]:
-        """Degrees about base to tip by which the beam agrees much better, and what is
-        left [1] of the largest difference; 0 and the difference if it nowhere does."""
+        """A turn of the beam about base to tip that makes it agree much better.
+
+        Its degrees, 0 if there is none, and the largest difference [1] it leaves.
+        """
         worst = float(np.abs(self.difference).max())
         axis = self.fea.tip - self.fea.base
         if not np.linalg.norm(axis) > 0:
@@ -76,10 +77,11 @@ class Comparison:
         angle, left = self.better_turn
         if angle:
             worst = 100 * np.abs(self.difference).max()
+            swap = "" if angle == 180 else ", or width and height swapped"
             return (
                 f"The beam's axes look swapped: turned by {_TURNS[angle]} about base "
-                f"to tip it would differ by {100 * left:.3g} % at most, not {worst:.3g} "
-                f"%.  Expected another up{', or width and height swapped' * (angle != 180)}."
+                f"to tip it would differ by {100 * left:.3g} % at most, not "
+                f"{worst:.3g} %.  Expected another up{swap}."
             )
         c = self.end_effect
         noise = self.fea.relative_error_estimate * self.slenderness

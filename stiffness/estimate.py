@@ -11,10 +11,10 @@ whatever their two numbers say; all of s_3 is taken there, and a little more.
 
 Where a thin wall ends, a twisted plate's stresses turn round within a layer as deep as
 a third of the wall.  An element much wider than the wall does not see that, and s_2,
-full of the plate's own linear stresses, makes it look smooth.  But it leaves tractions t on the free surface.  What would undo
-them is a wave along the surface, half as long as the face is narrow, l, and decays
-like exp(-pi x / l): its energy, the integral of t^2 / (2 mu) l / pi, is taken where it
-is the larger one.
+full of the plate's own linear stresses, makes it look smooth.  But it leaves tractions
+t on the free surface.  What would undo them is a wave along the surface, half as long
+as the face is narrow, l, that decays like exp(-pi x / l): its energy, the integral of
+t^2 / (2 mu) l / pi, is taken where it is the larger one.
 
 The estimate sees the field, not the shape: what a bent element leaves of a shape is
 counted apart, by :func:`shape_errors`.

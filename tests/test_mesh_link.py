@@ -60,7 +60,10 @@ position = {position}
 name = "tool"
 parent = "slide"
 {more}
-link = {{ mesh = {{ surface = "bar.stl", base = "z=0", tip = "z=0.08" {axis} }}, young = 6e10, poisson = 0.3 }}
+[frame.link]
+mesh = {{ surface = "bar.stl", base = "z=0", tip = "z=0.08" {axis} }}
+young = 6e10
+poisson = 0.3
 """
 
 
