@@ -1,7 +1,7 @@
 """Judge the error estimate of K_E on parts drawn at random, against other solvers.
 
-``python benchmarks/stiffness_random_parts.py [--set test] [--parts 0:33] [--cache F]``
-(``pip install ngsolve`` for references that are not yet in the cache)
+``python benchmarks/stiffness_random_parts.py [--set test] [--parts 0:33]``
+(``pip install ngsolve`` for parts whose reference is not in the JSON file beside this)
 
 Eleven kinds of parts in turn: plate, bar, box, channel, L-bracket, fork, rod, tube,
 cone, stepped rod and an eye with a bore, thin and thick, slender and stubby, nu from 0
@@ -10,8 +10,9 @@ to 0.45, all by the set's seed and the part's number.  Each is solved as
 ``stiffness_random_references.py``.  Printed: unknowns, meshes, true error, told error,
 effectivity told / true, all largest entries scaled by sqrt(K_ii K_jj); then their
 distribution.  The reference's own uncertainty is beside the true error; parts are
-counted as covered if told is not below true.  References and answers are kept in a
-JSON file, so that a campaign resumes and nothing is computed twice.
+counted as covered if told is not below true.  References and answers are kept in
+JSON files, so that a campaign resumes and nothing is computed twice; the answers'
+file is to be deleted when the code has changed.
 """
 
 import argparse
@@ -34,6 +35,7 @@ SEEDS = {"training": 1, "test": 2}  # of the factors in stiffness/, and of their
 KINDS = ("plate", "bar", "box", "channel", "bracket", "fork",
          "rod", "tube", "cone", "stepped", "eye")  # fmt: skip
 FACETS = 64
+REFERENCES = Path(__file__).with_suffix(".json")
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,11 +283,11 @@ def reference(part: Part) -> dict:
     return independent_stiffness(part, YOUNG)
 
 
-def judge(name: str, number: int, cache: Path) -> float:
+def judge(name: str, number: int, references: Path, answers: Path) -> float:
     """One row; told over true."""
     part = draw_part(SEEDS[name], number)
-    known = kept(cache, f"{name}-{number}", lambda: reference(part))
-    found = kept(cache.with_suffix(".answers.json"), f"{name}-{number}",
+    known = kept(references, f"{name}-{number}", lambda: reference(part))
+    found = kept(answers, f"{name}-{number}",
                  lambda: answer(part))  # fmt: skip
     truth = np.array(known["stiffness"])
     true = np.abs(scaled(np.array(found["stiffness"]) - truth, truth)).max()
@@ -303,11 +305,14 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--set", choices=list(SEEDS), default="test")
     parser.add_argument("--parts", default="0:33", help="numbers, first:last + 1")
-    parser.add_argument("--cache", type=Path, default=Path("random_parts.json"))
+    parser.add_argument("--references", type=Path, default=REFERENCES)
+    parser.add_argument("--answers", type=Path, default=Path("random_parts.json"))
     asked = parser.parse_args()
     print("    part        nu unknowns meshes  true error            told   told/true")
     numbers = range(*(int(n) for n in asked.parts.split(":")))
-    ratios = np.array([judge(asked.set, n, asked.cache) for n in numbers])
+    ratios = np.array([
+        judge(asked.set, n, asked.references, asked.answers) for n in numbers
+    ])
     low, five, half, most, high = np.quantile(ratios, [0, 0.05, 0.5, 0.95, 1])
     print(f"told / true: least {low:.2f}, 5 % {five:.2f}, median {half:.2f}, 95 % "
           f"{most:.2f}, largest {high:.2f}; covered {(ratios >= 1).sum()} of "

@@ -31,7 +31,7 @@ def independent_stiffness(part, young):
 
     Returns:
         ``stiffness`` (6, 6), extrapolated by what the last order changed, and how
-        ``unsure`` it is [1], a half of what was added.
+        ``unsure`` it is [1], all that was added.
     """
     nu = part.nu
     lame = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
@@ -43,7 +43,7 @@ def independent_stiffness(part, young):
         coarse, fine, more = bricks(part, lame)
     step = more * (fine - coarse)
     K = fine + step
-    return {"stiffness": K.tolist(), "unsure": np.abs(scaled(step, K)).max() / 2}
+    return {"stiffness": K.tolist(), "unsure": np.abs(scaled(step, K)).max()}
 
 
 def round_part(part, lame):
