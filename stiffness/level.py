@@ -19,7 +19,7 @@ from stiffness.material import Material, material_of_elements
 from stiffness.mesh import Solid
 from stiffness.refine import refine
 
-# true over indicated error of a first mesh was 0.5 to 1.0 on the training parts of
+# true over indicated error of a first mesh was 0.6 to 1.1 on the training parts of
 # benchmarks/stiffness_random_parts.py
 _BLIND = 2.0
 _SAFETY = 1.3

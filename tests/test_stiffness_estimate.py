@@ -209,9 +209,9 @@ def test_stiffness_falls_and_two_meshes_tell_the_fall():
 # --- what is left on free surfaces ---------------------------------------------------
 
 PLATE = (0.060, 0.002, 0.100)  # m, width, thickness, length
-# its K by bricks of order 5 that shrink toward the edges (NGSolve, to 3e-4):
+# its K by bricks of order 5 that shrink toward the edges (NGSolve, to 5e-4):
 # benchmarks/stiffness_random_references.py; the largest error of K is that of RZ
-PLATE_RZ = 50.931  # N m/rad
+PLATE_RZ = 50.96  # N m/rad
 
 
 def plate(*counts):
