@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from stiffness.condense import KINDS
 from stiffness.interface import parse_interface
 from stiffness.link import LinkStiffness
 from stiffness.reading import BadInput, Table, describe, quoted
@@ -83,13 +82,16 @@ class SurfaceLink:
         """
         from stiffness.fea import mesh_link
 
-        return mesh_link(
-            self.surface,
-            parse_interface(self.base, f"{self.name}.base"),
-            parse_interface(self.tip, f"{self.name}.tip"),
-            self.young, self.poisson, unit=self.unit, accuracy=self.accuracy,
-            interface=self.interface, density=self.density,
-        )  # fmt: skip
+        try:
+            return mesh_link(
+                self.surface,
+                parse_interface(self.base, "base"),
+                parse_interface(self.tip, "tip"),
+                self.young, self.poisson, unit=self.unit, accuracy=self.accuracy,
+                interface=self.interface, density=self.density,
+            )  # fmt: skip
+        except BadInput as error:
+            raise BadInput(f"link {quoted(self.name)}: {error}") from None
 
 
 def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
@@ -105,6 +107,8 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
     Raises:
         BadInput: a rule is broken, a file is missing, or a name stands there twice.
     """
+    from stiffness.condense import KINDS
+
     found: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
         name = table.text("name")

@@ -334,6 +334,16 @@ def test_a_surface_that_is_not_said_properly_is_refused(
     assert message in str(caught.value)
 
 
+def test_a_surface_without_its_interface_is_refused_and_nothing_written(
+    bar_stl, tmp_path
+):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(LINKS.replace("z=0.08", "z=0.09"))
+    with pytest.raises(BadInput, match='link "bar": .*tip'):
+        build_library(read_spec(spec))
+    assert list((tmp_path / "links").iterdir()) == []
+
+
 def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch):
     """A brick by gmsh's own kernel; STEP is in millimetres and says so."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
