@@ -127,6 +127,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
         unit=mesh.choice("unit", UNITS, "m"),
         up=up,
         frame_up=frame_up,
+        axis=_direction(mesh, "axis"),
         interface=mesh.choice("interface", ("rigid", "distributing"), "rigid"),
     )
     mesh.finish()
@@ -226,7 +227,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
     if isinstance(link, BeamLink):
         kind, inner = "beam", dict[str, Any](link.section)
     else:
-        names = ("base", "tip", "unit", "up", "interface")
+        names = ("base", "tip", "unit", "axis", "up", "interface")
         kind, inner = "mesh", {"surface": _from(folder, link.surface)}
     given = {name: getattr(link, name) for name in names}
     for name, value in given.items():

@@ -38,13 +38,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
         if isinstance(frame.link, BeamLink):
             links[frame.name] = _with_span(frame, frame.link, shift)
         elif isinstance(frame.link, MeshLink):
-            _span(frame, 0.0)
-            if shift:
-                raise BadInput(
-                    f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic "
-                    f"joint whose home position is {shift:g} m; expected 0 (write that "
-                    "length as a translation)"
-                )
+            _check_mesh(frame, frame.link, shift)
     return robot.with_links(links) if links else robot
 
 
@@ -65,12 +59,29 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
     return answer
 
 
+def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
+    """A mesh has a direction, and its roll is fixed by another one."""
+    if link.axis is None and shift:
+        raise BadInput(
+            f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic joint "
+            f'whose home position is {shift:g} m; expected 0 or an "axis", base to tip'
+        )
+    axis = _span(frame, 0.0) if link.axis is None else np.array(link.axis)
+    try:
+        section_axes(axis, link.frame_up)
+    except BadInput as error:
+        place = f"frame {quoted(frame.name)}.up"
+        raise BadInput(f"{place}: {error}; expected another direction") from None
+
+
 def _span(frame: Frame, shift: float) -> NDArray:
     """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
     span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
     if np.linalg.norm(span) < _SAME_POINT:
+        mesh = isinstance(frame.link, MeshLink)
+        given = 'mesh with "axis"' if mesh else 'beam with "length" and "axis"'
         raise BadInput(
             f"frame {quoted(frame.name)}.link: found no distance from the parent; "
-            'expected a translation, or a beam with "length" and "axis"'
+            f"expected a translation, or a {given}"
         )
     return span

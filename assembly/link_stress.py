@@ -14,12 +14,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.mesh_link import mesh_rotation
+from assembly.mesh_link import mesh_turn
 from assembly.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from stiffness.beam import section_axes
 from stiffness.beam_stress import peak_beam_stress
 from stiffness.reading import BadInput
-from stiffness.screws import rotation_matrix
 
 _CHUNK = 64  # wrenches at a time: 64 x 20000 nodes x 6 numbers are 61 MB
 
@@ -163,8 +162,7 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
         (Material(link.young, link.poisson),), interface=link.interface,
     )  # fmt: skip
     influence = stress_influence(solved)
-    span = rotation_matrix(frame.rotation).T @ frame.translation
-    R = mesh_rotation(solved.link.tip - solved.link.base, span, link.up, link.frame_up)
+    R = mesh_turn(frame, solved.link.tip - solved.link.base)
 
     def peak(wrench: NDArray) -> NDArray:
         own = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])

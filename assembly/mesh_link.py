@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.robot import Frame, MeshLink
+from stiffness.beam import section_axes
 from stiffness.link import LinkStiffness, turn_link
-from stiffness.reading import BadInput
+from stiffness.reading import BadInput, quoted
 from stiffness.screws import rotation_matrix
 
 
@@ -20,8 +21,8 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
         The link, read at the tip interface's centre, which is the frame's origin.
 
     Raises:
-        BadInput: the surface or an interface is not usable, or the distance of the
-            interfaces is not that of the two origins.
+        BadInput: the surface or an interface is not usable, ``up`` lies along the
+            link, or the distance of the interfaces is not that of the two origins.
         ValueError: the frame has no mesh link.
     """
     link = frame.link
@@ -29,10 +30,10 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     place = f'frame "{frame.name}".link.mesh'
     solved = _solved(link, accuracy, place)
-    # from the parent's origin to this frame's, in this frame's axes
-    span = rotation_matrix(frame.rotation).T @ frame.translation
-    turn = mesh_rotation(solved.tip - solved.base, span, link.up, link.frame_up)
-    _check_tip(place, turn @ (solved.tip - solved.base), span)
+    reach = solved.tip - solved.base
+    turn = mesh_turn(frame, reach)
+    if link.axis is None:
+        _check_tip(place, turn @ reach, _between_origins(frame))
     return turn_link(solved, turn)
 
 
@@ -68,6 +69,39 @@ def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
     return _KNOWN[key]
 
 
+def mesh_turn(frame: Frame, reach: NDArray) -> NDArray:
+    """Rotation from a frame's mesh's axes to the frame's.
+
+    Args:
+        frame: one with a :class:`assembly.robot.MeshLink`.
+        reach: (3,) [m] from base to tip in the mesh's axes.
+
+    Returns:
+        (3, 3) it lays the reach along the link's ``axis``, or along the way from the
+        parent's origin to the frame's if it has none.
+
+    Raises:
+        BadInput: the mesh's ``up`` lies along the reach.
+        ValueError: the frame has no mesh link.
+    """
+    link = frame.link
+    if not isinstance(link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    if link.up is not None:
+        try:
+            section_axes(reach, link.up)
+        except BadInput as error:
+            place = f"frame {quoted(frame.name)}.link.mesh.up"
+            raise BadInput(f"{place}: {error}; expected another direction") from None
+    span = _between_origins(frame) if link.axis is None else np.array(link.axis)
+    return mesh_rotation(reach, span, link.up, link.frame_up)
+
+
+def _between_origins(frame: Frame) -> NDArray:
+    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
+
+
 def mesh_rotation(
     mesh_span: NDArray,
     span: NDArray,
@@ -78,7 +112,7 @@ def mesh_rotation(
 
     Args:
         mesh_span: (3,) [m] base to tip in the mesh's axes.
-        span: (3,) [m] parent's origin to the frame's, in the frame's axes.
+        span: (3,) its direction in the frame's axes.
         up: a direction in the mesh's axes that fixes the roll, with ``frame_up``.
         frame_up: the same direction in the frame's axes.
 

@@ -97,6 +97,8 @@ class MeshLink:
         unit: length unit of the surface file.
         up: with ``frame_up`` fixes the roll: a direction in the mesh's axes.
         frame_up: the same direction in the frame's axes.
+        axis: direction from base to tip in the frame's axes; None from the parent's
+            origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
     """
 
@@ -110,6 +112,7 @@ class MeshLink:
     up: tuple[float, float, float] | None = None
     frame_up: tuple[float, float, float] | None = None
     interface: str = "rigid"
+    axis: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ PLANES = {"x": "x0", "y": "y0", "z": "z0"}  # names of the cuts
 SHRINK, EPS = 0.15, 1e-9
 
 
-def mode_stiffness(mesh, order, even, motions, held=""):
+def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
     """Energies of motions of the tip that are even or odd in each cut.
 
     Args:
@@ -33,11 +33,12 @@ def mode_stiffness(mesh, order, even, motions, held=""):
         even: (x, y, z) whether the motions are their own mirror image.
         motions: of the tip.
         held: name of a face that stands still.
+        lame: both constants [Pa].
 
     Returns:
         Work of each field's forces on each other's, of the part, and unknowns.
     """
-    fixed = {c: ["tip", held] if held else ["tip"] for c in "xyz"}
+    (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
         for c in "xyz":
             # even: no motion across the cut; odd: none along it
@@ -47,7 +48,7 @@ def mode_stiffness(mesh, order, even, motions, held=""):
     space = ng.VectorH1(mesh, order=order, dirichletx=x, dirichlety=y, dirichletz=z)
     u, v = space.TnT()
     e, f = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
-    form = 2 * MU * ng.InnerProduct(e, f) + LAM * ng.Trace(e) * ng.Trace(f)
+    form = 2 * mu * ng.InnerProduct(e, f) + lam * ng.Trace(e) * ng.Trace(f)
     a = ng.BilinearForm(space, symmetric=True, condense=True)
     a += form * ng.dx
     a.Assemble()

@@ -55,22 +55,22 @@ def half_section(corners, lines, size, layers=8):
     return mesh
 
 
-def energy(u, v, m):
+def energy(u, v, m, lame=(LAM, MU)):
     """Work of the stresses of one field on the strains of another, times 1 / r."""
-    r = ng.x
+    r, (lam, mu) = ng.x, lame
     (U, V, W, dU, dV, dW), (S, T, X, dS, dT, dX) = u, v
     e, f = (
         [d[0][0], (a + m * b) / r, d[2][1], d[0][1] + d[2][0],
          -(m * a + b) / r + d[1][0], d[1][1] - m * c / r]
         for a, b, c, d in ((U, V, W, (dU, dV, dW)), (S, T, X, (dS, dT, dX)))
     )  # fmt: skip
-    normal = LAM * sum(e[:3]) * sum(f[:3]) + 2 * MU * sum(
+    normal = lam * sum(e[:3]) * sum(f[:3]) + 2 * mu * sum(
         a * b for a, b in zip(e[:3], f[:3], strict=True)
     )
-    return normal + MU * sum(a * b for a, b in zip(e[3:], f[3:], strict=True))
+    return normal + mu * sum(a * b for a, b in zip(e[3:], f[3:], strict=True))
 
 
-def mode_stiffness(mesh, order, m, motions):
+def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
     """Stiffness between motions (U, V, W) of the tip in mode m."""
     held = f"{BASE}|{TIP}"
     one = ng.H1(mesh, order=order, dirichlet=held)
@@ -89,7 +89,7 @@ def mode_stiffness(mesh, order, m, motions):
 
     trial, test = space.TnT()
     a = ng.BilinearForm(space, symmetric=True)
-    form = energy(parts(*trial), parts(*test), m) * ng.x
+    form = energy(parts(*trial), parts(*test), m, lame) * ng.x
     a += form * ng.dx(bonus_intorder=6)
     a.Assemble()
     inverse = a.mat.Inverse(space.FreeDofs(), inverse="sparsecholesky")
@@ -111,14 +111,14 @@ def mode_stiffness(mesh, order, m, motions):
     return (2 * np.pi if m == 0 else np.pi) * (K + K.T) / 2
 
 
-def stiffness(mesh, order):
+def stiffness(mesh, order, lame=(LAM, MU)):
     """K_E (6, 6) at the tip's centre, base held."""
     turned, stretched = (
-        mode_stiffness(mesh, order, 0, [motion])[0, 0]
+        mode_stiffness(mesh, order, 0, [motion], lame)[0, 0]
         for motion in ((0, ng.x, 0), (0, 0, 1))
     )
     # turning about y lifts z by -r cos(a); moving along x is (cos a, -sin a, 0)
-    bent = mode_stiffness(mesh, order, 1, [(0, 0, -ng.x), (1, -1, 0)])
+    bent = mode_stiffness(mesh, order, 1, [(0, 0, -ng.x), (1, -1, 0)], lame)
     K = np.diag([bent[0, 0], bent[0, 0], turned, bent[1, 1], bent[1, 1], stretched])
     K[1, 3] = K[3, 1] = bent[0, 1]
     K[0, 4] = K[4, 0] = -bent[0, 1]

@@ -5,6 +5,10 @@ link are therefore stiffer than the beam, by about what a beam shorter by a fixe
 of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section and on
 Poisson's ratio only.  It fades as the link grows slender; a difference that does not
 fade is an error of one of the two models.
+
+The commonest one is a section whose width and height are swapped, or an ``up`` left
+out: the beam is then turned about its own axis.  So the beam is turned by quarters, and
+if it agrees much better somewhere, that is said instead.
 """
 
 from dataclasses import dataclass
@@ -15,6 +19,10 @@ from numpy.typing import NDArray
 from stiffness.display import html_table, short_repr
 from stiffness.link import LinkStiffness, scaled
 from stiffness.reading import BadInput
+from stiffness.screws import rotation_matrix, screw_map
+
+_MUCH_BETTER = 0.25  # of the largest difference, and no less than the mesh's error
+_TURNS = {90: "a quarter", 180: "half a turn", 270: "three quarters"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +56,36 @@ class Comparison:
         return np.diag(self.difference) * self.slenderness
 
     @property
+    def better_turn(self) -> tuple[int, float]:
+        """A turn of the beam about base to tip that makes it agree much better.
+
+        Its degrees, 0 if there is none, and the largest difference [1] it leaves.
+        """
+        worst = float(np.abs(self.difference).max())
+        axis = self.fea.tip - self.fea.base
+        if not np.linalg.norm(axis) > 0:
+            return 0, worst
+        left = {
+            angle: _turned_difference(self, np.radians(angle) * axis)
+            for angle in _TURNS
+        }
+        best = min(left, key=lambda angle: left[angle])
+        noise = 2 * self.fea.relative_error_estimate
+        found = left[best] < _MUCH_BETTER * worst and worst > noise
+        return (best, left[best]) if found else (0, worst)
+
+    @property
     def explanation(self) -> str:
         """The difference in words."""
+        angle, left = self.better_turn
+        if angle:
+            worst = 100 * np.abs(self.difference).max()
+            swap = "" if angle == 180 else ", or width and height swapped"
+            return (
+                f"The beam's axes look swapped: turned by {_TURNS[angle]} about base "
+                f"to tip it would differ by {100 * left:.3g} % at most, not "
+                f"{worst:.3g} %.  Expected another up{swap}."
+            )
         c = self.end_effect
         noise = self.fea.relative_error_estimate * self.slenderness
         turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
@@ -64,6 +100,14 @@ class Comparison:
             f"(translations); the mesh's error is worth {noise:.2f}."
             f"{bent if self.length > 1.001 * chord else ''}"
         )
+
+
+def _turned_difference(comparison: Comparison, rotation: NDArray) -> float:
+    """[1] largest difference from the beam turned about the tip by a vector."""
+    axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
+    A = screw_map(np.zeros(3), rotation_matrix(axis))
+    K = A @ comparison.beam.stiffness @ A.T
+    return float(np.abs(scaled(comparison.fea.stiffness - K, K)).max())
 
 
 def compare_link(

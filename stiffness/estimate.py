@@ -9,12 +9,20 @@ of s_3 that is still to come: nothing where the field is smooth, all of it and m
 where it is not.  Elements on a singular edge are known to be of the second kind
 whatever their two numbers say; all of s_3 is taken there, and a little more.
 
+Where a thin wall ends, a twisted plate's stresses turn round within a layer as deep as
+a third of the wall.  An element much wider than the wall does not see that, and s_2,
+full of the plate's own linear stresses, makes it look smooth.  But it leaves tractions
+t on the free surface.  What would undo them is a wave along the surface, half as long
+as the face is narrow, l, that decays like exp(-pi x / l): its energy, the integral of
+t^2 / (2 mu) l / pi, is taken where it is the larger one.
+
 The estimate sees the field, not the shape: what a bent element leaves of a shape is
 counted apart, by :func:`shape_errors`.
 
 Sources:
     Mavriplis (1990) for the decay of an element's own coefficients as an estimate;
-    Schwab (1998), p- and hp-Finite Element Methods, for the rate p^-b.
+    Schwab (1998), p- and hp-Finite Element Methods, for the rate p^-b;
+    Friedrichs & Dressler (1961) for the layer at a plate's free edge.
 """
 
 from collections.abc import Sequence
@@ -72,6 +80,50 @@ def error_matrices(
         to_come = np.where(singular[part], _SINGULAR, to_come)
         errors[part] = to_come[:, None, None] * s_3
     return errors
+
+
+def traction_errors(
+    mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
+) -> NDArray:
+    """Energies of what would undo the tractions that elements leave on free faces.
+
+    Args:
+        mesh: the tetrahedra.
+        fields: (n, 3, k) [m] displacements of the unit cases.
+        lam: (t,) [Pa] Lame's first constant.
+        mu: (t,) [Pa] shear modulus.
+        free: (f,) indices of boundary triangles without loads.
+
+    Returns:
+        (f, k, k) [unit of the stiffness].
+    """
+    cases = fields.shape[2]
+    errors = np.zeros((len(free), cases, cases))
+    for first in range(0, len(free), _CHUNK):
+        some = free[first : first + _CHUNK]
+        _, normal, area, G = gradients_on_faces(mesh, some)
+        cells = mesh.owner[some]
+        slope = np.einsum("fqmx,fmik->fqkix", G, fields[mesh.cells[cells]])
+        t = np.einsum("fqkix,fqx->fqki", slope + slope.swapaxes(3, 4), normal)
+        t *= mu[cells][:, None, None, None]
+        trace = np.trace(slope, axis1=3, axis2=4) * lam[cells][:, None, None]
+        t += trace[..., None] * normal[:, :, None]
+        depth = _narrowest(mesh, some) / np.pi / (2 * mu[cells])
+        weighted = t * (area * depth[:, None])[..., None, None]
+        errors[first : first + len(some)] = np.einsum("fqki,fqli->fkl", weighted, t)
+    return errors
+
+
+def _narrowest(mesh: Elements, faces: NDArray) -> NDArray:
+    """(f,) [m] the smaller of triangles' heights and their elements' depths."""
+    a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
+    across = np.cross(b - a, c - a)
+    twice = np.linalg.norm(across, axis=1)
+    longest = np.max([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    corners = mesh.nodes[mesh.cells[mesh.owner[faces], :4]]
+    edges = corners[:, 1:] - corners[:, :1]
+    depth = np.abs(np.linalg.det(edges)) / twice
+    return np.minimum(twice / longest, depth)
 
 
 def shape_errors(

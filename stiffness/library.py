@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from stiffness.curve import curve_compliance
 from stiffness.display import html_table, short_repr
+from stiffness.library_surface import SurfaceLink, is_current, read_surface_links
 from stiffness.link import LinkStiffness, check_definite, inverted, scaled
 from stiffness.parametric import check_shape, shape_beam, shape_surface
 from stiffness.reading import BadInput, nearest, read_text, read_toml
@@ -67,6 +68,7 @@ class Spec:
         method: ``"beam"`` or ``"fea"``.
         grid: values of each parameter: lengths [m], ``young`` [Pa], ...
         accuracy: asked of finite elements.
+        links: parts given by their surface, beside the grid or in its stead.
     """
 
     folder: Path
@@ -74,9 +76,12 @@ class Spec:
     method: str
     grid: dict[str, tuple[float, ...]]
     accuracy: float = 0.005
+    links: tuple[SurfaceLink, ...] = ()
 
     def points(self) -> list[dict[str, float]]:
-        """Every combination of the grid's values."""
+        """Every combination of the grid's values; none without a shape."""
+        if not self.shape:
+            return []
         names = list(self.grid)
         return [
             dict(zip(names, values, strict=True))
@@ -88,8 +93,9 @@ def read_spec(path: Path) -> Spec:
     """What a build file asks for.
 
     Args:
-        path: TOML with ``library``, ``shape``, ``method``, ``accuracy`` and a table
-            ``grid`` of lists of numbers.
+        path: TOML with ``library`` and ``accuracy``; ``shape``, ``method`` and a table
+            ``grid`` of lists of numbers; tables ``[[link]]`` of parts given by their
+            surface; the grid, the links, or both.
 
     Returns:
         The spec; the folder is relative to the file.
@@ -98,6 +104,12 @@ def read_spec(path: Path) -> Spec:
         BadInput: the file, a name or a value is not proper.
     """
     table = read_toml(path)
+    folder = path.parent / table.text("library")
+    accuracy = table.number("accuracy", "1", 0.005, least=1e-5, below=0.5)
+    links = read_surface_links(table, accuracy)
+    if links and not (table.has("shape") or table.has("grid")):
+        table.finish()
+        return Spec(folder, "", "fea", {}, accuracy, links)
     grid_table = table.table("grid")
     grid = {}
     for name in list(grid_table.content):
@@ -110,11 +122,12 @@ def read_spec(path: Path) -> Spec:
         grid[name] = tuple(sorted(float(v) for v in given))
     shape = table.text("shape")
     spec = Spec(
-        folder=path.parent / table.text("library"),
+        folder=folder,
         shape=shape,
         method=table.choice("method", _METHODS, "fea"),
         grid=grid,
-        accuracy=table.number("accuracy", "1", 0.005, least=1e-5, below=0.5),
+        accuracy=accuracy,
+        links=links,
     )
     table.finish()
     for name in ("young", "poisson"):
@@ -172,41 +185,62 @@ def build_library(
         spec.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"{spec.folder}: cannot be made: {error.strerror}") from None
-    points = spec.points()
-    files = [spec.folder / f"{entry_key(spec, p)}.json" for p in points]
+    wanted: list[dict[str, float] | SurfaceLink] = [*spec.points(), *spec.links]
+    files = [spec.folder / f"{_key(spec, one)}.json" for one in wanted]
     tell = update or (lambda done, total: None)
-    waiting = [p for p, f in zip(points, files, strict=True) if not f.exists()]
-    done = len(points) - len(waiting)
-    tell(done, len(points))
+    waiting = [
+        one
+        for one, file in zip(wanted, files, strict=True)
+        if not (
+            is_current(file, one) if isinstance(one, SurfaceLink) else file.exists()
+        )
+    ]
+    done = len(wanted) - len(waiting)
+    tell(done, len(wanted))
     make = partial(_make_entry, spec)
     if workers == 1:
-        for point in waiting:
-            make(point)
+        for one in waiting:
+            make(one)
             done += 1
-            tell(done, len(points))
+            tell(done, len(wanted))
         return files
     with ProcessPoolExecutor(workers) as pool:
-        for job in as_completed([pool.submit(make, point) for point in waiting]):
+        for job in as_completed([pool.submit(make, one) for one in waiting]):
             job.result()
             done += 1
-            tell(done, len(points))
+            tell(done, len(wanted))
     return files
 
 
-def _make_entry(spec: Spec, point: dict[str, float]) -> None:
+def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
+    """Name of an entry of either kind."""
+    if isinstance(wanted, SurfaceLink):
+        return wanted.name
+    return entry_key(spec, wanted)
+
+
+def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
     """Compute one entry and write it."""
-    link, geometry = _solve_point(spec, point)
-    key = entry_key(spec, point)
-    content = link_results(link) | {
-        "format": FORMAT,
-        "key": key,
-        "shape": spec.shape,
-        "parameters": point,
-        "stiffness_error": link.stiffness_error,
-        "geometry": geometry,
-        "program": _program(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
+    if isinstance(wanted, SurfaceLink):
+        request = wanted.request()
+        link, parameters = wanted.solve(), wanted.parameters
+        about = {"surface": wanted.surface.name, "request": request}
+    else:
+        link, geometry = _solve_point(spec, wanted)
+        parameters, about = wanted, {"shape": spec.shape, "geometry": geometry}
+    key = _key(spec, wanted)
+    content = (
+        link_results(link)
+        | about
+        | {
+            "format": FORMAT,
+            "key": key,
+            "parameters": parameters,
+            "stiffness_error": link.stiffness_error,
+            "program": _program(),
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+    )
     write_json(content, str(spec.folder / f"{key}.json"))
 
 
@@ -342,6 +376,10 @@ def look_up(
         BadInput: a parameter is unknown, missing or outside the grid, or the entries
             do not fill a grid.
     """
+    # parts given by their surface are beside any grid
+    entries = [entry for entry in entries if "surface" not in entry.about]
+    if not entries:
+        raise BadInput("look-up: found only entries of surfaces, expected a grid")
     names = list(entries[0].parameters)
     for name in wanted:
         if name not in names:

@@ -59,6 +59,7 @@ def comparison_results(comparison: Comparison) -> dict[str, Any]:
         "length": comparison.length,
         "slenderness": comparison.slenderness,
         "end_effect": comparison.end_effect,
+        "axes_turned": comparison.better_turn[0],
         "explanation": comparison.explanation,
     }
 

@@ -1,6 +1,7 @@
 """Beam beside finite elements over slenderness, and beams along curves from files."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from stiffness.link import LinkStiffness
 from stiffness.options import numbers, wrench
 from stiffness.plot import plot_slenderness
 from stiffness.reading import BadInput
-from stiffness.results import sweep_text
+from stiffness.results import comparison_results, sweep_text
 from stiffness.slenderness import fit_end_effect, sweep_slenderness
 
 MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
@@ -247,6 +248,42 @@ def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
             [*command, "--curve", str(path), "--radius", "0.1"],
             catch_exceptions=False,
         )
+
+
+def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
+    """A 0.3 m bar by the beam formula, read at its tip."""
+    section = rectangular_section(width, height, 0.3)
+    C = beam_compliance(0.3, section, 6e10, 0.3, axis=axis, up=up)
+    tip = 0.3 * np.array(axis)
+    return LinkStiffness("beam", C / stiffer, tip=tip, base=np.zeros(3))
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
+def test_a_section_turned_by_a_quarter_is_told_apart_from_held_ends(axis):
+    """A 20 x 60 mm bar 2 % stiffer than its beam; I differs ninefold if turned."""
+    solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
+    right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
+    assert right.better_turn == (0, pytest.approx(0.02))
+    assert "Held faces" in right.explanation
+    across = np.cross(axis, [0, 1, 0])
+    for beam in (
+        rectangle(0.02, 0.06, [0, 1, 0], axis=axis),
+        rectangle(0.06, 0.02, across, axis=axis),
+    ):
+        turned = compare_link(beam, solid, 0.03)
+        assert turned.better_turn == (90, pytest.approx(0.02))
+        assert np.abs(turned.difference).max() > 5
+        assert "axes look swapped: turned by a quarter about base" in turned.explanation
+        assert "Held faces" not in turned.explanation
+        assert comparison_results(turned)["axes_turned"] == 90
+
+
+def test_a_nearly_square_bar_within_the_meshs_error_is_not_called_turned():
+    solid = rectangle(0.0200, 0.0202, [0, 1, 0])
+    unsure = replace(solid, stiffness_error=0.02 * solid.stiffness)
+    beam = rectangle(0.0202, 0.0200, [0, 1, 0])
+    assert compare_link(beam, unsure, 0.01).better_turn[0] == 0
+    assert compare_link(beam, solid, 0.01).better_turn[0] == 90
 
 
 def test_a_bent_beams_corner_is_named():

@@ -3,10 +3,9 @@
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from assembly.mesh_link import mesh_rotation
+from assembly.mesh_link import mesh_turn
 from assembly.robot import MeshLink, Robot
 from stiffness.reading import BadInput
-from stiffness.screws import rotation_matrix
 from validation.multibody.exudyn_parts import MeshBody, Solid
 
 
@@ -41,9 +40,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
             known[key] = _solid(link)
         solid = known[key]
         reach = solid.centers[1] - solid.centers[0]
-        span = rotation_matrix(frame.rotation).T @ frame.translation
-        turn = mesh_rotation(reach, span, link.up, link.frame_up)
-        bodies[frame.name] = MeshBody(solid, turn)
+        bodies[frame.name] = MeshBody(solid, mesh_turn(frame, reach))
     return bodies
 
 

@@ -275,7 +275,14 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
             link = frame.link
             if frame.name in wanted and isinstance(link, BeamLink):
                 meshes[frame.name] = MeshLink(
-                    surface, base, tip, link.young, link.poisson, link.density, unit
+                    surface,
+                    base,
+                    tip,
+                    link.young,
+                    link.poisson,
+                    link.density,
+                    unit,
+                    axis=link.axis,
                 )
     elif source == "fea":
         raise table.bad("surface", 'missing; expected the surface file of source "fea"')
