@@ -13,7 +13,13 @@ import typer
 from assembly.posture import parse_assignments
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import SCREW, WRENCH
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import (
+    PIXELS,
+    check_json,
+    check_writable,
+    save_pixels,
+    write_json,
+)
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -45,7 +51,11 @@ UnderOption = Annotated[
 ]
 JsonOption = Annotated[
     str | None,
-    typer.Option("--json", help="Write results as JSON to a file; - is stdout."),
+    typer.Option(
+        "--json",
+        help="Write results as JSON to a file; - is stdout.",
+        callback=check_json,
+    ),
 ]
 
 
@@ -348,20 +358,14 @@ def error(
         raise typer.Exit(1)
 
 
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a figure; a kind of file that is not known is bad input."""
-    try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: cannot be written: {error}") from None
-
-
 @app.command()
 def show(
     robot: RobotArgument,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="PNG file; a window opens without one."),
+        typer.Option(
+            "-o", "--output", help="PNG, JPEG, BMP or TIFF; a window opens without."
+        ),
     ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
@@ -374,17 +378,24 @@ def show(
         typer.Option(help="Also the body of possible errors: translation | rotation."),
     ] = None,
     reading: Annotated[
-        str, typer.Option(help="Of the errors: frozen | free | budget.")
-    ] = "budget",
+        str | None,
+        typer.Option(
+            help="Of the errors: frozen | free | budget; default budget, of a loaded "
+            "robot frozen."
+        ),
+    ] = None,
 ) -> None:
     """Draw the nominal and the forced robot, and the errors its platform can have."""
-    from assembly.energy import solve_assembly
+    from assembly.energy import CannotAssemble, solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly
     from assembly.pose_error import READINGS
+    from assembly.results import failure_status
+    from assembly.solvers.conic import SolverFailed
+    from assembly.solvers.reduction import FreeMotion
 
     if output is not None:
-        check_writable(output)
+        check_writable(output, PIXELS)
     elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
         raise BadInput("no display to open a window on; name a file with --output")
     for option, value, valid in (
@@ -392,10 +403,26 @@ def show(
     ):  # fmt: skip
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
-    answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
-    plotter = draw_assembly(answer, exaggeration, errors, reading, output is not None)
+    if exaggeration is not None and not exaggeration < float("inf"):
+        raise BadInput(f"--exaggeration: found {exaggeration}, expected a finite one")
+    wrench = parse_load(load)
+    loaded = wrench is not None and any(wrench)
+    if loaded and errors is not None and reading == "budget":
+        raise BadInput(
+            "--reading: found budget with --load, and a loaded robot has no such "
+            "reading; expected frozen or free"
+        )
+    reading = reading or ("frozen" if loaded else "budget")
+    try:
+        answer = solve_assembly(posture_of(robot, pose, joint), wrench)
+        plotter = draw_assembly(
+            answer, exaggeration, errors, reading, output is not None
+        )
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        print(f"{failure_status(error)}: {error}")
+        raise typer.Exit(1) from None
     if output is None:
         plotter.show()
     else:
-        plotter.screenshot(str(output))
+        save_pixels(plotter.screenshot(return_img=True), output)
     plotter.close()

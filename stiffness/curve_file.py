@@ -12,7 +12,7 @@ from stiffness.options import check_section
 from stiffness.reading import BadInput, Table, read_toml
 
 
-def read_curve(path: Path, nu: float) -> list[Piece]:
+def read_curve(path: Path | str, nu: float) -> list[Piece]:
     """The pieces of a beam.
 
     Args:

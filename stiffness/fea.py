@@ -63,7 +63,7 @@ class MeshedLink:
 
 
 def mesh_link(
-    surface: Path,
+    surface: Path | str,
     base: Interface,
     tip: Interface,
     E: float,
@@ -74,7 +74,7 @@ def mesh_link(
     interface: str = "rigid",
     density: float = 0.0,
     budget: Budget | None = None,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> LinkStiffness:
     """Stiffness of a link of one material, from a surface file.
 
@@ -126,7 +126,7 @@ def solve_link(
     interface: str = "rigid",
     point_masses: Sequence[PointMass] = (),
     budget: Budget | None = None,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> MeshedLink:
     """Solve a link to an asked accuracy.
 
@@ -216,7 +216,7 @@ def first_mesh(
     base: Interface,
     tip: Interface,
     budget: Budget,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> Solid:
     """A coarse mesh to refine from, fine enough for the part's walls.
 

@@ -81,7 +81,7 @@ class Spec:
         ]
 
 
-def read_spec(path: Path) -> Spec:
+def read_spec(path: Path | str) -> Spec:
     """What a build file asks for.
 
     Args:
@@ -94,6 +94,7 @@ def read_spec(path: Path) -> Spec:
     Raises:
         BadInput: the file, a name or a value is not proper.
     """
+    path = Path(path)
     table = read_toml(path)
     grid_table = table.table("grid")
     grid = {}
@@ -237,7 +238,7 @@ def _program() -> str:
         return "forcefit, not installed"
 
 
-def read_entry(path: Path, key: str) -> Entry:
+def read_entry(path: Path | str, key: str) -> Entry:
     """One entry of a library.
 
     Args:
@@ -282,7 +283,7 @@ def _entry(file: Path) -> Entry:
     return Entry(file.stem, K, error_matrix, tip, parameters, about)
 
 
-def read_compliance(path: Path, key: str) -> NDArray:
+def read_compliance(path: Path | str, key: str) -> NDArray:
     """Compliance of one entry.
 
     Args:
@@ -298,7 +299,7 @@ def read_compliance(path: Path, key: str) -> NDArray:
     return inverted(read_entry(path, key).stiffness)
 
 
-def read_library(path: Path) -> list[Entry]:
+def read_library(path: Path | str) -> list[Entry]:
     """All entries of a library, in the order of their keys.
 
     Args:

@@ -87,7 +87,7 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def read_surface(path: Path, unit: str = "m") -> Surface:
+def read_surface(path: Path | str, unit: str = "m") -> Surface:
     """Read a surface and refuse what bounds no solid.
 
     Args:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stiffness.reading import BadInput
 from stiffness.screws import SCREW
-from stiffness.writing import write_json
+from stiffness.writing import write_json, write_text
 from validation.html import (
     html_figure,
     html_image,
@@ -38,11 +38,9 @@ def write_study(results: StudyResults) -> Path:
     folder = results.study.folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        page = folder / "report.html.part"
-        page.write_text(report_page(results), encoding="utf-8")
-        page.replace(folder / "report.html")
     except OSError as error:
         raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
+    write_text(report_page(results), folder / "report.html")
     write_json(results_table(results), str(folder / "results.json"))
     if results.maps is not None:
         save_dataset(results.maps, folder / "results.nc")

@@ -21,10 +21,9 @@ from assembly.cli import (
     parse_load,
     posture_of,
     progress_bars,
-    save_figure,
 )
 from stiffness.reading import BadInput, nearest
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 
 
 @app.command()
@@ -78,7 +77,7 @@ def statistics(
     from assembly.statistics.monte_carlo import Experiment, parse_limit, run_draws
     from assembly.statistics.play import PLAY
     from assembly.statistics.plot import histogram_figure
-    from assembly.sweeps.dataset import save_dataset
+    from assembly.sweeps.dataset import check_dataset, save_dataset
 
     for option, word, valid in (
         ("--play", play, PLAY), ("--by", by, ("source", "frame", "kind"))
@@ -90,8 +89,10 @@ def statistics(
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    if output is not None:
+        check_dataset(output, "draws")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
     wrench, g = parse_load(load), parse_gravity(gravity)
@@ -169,15 +170,17 @@ def tolerances(
         present_text,
         tolerance_dataset,
     )
-    from assembly.sweeps.dataset import save_dataset
+    from assembly.sweeps.dataset import check_dataset, save_dataset
 
     if compliant not in {"free", "rigid"}:
         hint = nearest(compliant, ("free", "rigid"))
         raise BadInput(f'--compliant: found "{compliant[:60]}"{hint}')
     if plan is None and (output or figure):
         raise BadInput("tolerances: --output and --figure need a --plan")
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    if output is not None:
+        check_dataset(output, "tolerances")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     machine = load_robot(robot)
     asked = None if plan is None else read_plan(plan, machine)
     postures = grid_postures(machine, grid)

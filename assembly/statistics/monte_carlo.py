@@ -7,6 +7,7 @@ journal beside it from the first on: a run that was killed goes on where it stop
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -26,8 +27,9 @@ from assembly.solvers.reduction import FreeMotion
 from assembly.statistics.distributions import ErrorSources, draw_generator
 from assembly.statistics.play import PLAY, settle_play
 from assembly.sweeps.dataset import save_dataset
+from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
-from assembly.sweeps.sweep import journal_path, robot_hash
+from assembly.sweeps.sweep import journal_path
 from stiffness.reading import BadInput, nearest
 from stiffness.screws import SCREW
 
@@ -180,7 +182,7 @@ class Experiment:
 def run_draws(
     experiment: Experiment,
     count: int,
-    path: Path | None = None,
+    path: Path | str | None = None,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> "xarray.Dataset":
@@ -197,14 +199,26 @@ def run_draws(
         Data set over ``draw``; the file holds the same.
 
     Raises:
-        BadInput: the journal is another run's, or a file cannot be written.
+        BadInput: the journal is another run's or held by one, or a file cannot be
+            written.
     """
+    with ExitStack() as held:  # the journal, until the file stands
+        return _run_draws(experiment, count, path, workers, progress, held)
+
+
+def _run_draws(
+    experiment: Experiment, count: int, path: Path | str | None, workers: int,
+    progress: Callable[[int, int], None], held: ExitStack,
+) -> "xarray.Dataset":  # fmt: skip
+    """The same; the journal is let go with ``held``."""
     blocks = -(-count // BLOCK)
     kept: dict[int, NDArray] = {}
     journal = None
     if path is not None:
         identity = provenance(experiment) | {"draws": count, "block": BLOCK}
-        journal = open_journal(journal_path(path), identity, experiment.record_type)
+        journal = held.enter_context(
+            open_journal(journal_path(path), identity, experiment.record_type)
+        )
         kept = {b: journal.read(b)[0] for b in journal.places}
     done = sum(map(len, kept.values()))
     progress(done, count)
@@ -274,6 +288,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "load": " ".join(map(repr, experiment.load or ())),
         "gravity": " ".join(map(repr, experiment.gravity or ())),
         "program": f"forcefit {version('forcefit')}",
+        "program_sha256": program_hash(),
     }
 
 

@@ -20,10 +20,9 @@ from assembly.cli import (
     parse_gravity,
     parse_load,
     progress_bars,
-    save_figure,
 )
 from stiffness.reading import BadInput, nearest
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 
 
 @app.command()
@@ -93,11 +92,16 @@ def sweep(
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
     """
-    from assembly.sweeps.dataset import open_dataset
-    from assembly.sweeps.maps import figure_of
+    from assembly.sweeps.dataset import check_dataset, open_dataset
+    from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.request import ask_sweep, summary_of, summary_text
     from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
 
+    if workers is not None and scheduler is not None:
+        raise BadInput("sweep: found --workers and --scheduler, expected one of them")
+    check_dataset(output, "a sweep")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     asked = ask_sweep(
         robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
         seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
@@ -106,10 +110,8 @@ def sweep(
         gravity=parse_gravity(gravity) or (0.0,) * 3,
         under=parse_covariates(under),
     )  # fmt: skip
-    if workers is not None and scheduler is not None:
-        raise BadInput("sweep: found --workers and --scheduler, expected one of them")
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    if figure is not None:
+        check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
     done = [0]
     solver: Solver = solve_here
     if workers is not None or scheduler is not None:
@@ -162,7 +164,7 @@ def plot(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
-    check_writable(output)
+    check_writable(output, PICTURE)
     places = {}
     for text in at or ():
         name, equals, value = (piece.strip() for piece in text.rpartition("="))

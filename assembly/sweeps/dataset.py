@@ -4,8 +4,8 @@ Written block by block from the journal, a file never needs more memory than a f
 blocks, and its bytes depend on the sweep alone.
 """
 
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
 from stiffness.reading import BadInput
+from stiffness.writing import NETCDF, check_writable, unwritable, whole_file
 
 if TYPE_CHECKING:
     import xarray
@@ -21,12 +22,17 @@ if TYPE_CHECKING:
     from assembly.sweeps.sweep import Sweep
 
 Texts = dict[str, dict[int, str]]
+# what commands write, and an attribute that none but such a file has
+KINDS = {
+    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
+}  # fmt: skip
 _TEXT = {
     "status": "ok, or why there is no answer: " + ", ".join(STATUSES[1:]),
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
 _TOGETHER = 64  # blocks written at a time
+_UNLOCKED = {"locking": False}  # by HDF5: the file is held already
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
@@ -69,15 +75,18 @@ def write_sweep(
     Raises:
         BadInput: the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
+    with _whole_netcdf(path) as part:
         _write(sweep, read, part)
-        part.replace(path)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise BadInput(f"{path}: cannot be written: {reason}") from None
-    finally:
-        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _whole_netcdf(path: Path | str) -> Generator[Path, None, None]:
+    """A NetCDF file, whole or not at all; where to write it meanwhile."""
+    with whole_file(path) as part:
+        try:
+            yield part
+        except RuntimeError as error:  # HDF5 closing a file on a full disk
+            raise BadInput(unwritable(path, error)) from None
 
 
 def _write(
@@ -92,7 +101,7 @@ def _write(
     sizes = dict(zip(sweep.dims, sweep.shape, strict=True))
     for one in asked.values():
         sizes |= {dim: len(labels) for dim, labels in one.dims.items()}
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(path, "w", **_UNLOCKED) as file:
         file.dimensions = sizes
         for name, (dims, values, attributes) in coordinates.items():
             kind = text if values.dtype == object else values.dtype
@@ -217,14 +226,46 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     Raises:
         BadInput: the file cannot be written.
     """
+    from xarray.backends import H5NetCDFStore
+
+    with _whole_netcdf(path) as part:
+        store = H5NetCDFStore.open(part, mode="w", driver_kwds=_UNLOCKED)
+        try:
+            data.dump_to_store(store)
+        finally:
+            store.close()
+
+
+def check_dataset(path: Path | str, what: str) -> None:
+    """Refuse a NetCDF file that could not be written, before the work.
+
+    Args:
+        path: of the file to be written later.
+        what: one of :data:`KINDS`; a file that stands there already must be one.
+
+    Raises:
+        BadInput: it is not, or as :func:`stiffness.writing.check_writable`.
+    """
+    check_writable(path, NETCDF)
     path = Path(path)
-    part = path.with_name(path.name + ".part")
+    if path.is_file() and path.stat().st_size and not _is(path, what):
+        raise BadInput(
+            f"{path}: found a NetCDF file that is not one of {what} by forcefit; "
+            "expected one, or nothing there: it is not overwritten"
+        )
+
+
+def _is(path: Path, what: str) -> bool:
+    """Whether a file says that it is ours and of a kind."""
+    import h5py
+
     try:
-        data.to_netcdf(part, engine="h5netcdf")
-        part.replace(path)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise BadInput(f"{path}: cannot be written: {reason}") from None
+        with h5py.File(path, "r") as file:
+            said = {str(name): file.attrs[name] for name in file.attrs}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError):
+        return False
+    ours = str(said.get("program", "")).startswith("forcefit ")
+    return ours and KINDS[what] in said
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
