@@ -4,6 +4,7 @@ What is being written stands in ``FILE.part`` beside the file and takes its name
 is complete and on the disk.  What a killed program leaves of it, the next one replaces.
 """
 
+import io
 import json
 import math
 import os
@@ -159,7 +160,19 @@ def write_text(text: str, path: Path | str) -> None:
         BadInput: the file cannot be written.
     """
     # names of files may hold bytes that are not UTF-8
-    content = text.encode("utf-8", errors="backslashreplace")
+    write_bytes(text.encode("utf-8", errors="backslashreplace"), path)
+
+
+def write_bytes(content: bytes, path: Path | str) -> None:
+    """Write a file whole or not at all.
+
+    Args:
+        content: of the file.
+        path: of the file.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
     with whole_file(path) as part:
         part.write_bytes(content)
 
@@ -175,8 +188,9 @@ def save_figure(figure: Any, path: Path | str) -> None:
         BadInput: the ending is none of those, or the file cannot be written.
     """
     check_writable(path, PICTURE)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150, format=_ending(path))
+    content = io.BytesIO()
+    figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
+    write_bytes(content.getvalue(), path)
 
 
 def save_pixels(pixels: Any, path: Path | str) -> None:
@@ -192,13 +206,10 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
     from matplotlib.image import imsave
 
     check_writable(path, PIXELS)
-    with whole_file(path) as part:
-        imsave(part, pixels, format=_ending(path))
-
-
-def _ending(path: Path | str) -> str:
-    """The ending of a file's name, without the dot."""
-    return Path(path).suffix.lower().removeprefix(".")
+    ending = Path(path).suffix[1:].lower()
+    content = io.BytesIO()
+    imsave(content, pixels, format={"tif": "tiff"}.get(ending, ending))
+    write_bytes(content.getvalue(), path)
 
 
 def check_json(target: str | None) -> str | None:

@@ -46,7 +46,7 @@ OWNERS = {
         "assembly/statistics/tolerances.py",
         "stiffness/library.py",
     ),
-    "h5netcdf": ("assembly/sweeps/dataset.py",),
+    "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")

@@ -153,8 +153,8 @@ def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
 
 def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
-    status, out, err = run("assembly", "sweep", "five_bar", "--grid",
-                           "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture)  # fmt: skip
+    words = ["--grid", "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture]
+    status, out, err = run("assembly", "sweep", "five_bar", *words)
     assert (status, out) == (0, "out of reach: 9\n")
     assert "Warning" not in err
     assert run("assembly", "plot", file, "-o", picture, "--at", "tx=5")[0] == 0
@@ -162,9 +162,10 @@ def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
 
 def test_postures_of_a_list_and_designs_are_a_map(run, tmp_path):
     (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.14\n")
+    words = ["--vary", "elbow.link.young=2e11,7e10,1e11", "-o", tmp_path / "x.nc",
+             "--figure", tmp_path / "x.svg"]  # fmt: skip
     status, _, err = run("assembly", "sweep", "five_bar", "--poses",
-                         tmp_path / "poses.csv", "--vary", "elbow.link.young=2e11,7e10,1e11",
-                         "-o", tmp_path / "x.nc", "--figure", tmp_path / "x.svg")  # fmt: skip
+                         tmp_path / "poses.csv", *words)  # fmt: skip
     assert (status, "Warning" in err) == (0, False)
     assert (tmp_path / "x.svg").read_bytes().startswith(b"<?xml")
 
@@ -188,15 +189,15 @@ def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-o", "robot.toml"], 'robot.toml: found the ending ".toml", expected a NetCDF '
-         "file of forcefit: .nc"),
+        (["-o", "robot.toml"], 'robot.toml: found the ending ".toml", expected a '
+         "NetCDF file of forcefit: .nc"),
         (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
          "forcefit; expected one, or nothing there: it is not overwritten"),
         (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
          "sweep by forcefit"),
-        (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", expected '
-         "a picture: .png or .svg or .pdf"),
+        (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
+         "expected a picture: .png or .svg or .pdf"),
         (["-o", "x.nc", "--figure", "other.png"], "other.png: found a file that is not "
          "a picture"),
         (["-o", "x.nc", "--json", "robot.toml"], 'found the ending ".toml", expected a '

@@ -4,17 +4,17 @@ Written block by block from the journal, a file never needs more memory than a f
 blocks, and its bytes depend on the sweep alone.
 """
 
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.sweeps.netcdf import netcdf_file
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
 from stiffness.reading import BadInput
-from stiffness.writing import NETCDF, check_writable, unwritable, whole_file
+from stiffness.writing import NETCDF, check_writable
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +32,6 @@ _TEXT = {
     "near_singularity": "singularities near by, with the joints that show them",
 }
 _TOGETHER = 64  # blocks written at a time
-_UNLOCKED = {"locking": False}  # by HDF5: the file is held already
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
@@ -75,25 +74,14 @@ def write_sweep(
     Raises:
         BadInput: the file cannot be written.
     """
-    with _whole_netcdf(path) as part:
-        _write(sweep, read, part)
-
-
-@contextmanager
-def _whole_netcdf(path: Path | str) -> Generator[Path, None, None]:
-    """A NetCDF file, whole or not at all; where to write it meanwhile."""
-    with whole_file(path) as part:
-        try:
-            yield part
-        except RuntimeError as error:  # HDF5 closing a file on a full disk
-            raise BadInput(unwritable(path, error)) from None
+    with netcdf_file(path) as file:
+        _write(sweep, read, file)
 
 
 def _write(
-    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
+    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
     """The file, from its coordinates to its last block."""
-    import h5netcdf
     import h5py
 
     text = h5py.string_dtype()
@@ -101,32 +89,31 @@ def _write(
     sizes = dict(zip(sweep.dims, sweep.shape, strict=True))
     for one in asked.values():
         sizes |= {dim: len(labels) for dim, labels in one.dims.items()}
-    with h5netcdf.File(path, "w", **_UNLOCKED) as file:
-        file.dimensions = sizes
-        for name, (dims, values, attributes) in coordinates.items():
-            kind = text if values.dtype == object else values.dtype
-            variable = file.create_variable(name, dims, kind, data=values)
-            variable.attrs.update(attributes)
-        for name, one in asked.items():
-            dims = (*sweep.dims, *one.dims)
-            file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
-        for name, meaning in _TEXT.items():
-            variable = file.create_variable(name, sweep.dims, text)
-            variable.attrs["long_name"] = meaning
-        file.attrs.update(sweep.provenance)
-        beside = [name for name in coordinates if name not in sizes]
-        if beside:
-            file.attrs["coordinates"] = " ".join(beside)
-        for first in range(0, sweep.blocks, _TOGETHER):
-            last = min(first + _TOGETHER, sweep.blocks)
-            start = first * sweep.block_size
-            records, texts = _joined([read(block) for block in range(first, last)])
-            for name in (*asked, *_TEXT):
-                values = (
-                    _text_column(name, records, texts) if name in _TEXT
-                    else records[name]
-                )  # fmt: skip
-                _put(file[name], sweep.shape, start, values)
+    file.dimensions = sizes
+    for name, (dims, values, attributes) in coordinates.items():
+        kind = text if values.dtype == object else values.dtype
+        variable = file.create_variable(name, dims, kind, data=values)
+        variable.attrs.update(attributes)
+    for name, one in asked.items():
+        dims = (*sweep.dims, *one.dims)
+        file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
+    for name, meaning in _TEXT.items():
+        variable = file.create_variable(name, sweep.dims, text)
+        variable.attrs["long_name"] = meaning
+    file.attrs.update(sweep.provenance)
+    beside = [name for name in coordinates if name not in sizes]
+    if beside:
+        file.attrs["coordinates"] = " ".join(beside)
+    for first in range(0, sweep.blocks, _TOGETHER):
+        last = min(first + _TOGETHER, sweep.blocks)
+        start = first * sweep.block_size
+        records, texts = _joined([read(block) for block in range(first, last)])
+        for name in (*asked, *_TEXT):
+            values = (
+                _text_column(name, records, texts) if name in _TEXT
+                else records[name]
+            )  # fmt: skip
+            _put(file[name], sweep.shape, start, values)
 
 
 def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> None:
@@ -228,12 +215,8 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     """
     from xarray.backends import H5NetCDFStore
 
-    with _whole_netcdf(path) as part:
-        store = H5NetCDFStore.open(part, mode="w", driver_kwds=_UNLOCKED)
-        try:
-            data.dump_to_store(store)
-        finally:
-            store.close()
+    with netcdf_file(path) as file:
+        data.dump_to_store(H5NetCDFStore(file))
 
 
 def check_dataset(path: Path | str, what: str) -> None:
