@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from stiffness.curve import curve_compliance
 from stiffness.link import LinkStiffness, check_definite, inverted, scaled
+from stiffness.options import checked
 from stiffness.parametric import check_shape, shape_beam, shape_surface
 from stiffness.reading import BadInput, nearest, read_text, read_toml
 from stiffness.results import link_results
@@ -31,6 +32,7 @@ from stiffness.writing import write_json
 FORMAT = "forcefit link 1"
 _MATERIAL = ("young", "poisson", "density")
 _METHODS = ("beam", "fea")
+_LARGEST = 1e15  # in SI: beyond any length, modulus or density
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,7 @@ def read_spec(path: Path | str) -> Spec:
         values = grid_table.get(name)
         given = values if isinstance(values, list) else [values]
         if not given or not all(_is_number(v) for v in given):
-            raise grid_table.bad(name, "expected a number, or a list of numbers")
+            raise grid_table.bad(name, "expected a finite number, or a list of them")
         if len(set(given)) != len(given):
             raise grid_table.bad(name, "a value stands there twice")
         grid[name] = tuple(sorted(float(v) for v in given))
@@ -120,13 +122,15 @@ def read_spec(path: Path | str) -> Spec:
             raise grid_table.bad(name, "missing; expected a number or a list")
     for point in spec.points():
         check_shape(shape, _lengths(point))
+        checked(f"{path}: grid.young", point["young"], "Pa", above=0)
+        checked(f"{path}: grid.poisson", point["poisson"], "1", above=-1, below=0.5)
     return spec
 
 
 def _is_number(value: object) -> bool:
-    """A finite number, not true or false."""
+    """A number of a sane size, not true or false."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
-    return proper and bool(np.isfinite(float(value)))  # type: ignore[arg-type]
+    return proper and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
@@ -274,11 +278,15 @@ def _entry(file: Path) -> Entry:
             for name in ("stiffness", "stiffness_error", "tip")
         ]
         parameters = {str(k): float(v) for k, v in about["parameters"].items()}
-    except (json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+    except BadInput:
+        raise
+    except (ValueError, OverflowError, LookupError, TypeError, AttributeError) as error:
         raise BadInput(f"{file}: damaged entry ({type(error).__name__})") from None
     K, error_matrix, tip = arrays
     if K.shape != (6, 6) or error_matrix.shape != (6, 6) or tip.shape != (3,):
         raise BadInput(f"{file}: a matrix has another shape than 6 by 6")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise BadInput(f"{file}: a number is not finite")
     check_definite(f"{file}: stiffness", K)
     return Entry(file.stem, K, error_matrix, tip, parameters, about)
 

@@ -147,6 +147,8 @@ def check_surface(
     """
     if len(triangles) == 0:
         raise BadInput(f"{name}: holds no triangles")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise BadInput(f"{name}: a triangle has a corner that is not among the points")
     _check_coordinates(points, triangles, name, unit)
     points, triangles, repairs = _merge(points, triangles)
     if len(triangles) < 4:

@@ -4,6 +4,7 @@ Importing this module adds them to the application.
 """
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -101,11 +102,13 @@ def statistics(
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    held = ExitStack()  # keeps the journal until all is written
     try:
         with progress_bars() as update:
             data = run_draws(
-                experiment, draws, output, workers, lambda d, n: update("draws", d, n)
-            )
+                experiment, draws, output, workers, lambda d, n: update("draws", d, n),
+                held,
+            )  # fmt: skip
             if importance is not None:
                 shares = importance_dataset(
                     experiment, importance, by, confidence,
@@ -126,6 +129,7 @@ def statistics(
         **summarise(data, limits, yield_strength, confidence),
     }  # fmt: skip
     write_json(summary, json)
+    held.close()
     if json != "-":
         print(summary_text(summary))
 

@@ -185,6 +185,7 @@ def run_draws(
     path: Path | str | None = None,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    held: ExitStack | None = None,
 ) -> "xarray.Dataset":
     """Solve draws 0 .. count - 1.
 
@@ -194,6 +195,8 @@ def run_draws(
         path: NetCDF file to write; its journal is used and then removed.
         workers: threads.
         progress: called with the draws done and their number.
+        held: keeps the journal until it is closed, as in
+            :func:`assembly.sweeps.sweep.run_sweep`.
 
     Returns:
         Data set over ``draw``; the file holds the same.
@@ -202,15 +205,15 @@ def run_draws(
         BadInput: the journal is another run's or held by one, or a file cannot be
             written.
     """
-    with ExitStack() as held:  # the journal, until the file stands
-        return _run_draws(experiment, count, path, workers, progress, held)
+    with ExitStack() as own:
+        return _run_draws(experiment, count, path, workers, progress, held or own)
 
 
 def _run_draws(
     experiment: Experiment, count: int, path: Path | str | None, workers: int,
     progress: Callable[[int, int], None], held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """The same; the journal is let go with ``held``."""
+    """The same; ``held`` keeps the journal."""
     blocks = -(-count // BLOCK)
     kept: dict[int, NDArray] = {}
     journal = None
@@ -233,7 +236,7 @@ def _run_draws(
     data = draws_dataset(experiment, np.concatenate([kept[b] for b in range(blocks)]))
     if path is not None and journal is not None:
         save_dataset(data, path)
-        journal.path.unlink()
+        journal.remove_after(held)
     return data
 
 

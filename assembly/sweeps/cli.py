@@ -4,6 +4,7 @@ Importing this module adds them to the application.
 """
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -118,6 +119,7 @@ def sweep(
         from assembly.sweeps.cluster import cluster_solver
 
         solver = cluster_solver(workers, scheduler)
+    held = ExitStack()  # keeps the journal until all is written
     try:
         with progress_bars() as update:
 
@@ -125,7 +127,7 @@ def sweep(
                 done[0] = finished
                 update("points", finished, total)
 
-            run_sweep(asked, output, note, solver)
+            run_sweep(asked, output, note, solver, held)
     except KeyboardInterrupt:
         print(
             f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
@@ -138,6 +140,7 @@ def sweep(
         save_figure(figure_of(data), figure)
     summary = {"output": str(output)} | summary_of(data)
     write_json(summary, json)
+    held.close()
     if json != "-":
         print(summary_text(summary, data))
 

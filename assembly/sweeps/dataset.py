@@ -263,13 +263,17 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     Raises:
         BadInput: the file is absent or no NetCDF file.
     """
+    import h5py
     import xarray
 
     path = Path(path)
     if not path.is_file():
         raise BadInput(f"{path}: no such file; expected a data set of a sweep")
     try:
+        # h5netcdf writes to stderr when what it cannot open is collected
+        with h5py.File(path, "r"):
+            pass
         return xarray.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError, KeyError) as error:
+    except Exception as error:  # of a damaged file HDF5 raises whatever it meets
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None

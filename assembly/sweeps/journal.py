@@ -75,6 +75,15 @@ class Journal:
             raise BadInput(f"{self.path}: cannot be written: no space left")
         self.places[block] = start + len(head), len(content)
 
+    def remove_after(self, held: ExitStack) -> None:
+        """Remove the file when a block of code has ended well; a failure keeps it."""
+
+        def remove(kind: object, *_: object) -> None:
+            if kind is None:
+                self.path.unlink()
+
+        held.push(remove)
+
     def read(self, block: int) -> tuple[NDArray, dict[str, dict[int, str]]]:
         """Rows and texts of a finished block.
 

@@ -10,7 +10,7 @@ import json
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -187,6 +187,7 @@ def run_sweep(
     path: Path | str,
     progress: Progress = lambda done, total: None,
     solve: Solver = solve_here,
+    held: ExitStack | None = None,
 ) -> None:
     """Solve a sweep into a NetCDF file, going on from its journal if there is one.
 
@@ -200,6 +201,8 @@ def run_sweep(
         progress: called at the start and after each block with the number of points
             that are in the journal, and of all.
         solve: solves blocks: :func:`solve_here`, or :mod:`assembly.sweeps.cluster`.
+        held: keeps the journal until it is closed, for what is still made of the
+            file: killed meanwhile, the same sweep has nothing to solve again.
 
     Raises:
         BadInput: the journal is another sweep's, another run holds it, or a file
@@ -207,7 +210,11 @@ def run_sweep(
     """
     path = Path(path)
     kind = record_type(sweep.question)
-    with open_journal(journal_path(path), sweep.identity, kind) as journal:
+    with ExitStack() as own:
+        held = own if held is None else held
+        journal = held.enter_context(
+            open_journal(journal_path(path), sweep.identity, kind)
+        )
         done = sum(_length(sweep, block) for block in journal.places)
         progress(done, sweep.size)
         waiting = [b for b in range(sweep.blocks) if b not in journal.places]
@@ -216,7 +223,7 @@ def run_sweep(
             done += _length(sweep, block)
             progress(done, sweep.size)
         write_sweep(sweep, journal.read, path)
-        journal.path.unlink()
+        journal.remove_after(held)
 
 
 def journal_path(path: Path | str) -> Path:
