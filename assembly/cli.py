@@ -6,6 +6,7 @@ import time
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
 from typing import Annotated, Any
 
 import typer
@@ -22,6 +23,8 @@ from stiffness.writing import (
 )
 
 app = typer.Typer(no_args_is_help=True)
+
+_MOMENT = 2.0  # [s] that may pass without a word
 
 RobotArgument = Annotated[
     str, typer.Argument(metavar="ROBOT", help="A robot file, or a built-in name.")
@@ -198,7 +201,11 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float]:
 
 @contextmanager
 def progress_bars() -> Generator[Any, None, None]:
-    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each."""
+    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each.
+
+    Where stderr is no terminal, bars show at the end alone: a line says what takes
+    longer than a moment.  Bad input leaves none, its message is enough.
+    """
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -215,10 +222,17 @@ def progress_bars() -> Generator[Any, None, None]:
     )  # fmt: skip
     tasks: dict[str, Any] = {}
     began: dict[str, tuple[float, int]] = {}
-    with Progress(*columns, console=Console(stderr=True)) as bars:
+    waiting: list[Timer] = []
+    console = Console(stderr=True)
+    with Progress(*columns, console=console) as bars:
 
         def update(what: str, done: int, total: int) -> None:
             if what not in tasks:
+                if not console.is_terminal:
+                    said = f"{what}: {done} of {total}"
+                    waiting.append(Timer(_MOMENT, print, [said], {"file": sys.stderr}))
+                    waiting[-1].daemon = True
+                    waiting[-1].start()
                 # what was done in an earlier run does not count in the rate
                 tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
                 began[what] = time.monotonic(), done
@@ -227,7 +241,16 @@ def progress_bars() -> Generator[Any, None, None]:
             rate = f"{(done - before) / passed:.3g}/s" if done > before else ""
             bars.update(tasks[what], completed=done, total=total, rate=rate)
 
-        yield update
+        try:
+            yield update
+        except BadInput:
+            bars.live.transient = True
+            bars.live.stop()
+            bars.disable = True  # or it ends with an empty line
+            raise
+        finally:
+            for line in waiting:
+                line.cancel()
 
 
 @app.command()

@@ -32,11 +32,11 @@ from random import Random
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
-import typer
-from fuzz_mutations import change_file, change_words
-from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds
+import typer  # noqa: E402
+from fuzz_mutations import change_file, change_words  # noqa: E402
+from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
 
-import forcefit
+import forcefit  # noqa: E402
 
 LIMIT = 2.0  # [s] of processor time, then Ctrl-C
 PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
@@ -44,7 +44,8 @@ BATCH = 50  # inputs to a process
 MEMORY = 8 << 30  # [byte] of addresses
 _HEAD = struct.Struct("<Q")
 _OURS = re.compile(r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |"
-                   r"mesh \d|\S+ *\d+/\d+|\d[\d,]* unknowns|[a-z ]+: \d+ of \d+")  # fmt: skip
+                   r"mesh \d|\S+ *\d+/\d+|\d[\d,]* unknowns|[a-z ]+: \d+ of \d+"
+)  # fmt: skip
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
@@ -106,7 +107,7 @@ def prepare(folder: Path, warm: bool) -> None:
 def run(words: list[str]) -> tuple[object, str, str]:
     """The command in this process: exit status, standard output, error output."""
     saved = [os.dup(1), os.dup(2)]
-    files = [tempfile.TemporaryFile(), tempfile.TemporaryFile()]  # noqa: SIM115
+    files = [tempfile.TemporaryFile(), tempfile.TemporaryFile()]
     sys.stdout.flush()
     for number, file in enumerate(files, 1):
         os.dup2(file.fileno(), number)
@@ -335,7 +336,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int)
+    parser.add_argument("--only", type=int, nargs="+")
     asked = parser.parse_args()
 
     def too_late(*_):
@@ -351,10 +352,11 @@ def main() -> int:
         prepare(seeds, asked.only is None)
         options = options_of()
         if asked.only is not None:
-            ((_, found),) = batch([asked.only], asked.seed, options, seeds)
-            print(shlex.join(found["words"]), found["done"], found["status"], sep="\n")
-            print(found["out"][-2000:], found["err"], found["wrong"], sep="\n")
-            return bool(found["wrong"])
+            for number, found in batch(asked.only, asked.seed, options, seeds):
+                print(number, shlex.join(found["words"]), found["done"], sep="\n")
+                print(found["out"][-2000:], found["err"], sep="\n")
+                print(found["status"], found["wrong"])
+            return 0
         began = time.monotonic()
         for first in range(0, asked.count, BATCH):
             numbers = list(range(first, min(first + BATCH, asked.count)))

@@ -1,4 +1,4 @@
-"""Changes to files and to words of a command, for ``fuzz.py``; all from one ``Random``."""
+"""Changes to files and to words of a command, for ``fuzz.py``, by one ``Random``."""
 
 import csv
 import io
@@ -16,7 +16,8 @@ NUMBERS = [
 ]  # fmt: skip
 TEXTS = [
     "", " ", "-", "--", "a", "base", "x" * 300, "x" * 5000, "$x^2_a$", "<b>&amp;", "^",
-    "[bold]", "[/]", "%s%d{x}", "\u00e9\u4e2d\U0001f916", "\u202e", "a\nb", "\t", "'", '"',
+    "[bold]", "[/]", "%s%d{x}", "\u00e9\u4e2d\U0001f916", "\u202e", "a\nb", "\t", "'",
+    '"',
     "\\", "../..", "/", "~", "*", "no.file", "tx", "tx=", "=1", "tx=nan", "tx=1e300",
     "tx=0,tx=1", "rz=0:1:1e-9", "rz=0:1:0", "rz=1:0:0.1", "rz=0:inf:1", "q.crank=0.5",
     "z=0", "bore=0,0,0/0,0,0/1", "disc=", "fx=inf", "fx=1e300", "energy=-1", "drift=0",
@@ -32,12 +33,14 @@ PATHS = [
 ]  # fmt: skip
 VALUES: list[Any] = [
     float("nan"), float("inf"), -1, 0, 1, 1e300, -1e300, 1e-300, 5e-324, 2**70, True,
-    "", " ", "base", "x" * 5000, "$x^2_a$", "<b>", "[bold]", "a\nb", "\x1b[31m", [], [[]],
+    "", " ", "base", "x" * 5000, "$x^2_a$", "<b>", "[bold]", "a\nb", "\x1b[31m", [],
+    [[]],
     [1], [0] * 3, [0] * 6, [-1] * 6, [1e200] * 3, [float("inf")] * 6, [[0.0] * 6] * 6,
     {}, {"a": 1}, {"a": {"b": [[[1]]]}}, [{}], "../x", "no.file", "\u00e9\u4e2d",
 ]  # fmt: skip
 PIECES = [
-    b"", b"\x00", b"\xff", b"\r", b"'", b'"', b"9", b"[", b"]", b"=", b",", b"\n", b"\n\n",
+    b"", b"\x00", b"\xff", b"\r", b"'", b'"', b"9", b"[", b"]", b"=", b",", b"\n",
+    b"\n\n",
     b"#", b"\xef\xbb\xbf", b"\xe2\x80\xa8", b"{", b"-", b"e", b";", b"\xf0\x9f\xa4",
 ]  # fmt: skip
 _TOKEN = re.compile(r"-?\d[\d.eE+_-]*|\"[^\"\n]*\"|\w+")

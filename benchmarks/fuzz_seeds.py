@@ -38,7 +38,8 @@ position = 1.1
 name = "wrist"
 parent = "rocker"
 translation = [0.3, 0, 0]
-link = { beam = { width = 0.02, height = 0.04, up = [0, 0, 1] }, young = 7e10, poisson = 0.3 }
+link = { beam = { width = 0.02, height = 0.04, up = [0, 0, 1] }, young = 7e10, \
+         poisson = 0.3 }
 joint = "revolute"
 position = -1
 clearance = { spin = 3, tilt = 1e-4 }
@@ -187,14 +188,16 @@ f 1 4 3
 COMMANDS = [
     (9, "assembly zone bar.toml"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
-    (6, "assembly solve arm.toml --joint one=0.2,two=0.4 --under time=60 --json new.json"),
+    (6, "assembly solve arm.toml --joint one=0.2,two=0.4 --under time=60 --json "
+        "new.json"),
     (3, "assembly exact bar.toml --joint crank=1.1"),
     (3, "assembly error bar.toml --reading frozen --point x=0.1 --direction tx=1"),
     (1, "assembly show bar.toml -o new.png --exaggeration 20"),
     (5, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --near 0.1"),
-    (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --reading none --wrench elbow"),
-    (4, "assembly sweep bar.toml --grid q.crank=1:1.1:0.1 -o new.nc --errors errors.toml "
-        "--draws 3 --seed 2 --reading none --vary elbow.link.young=7e10,2e11"),
+    (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --reading none "
+        "--wrench elbow"),
+    (4, "assembly sweep bar.toml --grid q.crank=1:1.1:0.1 -o new.nc --errors "
+        "errors.toml --draws 3 --seed 2 --reading none --vary elbow.link.young=7e10,2e11"),
     (1, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --figure new.svg "
         "--yield-strength 2e8 --reading none"),
     (6, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1"),
@@ -212,7 +215,8 @@ COMMANDS = [
         "width=0.06,height=0.04,wall=0.003 --up z"),
     (7, "stiffness curve curve.toml --young 7e10 --poisson 0.3 --json new.json"),
     (3, "stiffness fea solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
-        "--unit mm --part z=0.2..0.4/young=2e11,poisson=0.3,density=7800 --mass 1/0,0,1"),
+        "--unit mm --part z=0.2..0.4/young=2e11,poisson=0.3,density=7800 --mass "
+        "1/0,0,1"),
     (3, "stiffness fea solid.stl --base z=0 --tip bore=0,0,0/0,1,0/7 --young 7e10 "
         "--poisson 0.3 --accuracy 0.1"),
     (2, "stiffness compare solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
@@ -227,7 +231,8 @@ COMMANDS = [
     (3, "stiffness library export links --to mapdl --key "
         "round-beam-length0.3-radius0.02-young7e+10-poisson0.3"),
     (6, "validation inspect campaign --json -"),
-    (1, "validation diagnose campaign --json new.json --save new.toml --report new.html"),
+    (1, "validation diagnose campaign --json new.json --save new.toml --report "
+        "new.html"),
     (1, "validation crosscheck bar.toml --scale 1,x --links beam --time-limit 5"),
     (3, "validation validity bar.toml --joint crank=1.1 --load fx=10"),
     (2, "validation generate arm.toml newfolder --truth new.json --effect drift=3 "

@@ -8,6 +8,7 @@ program's version and the date.
 
 import itertools
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -256,10 +257,10 @@ def read_entry(path: Path | str, key: str) -> Entry:
         BadInput: there is no such library or entry, or the file is damaged.
     """
     path = Path(path)
-    if not path.is_dir():
+    if not os.path.isdir(path):
         raise BadInput(f"{path}: no library there; expected a folder of entries")
     file = path / f"{key}.json"
-    if Path(key).name != key or not file.is_file():
+    if Path(key).name != key or not os.path.isfile(file):
         known = [p.stem for p in sorted(path.glob("*.json"))]
         raise BadInput(f'{path}: no entry "{key}"{nearest(key, known)}')
     return _entry(file)
@@ -320,7 +321,7 @@ def read_library(path: Path | str) -> list[Entry]:
         BadInput: there is no library, nothing in it, or a damaged entry.
     """
     path = Path(path)
-    files = sorted(path.glob("*.json")) if path.is_dir() else []
+    files = sorted(path.glob("*.json")) if os.path.isdir(path) else []
     if not files:
         raise BadInput(f"{path}: no library there; expected a folder of entries")
     return [_entry(file) for file in files]

@@ -44,7 +44,8 @@ def read_text(path: Path | str) -> str:
         Its text with line ends as ``\n``.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable, far too large or not UTF-8.
+        BadInput: the file is absent, a folder, unreadable, far too large, not UTF-8,
+            or holds NUL.
     """
     try:
         with Path(path).open("rb") as file:  # which may be a pipe, or have no end
@@ -54,6 +55,8 @@ def read_text(path: Path | str) -> str:
         raise BadInput(f"{path}: cannot be read: {reason}") from None
     if len(content) > _LARGEST_FILE:
         raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    if (place := content.find(0)) >= 0:
+        raise BadInput(f"{path}: byte {place} is NUL; expected a text file in UTF-8")
     try:
         return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:

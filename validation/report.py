@@ -35,12 +35,12 @@ def write_study(results: StudyResults) -> Path:
     """
     from assembly.sweeps.dataset import save_dataset
 
-    folder = results.study.folder
+    folder, page = results.study.folder, report_page(results)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
-    write_text(report_page(results), folder / "report.html")
+    write_text(page, folder / "report.html")
     write_json(results_table(results), str(folder / "results.json"))
     if results.maps is not None:
         save_dataset(results.maps, folder / "results.nc")

@@ -4,6 +4,7 @@ A study file is TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` 
 Everything in it is read and checked before any work begins.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -142,7 +143,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     except BadInput as error:
         raise root.bad("", str(error)) from None
     folder = Path(folder or asked)
-    if folder.exists() and not folder.is_dir():
+    if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"{folder}: found a file, expected a folder or nothing")
     return Study(
         title, robot, errors, source, meshes, accuracy, pose, axes, scales, checks,
@@ -204,7 +205,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
     meshes: dict[str, MeshLink] = {}
     if table.has("surface"):
         surface = Path(root.file).parent / table.text("surface")
-        if not surface.is_file():
+        if not os.path.isfile(surface):
             raise table.bad("surface", f"no such file: {surface}")
         beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
         wanted = _frames(table, robot, [f.name for f in beams])

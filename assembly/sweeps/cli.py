@@ -103,14 +103,17 @@ def sweep(
     check_dataset(output, "a sweep")
     if figure is not None:
         check_writable(figure, PICTURE)
-    asked = ask_sweep(
-        robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-        seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
-        linearisation=linearisation, near=near, yield_strength=yield_strength,
-        load=parse_load(load) or (0.0,) * 6,
-        gravity=parse_gravity(gravity) or (0.0,) * 3,
-        under=parse_covariates(under),
-    )  # fmt: skip
+    push, g = parse_load(load), parse_gravity(gravity)
+    covariates = parse_covariates(under)
+    with progress_bars() as update:
+        update("robot", 0, 1)  # where it is placed, code may be compiled
+        asked = ask_sweep(
+            robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
+            linearisation=linearisation, near=near, yield_strength=yield_strength,
+            load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
+        )  # fmt: skip
+        update("robot", 1, 1)
     if figure is not None:
         check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
     done = [0]

@@ -4,6 +4,7 @@ Written block by block from the journal, a file never needs more memory than a f
 blocks, and its bytes depend on the sweep alone.
 """
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -267,7 +268,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     import xarray
 
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file; expected a data set of a sweep")
     try:
         # h5netcdf writes to stderr when what it cannot open is collected

@@ -182,7 +182,8 @@ def _command(robot: str | Path, options: Mapping[str, Any]) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default.get(key):
             words += [name, str(value)]
-    return shlex.join(words)
+    # names of files may hold bytes that are not UTF-8
+    return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
