@@ -30,6 +30,7 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import typer  # noqa: E402
@@ -43,9 +44,11 @@ PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
 BATCH = 50  # inputs to a process
 MEMORY = 8 << 30  # [byte] of addresses
 _HEAD = struct.Struct("<Q")
-_OURS = re.compile(r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |"
-                   r"mesh \d|\S+ *\d+/\d+|\d[\d,]* unknowns|[a-z ]+: \d+ of \d+"
-)  # fmt: skip
+# progress, verdicts and what meshing says
+_OURS = re.compile(
+    r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
+    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z ]+: \d+ of \d+"
+)
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:

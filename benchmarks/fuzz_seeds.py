@@ -197,7 +197,8 @@ COMMANDS = [
     (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --reading none "
         "--wrench elbow"),
     (4, "assembly sweep bar.toml --grid q.crank=1:1.1:0.1 -o new.nc --errors "
-        "errors.toml --draws 3 --seed 2 --reading none --vary elbow.link.young=7e10,2e11"),
+        "errors.toml --draws 3 --seed 2 --reading none --vary "
+        "elbow.link.young=7e10,2e11"),
     (1, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --figure new.svg "
         "--yield-strength 2e8 --reading none"),
     (6, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1"),

@@ -34,6 +34,7 @@ from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 
 import numpy as np
 
@@ -61,7 +62,7 @@ COMMANDS = {
     "sweep": "assembly sweep five_bar --grid tx=-0.04:0.04:0.01,ty=0.1:0.15:0.01 "
     "--errors errors.toml --draws 20 --reading none -o out.nc --json out.json",
     "statistics": "assembly statistics five_bar --errors errors.toml --draws 20000 "
-    "--pose ty=0.13 -o out.nc --json out.json",
+    "--pose ty=0.13 --no-margins -o out.nc --json out.json",
     "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "
     "--plan plan.toml --fresh 50 -o out.nc --figure out.png --json out.json",
     "diagnose": "validation diagnose campaign --json out.json --report out.html "

@@ -113,9 +113,9 @@ def sweep(
             linearisation=linearisation, near=near, yield_strength=yield_strength,
             load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
         )  # fmt: skip
+        if figure is not None:
+            check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
-    if figure is not None:
-        check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
     done = [0]
     solver: Solver = solve_here
     if workers is not None or scheduler is not None:
