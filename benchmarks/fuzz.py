@@ -47,7 +47,7 @@ _HEAD = struct.Struct("<Q")
 # progress, verdicts and what meshing says
 _OURS = re.compile(
     r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
-    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z ]+: \d+ of \d+"
+    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
 )
 
 

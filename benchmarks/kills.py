@@ -152,6 +152,8 @@ def start(words: list[str], limit: int | None = None) -> int:
     except BaseException:
         os.write(2, traceback.format_exc().encode())
     finally:
+        if status not in {0, 130}:
+            os.write(2, sys.stderr.getvalue()[-300:].encode())
         os._exit(status)
 
 
@@ -263,15 +265,13 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full":
             status = finish(child)
             counts["disks full"] += status == 2
-            if status not in {0, 2}:
-                counts["wrong exit status"] += 1
+            counts["wrong exit status"] += wrong(status, {0, 2}, case, way)
         else:
             time.sleep(case.seconds * random.uniform(0, 1.15))
             os.kill(child, way)
             status = finish(child)
             counts[f"stopped by {way.name}"] += status != 0
-            if status not in {0, -way, 130}:
-                counts["wrong exit status"] += 1
+            counts["wrong exit status"] += wrong(status, {0, -way, 130}, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status)
         if status == 0 or (case.header and not path.exists() and standing):
@@ -285,13 +285,21 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
     if small:
         subprocess.run(["mount", "-o", "remount,size=64m", "."], check=True)
     status = finish(start(case.words))
-    counts["wrong exit status"] += status != 0
+    counts["wrong exit status"] += wrong(status, {0}, case, "nothing")
     counts["lost"] += solved_again(case, standing)
     found = {p.name: p.read_bytes() for p in Path().glob("out.*")}
     counts["different at the end"] += found != case.files
     counts["ended"] += 1
     for name in found:
         Path(name).unlink()
+
+
+def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
+    """Whether an exit status is none of the right ones; it is then told."""
+    if status in right:
+        return False
+    print(f"exit status {status} of {case.words[1]} after {way}")
+    return True
 
 
 def solved_again(case: Case, standing: int) -> int:
