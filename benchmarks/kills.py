@@ -138,13 +138,14 @@ def start(words: list[str], limit: int | None = None) -> int:
     child = os.fork()
     if child:
         return child
-    status = 99
+    status, said = 99, io.StringIO()
+    said.close = lambda: None  # type: ignore[method-assign]
     try:
         with Path("/dev/null").open("w") as nothing:
             os.dup2(nothing.fileno(), 1)
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-        sys.stdout, sys.stderr = io.StringIO(), io.StringIO()
+        sys.stdout, sys.stderr = io.StringIO(), said
         sys.argv = ["forcefit", *words]
         forcefit.main()
     except SystemExit as done:
@@ -153,7 +154,7 @@ def start(words: list[str], limit: int | None = None) -> int:
         os.write(2, traceback.format_exc().encode())
     finally:
         if status not in {0, 130}:
-            os.write(2, sys.stderr.getvalue()[-300:].encode())
+            os.write(2, said.getvalue()[-300:].encode())
         os._exit(status)
 
 

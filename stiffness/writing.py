@@ -68,6 +68,7 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
         found = f"the ending {quoted(path.suffix)}" if path.suffix else "no ending"
         expected = " or ".join(kind.endings)
         raise BadInput(f"{path}: found {found}, expected {kind.name}: {expected}")
+    folder = path.parent
     try:
         folder = Path(os.path.realpath(path)).parent
         mode = path.stat().st_mode

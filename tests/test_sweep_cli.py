@@ -266,3 +266,17 @@ def test_ctrl_c_in_compiled_code_is_130_too(run, monkeypatch):
 
     monkeypatch.setattr(forcefit, "app", interrupted)
     assert run("study")[0] == 130
+
+
+def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path):
+    """HDF5 opens some of them, and h5netcdf then fails half open."""
+    file = tmp_path / "x.nc"
+    words = ["five_bar", "--grid", "tx=0:0.01:0.01,ty=0.13", "-o", file]
+    assert run("assembly", "sweep", *words)[0] == 0
+    content = file.read_bytes()
+    for place in range(100, len(content), 997):
+        spoilt = content[:place] + bytes(40) + content[place + 40 :]
+        file.write_bytes(spoilt)
+        status, _, err = run("assembly", "plot", file, "-o", tmp_path / "x.svg")
+        assert status in {0, 2}
+        assert messages(err) == (status == 2)

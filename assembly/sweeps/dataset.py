@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.sweeps.netcdf import netcdf_file
+from assembly.sweeps.netcdf import forgive_damaged_files, netcdf_file
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
 from stiffness.reading import BadInput
 from stiffness.writing import NETCDF, check_writable
@@ -264,16 +264,13 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     Raises:
         BadInput: the file is absent or no NetCDF file.
     """
-    import h5py
     import xarray
 
     path = Path(path)
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file; expected a data set of a sweep")
+    forgive_damaged_files()
     try:
-        # h5netcdf writes to stderr when what it cannot open is collected
-        with h5py.File(path, "r"):
-            pass
         return xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # of a damaged file HDF5 raises whatever it meets
         reason = str(error).partition("\n")[0][:200]

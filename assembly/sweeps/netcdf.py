@@ -35,6 +35,13 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
                 raise BadInput(unwritable(path, target.failure)) from None
 
 
+def forgive_damaged_files() -> None:
+    """Let h5netcdf close what it could not open; else it writes to stderr."""
+    import h5netcdf
+
+    h5netcdf.File._writable = False  # until a file says otherwise
+
+
 class _Target:
     """Where HDF5 writes; a failure is kept until HDF5 has closed its file.
 
