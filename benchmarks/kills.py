@@ -29,6 +29,7 @@ import time
 import traceback
 import zlib
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -150,11 +151,12 @@ def start(words: list[str], limit: int | None = None) -> int:
         forcefit.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
-    except BaseException:
-        os.write(2, traceback.format_exc().encode())
-    finally:
-        if status not in {0, 130}:
+        if status not in {0, 130} and limit is None:  # or it may not write that
             os.write(2, said.getvalue()[-300:].encode())
+    except BaseException:
+        with suppress(OSError):
+            os.write(2, traceback.format_exc().encode())
+    finally:
         os._exit(status)
 
 
