@@ -7,14 +7,23 @@ import time
 from collections.abc import Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from threading import Timer
 from typing import Annotated, Any
 
 import typer
 
 from stiffness.message import BadInput, nearest
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import (
+    PIXELS,
+    check_json,
+    check_writable,
+    save_pixels,
+    write_json,
+)
 
 app = typer.Typer(no_args_is_help=True)
+
+_MOMENT = 2.0  # [s] that may pass without a word
 
 
 def _built_in_names(incomplete: str) -> list[str]:
@@ -57,7 +66,11 @@ UnderOption = Annotated[
 ]
 JsonOption = Annotated[
     str | None,
-    typer.Option("--json", help="Write results as JSON to a file; - is stdout."),
+    typer.Option(
+        "--json",
+        help="Write results as JSON to a file; - is stdout.",
+        callback=check_json,
+    ),
 ]
 
 
@@ -226,7 +239,11 @@ def one_thread() -> AbstractContextManager:
 
 @contextmanager
 def progress_bars() -> Generator[Any, None, None]:
-    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each."""
+    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each.
+
+    Where stderr is no terminal, bars show at the end alone: a line says what takes
+    longer than a moment.  Bad input leaves none, its message is enough.
+    """
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -243,10 +260,17 @@ def progress_bars() -> Generator[Any, None, None]:
     )  # fmt: skip
     tasks: dict[str, Any] = {}
     began: dict[str, tuple[float, int]] = {}
-    with Progress(*columns, console=Console(stderr=True)) as bars:
+    waiting: list[Timer] = []
+    console = Console(stderr=True)
+    with Progress(*columns, console=console) as bars:
 
         def update(what: str, done: int, total: int) -> None:
             if what not in tasks:
+                if not console.is_terminal:
+                    said = f"{what}: {done} of {total}"
+                    waiting.append(Timer(_MOMENT, print, [said], {"file": sys.stderr}))
+                    waiting[-1].daemon = True
+                    waiting[-1].start()
                 # what was done in an earlier run does not count in the rate
                 tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
                 began[what] = time.monotonic(), done
@@ -255,7 +279,16 @@ def progress_bars() -> Generator[Any, None, None]:
             rate = f"{(done - before) / passed:.3g}/s" if done > before else ""
             bars.update(tasks[what], completed=done, total=total, rate=rate)
 
-        yield update
+        try:
+            yield update
+        except BadInput:
+            bars.live.transient = True
+            bars.live.stop()
+            bars.disable = True  # or it ends with an empty line
+            raise
+        finally:
+            for line in waiting:
+                line.cancel()
 
 
 @app.command()
@@ -402,20 +435,14 @@ def error(
         raise typer.Exit(1)
 
 
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a figure; a kind of file that is not known is bad input."""
-    try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
-        raise BadInput(f"{path}: cannot be written: {error}") from None
-
-
 @app.command()
 def show(
     robot: RobotArgument,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="PNG file; a window opens without one."),
+        typer.Option(
+            "-o", "--output", help="PNG, JPEG, BMP or TIFF; a window opens without."
+        ),
     ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
@@ -428,18 +455,24 @@ def show(
         typer.Option(help="Also the body of possible errors: translation | rotation."),
     ] = None,
     reading: Annotated[
-        str, typer.Option(help="Of the errors: frozen | free | budget.")
-    ] = "budget",
+        str | None,
+        typer.Option(
+            help="Of the errors: frozen | free | budget; default budget, of a loaded "
+            "robot frozen."
+        ),
+    ] = None,
 ) -> None:
     """Draw the nominal and the forced robot, and its errors."""
-    from assembly.energy import solve_assembly
+    from assembly.energy import CannotAssemble, solve_assembly
     from assembly.error_body import PARTS
     from assembly.plot import draw_assembly
     from assembly.reach import READINGS
-    from assembly.results import remark_lines
+    from assembly.results import failure_status, remark_lines
+    from assembly.solvers.conic import SolverFailed
+    from assembly.solvers.reduction import FreeMotion
 
     if output is not None:
-        check_writable(output)
+        check_writable(output, PIXELS)
     elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
         raise BadInput("no display to open a window on; name a file with --output")
     for option, value, valid in (
@@ -447,14 +480,29 @@ def show(
     ):  # fmt: skip
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
-    answer = solve_assembly(posture_of(robot, pose, joint), parse_load(load))
-    print(
-        "".join(f"{line}\n" for line in remark_lines(answer.posture.robot.remarks)),
-        end="",
-    )
-    plotter = draw_assembly(answer, exaggeration, errors, reading, output is not None)
+    if exaggeration is not None and not exaggeration < float("inf"):
+        raise BadInput(f"--exaggeration: found {exaggeration}, expected a finite one")
+    wrench = parse_load(load)
+    loaded = wrench is not None and any(wrench)
+    if loaded and errors is not None and reading == "budget":
+        raise BadInput(
+            "--reading: found budget with --load, and a loaded robot has no such "
+            "reading; expected frozen or free"
+        )
+    reading = reading or ("frozen" if loaded else "budget")
+    posture = posture_of(robot, pose, joint)
+    for line in remark_lines(posture.robot.remarks):
+        print(line)
+    try:
+        answer = solve_assembly(posture, wrench)
+        plotter = draw_assembly(
+            answer, exaggeration, errors, reading, output is not None
+        )
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        print(f"{failure_status(error)}: {error}")
+        raise typer.Exit(1) from None
     if output is None:
         plotter.show()
     else:
-        plotter.screenshot(str(output))
+        save_pixels(plotter.screenshot(return_img=True), output)
     plotter.close()

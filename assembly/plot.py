@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.energy import Assembly
-from assembly.error_body import ErrorBody, error_body
+from assembly.error_body import PARTS, ErrorBody, error_body
 from assembly.reach import reachable_screws
+from stiffness.reading import BadInput
 from stiffness.screws import rotation_matrix, screw_map
 
 
@@ -33,13 +34,22 @@ def draw_assembly(
 
     Returns:
         A pyvista plotter.
+
+    Raises:
+        BadInput: the platform moves freely, so its errors have no bound.
+        SolverFailed: the cone solver gave up on the errors.
     """
     plotter = robot_plotter(answer, exaggeration, off_screen)
     if errors is not None:
         reach = reachable_screws(answer, reading)
+        if reach.unbounded(PARTS[errors].start):
+            raise BadInput(
+                f"{answer.posture.robot.name}: its platform moves freely, so its "
+                f"{errors} error has no bound; expected none to be drawn"
+            )
         body = error_body(reach, errors)
         size = 0.15 * float(np.ptp(answer.posture.transforms[:, :3, 3], axis=0).max())
-        add_error_body(plotter, body, answer.posture.platform[:3, 3], size)
+        add_error_body(plotter, body, answer.posture.platform[:3, 3], size, reading)
     return plotter
 
 
@@ -83,14 +93,17 @@ def robot_plotter(
     return plotter
 
 
-def add_error_body(plotter: Any, body: ErrorBody, origin: NDArray, size: float) -> None:
+def add_error_body(
+    plotter: Any, body: ErrorBody, origin: NDArray, size: float, reading: str
+) -> None:
     """Add a body of translation or rotation errors to a picture, magnified.
 
     Args:
         plotter: of :func:`robot_plotter`.
         body: what to draw.
         origin: (3,) [m] where no error is, the platform's nominal origin.
-        size: [m] that the largest error is drawn with; the factor is written below.
+        size: [m] that the largest error is drawn with.
+        reading: of problem (27), written below with the largest error.
     """
     import pyvista
 
@@ -102,7 +115,10 @@ def add_error_body(plotter: Any, body: ErrorBody, origin: NDArray, size: float) 
         solid = pyvista.PolyData(shown, np.hstack([count, body.faces]).ravel())
     plotter.add_mesh(solid, color="gold", opacity=0.6, point_size=6)
     unit, scale = ("mm", 1e3) if body.part == "translation" else ("mrad", 1e3)
-    said = f"gold: {body.part} errors possible, up to {largest * scale:.3g} {unit}"
+    said = (
+        f"gold: {body.part} errors possible ({reading}), "
+        f"up to {largest * scale:.3g} {unit}"
+    )
     plotter.add_text(said, position="lower_left", font_size=9, name="body")
 
 

@@ -30,6 +30,7 @@ from stiffness.reading import (
     read_toml,
 )
 from stiffness.screws import rotation_matrix, rotation_vector
+from stiffness.writing import ROBOT_MARK, write_text
 
 _LONGEST_NAME = 200  # characters
 _MOST_FRAMES = 2000
@@ -235,18 +236,18 @@ def write_robot(robot: Robot, path: Path | str) -> None:
             they lead from there.
 
     Raises:
-        OSError: the file cannot be written.
+        BadInput: the file cannot be written.
     """
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
     effects = table.pop("effect", [])
-    lines = [f"{k} = {_toml(v)}" for k, v in table.items()]
+    lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
     kinds = {"frame": frames, "closure": closures, "effect": effects}
     for kind, tables in kinds.items():
         for inner in tables:
             said = (f"{k} = {_toml(v)}" for k, v in inner.items())
             lines += ["", f"[[{kind}]]", *said]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text("\n".join(lines) + "\n", path)
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from stiffness.writing import check_json
+
 Surface = Annotated[
     Path, typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP.")
 ]
@@ -49,6 +51,9 @@ Masses = Annotated[
 ]
 Seconds = Annotated[float, typer.Option(help="Budget of time [s].")]
 Json = Annotated[
-    str | None, typer.Option("--json", help="Write results as JSON; - is stdout.")
+    str | None,
+    typer.Option(
+        "--json", help="Write results as JSON; - is stdout.", callback=check_json
+    ),
 ]
 Figure = Annotated[Path | None, typer.Option(help="Draw it (png, svg, pdf).")]

@@ -31,7 +31,7 @@ from stiffness.arguments import (
 )
 from stiffness.library_cli import library
 from stiffness.message import BadInput
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,13 +53,6 @@ def _tell_progress() -> None:
     log = logging.getLogger("stiffness.fea")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
-
-
-def _check_outputs(json: str | None, figure: Path | None = None) -> None:
-    """Refuse files that could not be written, before the work."""
-    for path in (figure, None if json in {None, "-"} else Path(str(json))):
-        if path is not None:
-            check_writable(path)
 
 
 def _interfaces(base: str, tip: str) -> "tuple[Interface, Interface]":
@@ -183,7 +176,6 @@ def fea(
     materials = [Material(E, nu, density)]
     materials += [parse_part("--part", text) for text in part or ()]
     masses = [parse_mass("--mass", text) for text in mass or ()]
-    _check_outputs(json)
     _tell_progress()
     link = solve_link(
         read_surface(surface, unit), held, moved, materials,
@@ -236,7 +228,8 @@ def compare(
         bent, size = None, options.section().size
     held, moved = _interfaces(base, tip)
     accuracy = _accuracy(accuracy)
-    _check_outputs(json, figure)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     _tell_progress()
     meshed = mesh_link(
         surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
@@ -249,7 +242,7 @@ def compare(
     if figure is not None:
         from stiffness.plot import plot_comparison
 
-        plot_comparison(comparison).savefig(figure)
+        save_figure(plot_comparison(comparison), figure)
     write_json(comparison_results(comparison), json)
     if json != "-":
         print(comparison_text(comparison))
@@ -287,7 +280,8 @@ def slenderness(
     (E, nu), declared = options.material(), options.declared()
     wanted = numbers("--ratios", ratios, "1")
     accuracy = _accuracy(accuracy)
-    _check_outputs(json, figure)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     with Progress(console=Console(stderr=True)) as bars:
         task = bars.add_task("lengths", total=len(wanted))
         sweep = sweep_slenderness(
@@ -297,7 +291,7 @@ def slenderness(
     if figure is not None:
         from stiffness.plot import plot_slenderness
 
-        plot_slenderness(sweep).savefig(figure)
+        save_figure(plot_slenderness(sweep), figure)
     write_json(sweep_results(sweep), json)
     if json != "-":
         print(sweep_text(sweep))
@@ -349,7 +343,8 @@ def stress(
     accuracy = _accuracy(accuracy)
     if away is not None:
         checked("--away", away, "m", above=0)
-    _check_outputs(json, figure)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     _tell_progress()
     solved = solve_link(
         read_surface(surface, unit), held, moved, [Material(E, nu)],
@@ -361,7 +356,8 @@ def stress(
 
         everywhere = stress_influence(solved, away=0.0)
         ends = solved.link.base, solved.link.tip
-        plot_stress(everywhere, peak, *ends, declared, roll).savefig(figure)
+        drawn = plot_stress(everywhere, peak, *ends, declared, roll)
+        save_figure(drawn, figure)
     write_json(stress_results(peak), json)
     if json != "-":
         print(stress_text(peak))

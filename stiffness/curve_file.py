@@ -11,8 +11,10 @@ from stiffness.curve import Piece, arc_piece, straight_piece
 from stiffness.options import check_section
 from stiffness.reading import BadInput, Table, read_toml
 
+_LARGEST = 1e6  # in SI: beyond any beam
 
-def read_curve(path: Path, nu: float) -> list[Piece]:
+
+def read_curve(path: Path | str, nu: float) -> list[Piece]:
     """The pieces of a beam.
 
     Args:
@@ -40,7 +42,7 @@ def read_curve(path: Path, nu: float) -> list[Piece]:
     for number, part in enumerate(tables):
         start = pieces[-1].place(1.0) if pieces else np.zeros(3)
         if number == 0 and part.has("start"):
-            start = part.array("start", (3,), "m")
+            start = part.array("start", (3,), "m", largest=_LARGEST)
         section = _section(part, "section") if part.has("section") else section
         if section is None:
             raise part.bad("section", "missing; the first piece needs one")
@@ -53,7 +55,9 @@ def read_curve(path: Path, nu: float) -> list[Piece]:
 def _section(part: Table, key: str) -> dict[str, float]:
     """Lengths or constants of a section by name."""
     inner = part.table(key)
-    given = {name: inner.number(name, "m") for name in list(inner.content)}
+    given = {
+        name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
+    }
     check_section(f"{part.file}: {part.place}.{key}", given)
     return given
 
@@ -67,12 +71,13 @@ def _piece(
         if part.has("turn"):
             return arc_piece(
                 start,
-                part.array("center", (3,), "m"),
-                part.array("turn", (3,), "rad"),
+                part.array("center", (3,), "m", largest=_LARGEST),
+                part.array("turn", (3,), "rad", largest=_LARGEST),
                 shape,
             )
-        up = part.array("up", (3,), "1") if part.has("up") else None
-        return straight_piece(start, part.array("end", (3,), "m"), shape, up)
+        up = part.array("up", (3,), "1", largest=_LARGEST) if part.has("up") else None
+        end = part.array("end", (3,), "m", largest=_LARGEST)
+        return straight_piece(start, end, shape, up)
     except BadInput as error:
         if str(error).startswith(part.file):
             raise

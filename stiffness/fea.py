@@ -66,7 +66,7 @@ class MeshedLink:
 
 
 def mesh_link(
-    surface: Path,
+    surface: Path | str,
     base: Interface,
     tip: Interface,
     E: float,
@@ -77,7 +77,7 @@ def mesh_link(
     interface: str = "rigid",
     density: float = 0.0,
     budget: Budget | None = None,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> LinkStiffness:
     """Stiffness of a link of one material, from a surface file.
 
@@ -129,7 +129,7 @@ def solve_link(
     interface: str = "rigid",
     point_masses: Sequence[PointMass] = (),
     budget: Budget | None = None,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> MeshedLink:
     """Solve a link to an asked accuracy.
 
@@ -219,7 +219,7 @@ def first_mesh(
     base: Interface,
     tip: Interface,
     budget: Budget,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> Solid:
     """A coarse mesh to refine from, fine enough for the part's walls.
 

@@ -8,6 +8,7 @@ program's version and the date.
 
 import itertools
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from stiffness.curve import curve_compliance
 from stiffness.display import html_table, short_repr
 from stiffness.library_surface import SurfaceLink, is_current, read_surface_links
 from stiffness.link import LinkStiffness, check_definite, inverted, scaled
+from stiffness.options import checked
 from stiffness.parametric import check_shape, shape_beam, shape_surface
 from stiffness.reading import BadInput, nearest, read_text, read_toml
 from stiffness.results import link_results
@@ -33,6 +35,7 @@ from stiffness.writing import write_json
 FORMAT = "forcefit link 1"
 _MATERIAL = ("young", "poisson", "density")
 _METHODS = ("beam", "fea")
+_LARGEST = 1e15  # in SI: beyond any length, modulus or density
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,7 @@ class Spec:
         ]
 
 
-def read_spec(path: Path) -> Spec:
+def read_spec(path: Path | str) -> Spec:
     """What a build file asks for.
 
     Args:
@@ -103,6 +106,7 @@ def read_spec(path: Path) -> Spec:
     Raises:
         BadInput: the file, a name or a value is not proper.
     """
+    path = Path(path)
     table = read_toml(path)
     folder = path.parent / table.text("library")
     accuracy = table.number("accuracy", "1", 0.005, least=1e-5, below=0.5)
@@ -116,7 +120,7 @@ def read_spec(path: Path) -> Spec:
         values = grid_table.get(name)
         given = values if isinstance(values, list) else [values]
         if not given or not all(_is_number(v) for v in given):
-            raise grid_table.bad(name, "expected a number, or a list of numbers")
+            raise grid_table.bad(name, "expected a finite number, or a list of them")
         if len(set(given)) != len(given):
             raise grid_table.bad(name, "a value stands there twice")
         grid[name] = tuple(sorted(float(v) for v in given))
@@ -135,13 +139,15 @@ def read_spec(path: Path) -> Spec:
             raise grid_table.bad(name, "missing; expected a number or a list")
     for point in spec.points():
         check_shape(shape, _lengths(point))
+        checked(f"{path}: grid.young", point["young"], "Pa", above=0)
+        checked(f"{path}: grid.poisson", point["poisson"], "1", above=-1, below=0.5)
     return spec
 
 
 def _is_number(value: object) -> bool:
-    """A finite number, not true or false."""
+    """A number of a sane size, not true or false."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
-    return proper and bool(np.isfinite(float(value)))  # type: ignore[arg-type]
+    return proper and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
@@ -274,7 +280,7 @@ def _program() -> str:
         return "forcefit, not installed"
 
 
-def read_entry(path: Path, key: str) -> Entry:
+def read_entry(path: Path | str, key: str) -> Entry:
     """One entry of a library.
 
     Args:
@@ -288,10 +294,10 @@ def read_entry(path: Path, key: str) -> Entry:
         BadInput: there is no such library or entry, or the file is damaged.
     """
     path = Path(path)
-    if not path.is_dir():
+    if not os.path.isdir(path):
         raise BadInput(f"{path}: no library there; expected a folder of entries")
     file = path / f"{key}.json"
-    if Path(key).name != key or not file.is_file():
+    if Path(key).name != key or not os.path.isfile(file):
         known = [p.stem for p in sorted(path.glob("*.json"))]
         raise BadInput(f'{path}: no entry "{key}"{nearest(key, known)}')
     return _entry(file)
@@ -310,16 +316,20 @@ def _entry(file: Path) -> Entry:
             for name in ("stiffness", "stiffness_error", "tip")
         ]
         parameters = {str(k): float(v) for k, v in about["parameters"].items()}
-    except (json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+    except BadInput:
+        raise
+    except (ValueError, OverflowError, LookupError, TypeError, AttributeError) as error:
         raise BadInput(f"{file}: damaged entry ({type(error).__name__})") from None
     K, error_matrix, tip = arrays
     if K.shape != (6, 6) or error_matrix.shape != (6, 6) or tip.shape != (3,):
         raise BadInput(f"{file}: a matrix has another shape than 6 by 6")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise BadInput(f"{file}: a number is not finite")
     check_definite(f"{file}: stiffness", K)
     return Entry(file.stem, K, error_matrix, tip, parameters, about)
 
 
-def read_compliance(path: Path, key: str) -> NDArray:
+def read_compliance(path: Path | str, key: str) -> NDArray:
     """Compliance of one entry.
 
     Args:
@@ -335,7 +345,7 @@ def read_compliance(path: Path, key: str) -> NDArray:
     return inverted(read_entry(path, key).stiffness)
 
 
-def read_library(path: Path) -> list[Entry]:
+def read_library(path: Path | str) -> list[Entry]:
     """All entries of a library, in the order of their keys.
 
     Args:
@@ -348,7 +358,7 @@ def read_library(path: Path) -> list[Entry]:
         BadInput: there is no library, nothing in it, or a damaged entry.
     """
     path = Path(path)
-    files = sorted(path.glob("*.json")) if path.is_dir() else []
+    files = sorted(path.glob("*.json")) if os.path.isdir(path) else []
     if not files:
         raise BadInput(f"{path}: no library there; expected a folder of entries")
     return [_entry(file) for file in files]

@@ -29,6 +29,7 @@ from stiffness.patches import Patches, find_patches
 from stiffness.reading import BadInput
 from stiffness.shapes import Shape, project
 from stiffness.surface import Surface, read_surface
+from stiffness.writing import whole_file
 
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
@@ -75,7 +76,7 @@ def mesh_solid(
     edge: float | None = None,
     envelope: float = 5e-4,
     time_limit: float = 300.0,
-    cache: Path | None = None,
+    cache: Path | str | None = None,
 ) -> Solid:
     """Tetrahedra of a surface, from the cache if they were made before.
 
@@ -136,10 +137,9 @@ def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
     """Write a mesh whole or not at all; a full or read-only disk is no error."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        with whole_file(path) as part, part.open("wb") as file:
             np.savez_compressed(file, points=points, cells=cells)
-        os.replace(file.name, path)
-    except OSError:
+    except (OSError, BadInput):
         return
 
 

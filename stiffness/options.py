@@ -22,6 +22,8 @@ _SECTIONS = (
 )
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
+_LARGEST = 1e15  # in SI: beyond any length, modulus or density; its inverse below
+
 
 def checked(
     option: str,
@@ -46,9 +48,15 @@ def checked(
         The value.
 
     Raises:
-        BadInput: it is not finite, or outside.
+        BadInput: it is not finite, outside, or beyond what machines are made of.
     """
     if math.isfinite(value) and above < value < below and value >= least:
+        sane = abs(value) <= _LARGEST and (above != 0 or value >= 1 / _LARGEST)
+        if not sane:
+            raise BadInput(
+                f"{option}: found {value:g}, expected a size between {1 / _LARGEST:g} "
+                f"and {_LARGEST:g} [{unit}]"
+            )
         return value
     limits = [
         f"> {above:g}" if above > -math.inf else "",
@@ -172,9 +180,12 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
             :func:`stiffness.beam.declared_section`.
 
     Raises:
-        BadInput: a name belongs to no section, or one lacks.
+        BadInput: a name belongs to no section, one lacks, or a value is of no section.
     """
     if set(given) in _SECTIONS:
+        for name, value in given.items():
+            if not (value == 0 or 1e-40 <= abs(value) <= _LARGEST):
+                raise BadInput(f"{place}.{name}: found {value:g}, no size of a section")
         return
     known = set().union(*_SECTIONS)
     for name in given:

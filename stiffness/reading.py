@@ -34,7 +34,7 @@ _LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path | str) -> str:
     r"""Text of a UTF-8 file, with or without a byte order mark.
 
     Args:
@@ -44,16 +44,19 @@ def read_text(path: Path) -> str:
         Its text with line ends as ``\n``.
 
     Raises:
-        BadInput: the file is absent, a folder, unreadable, far too large or not UTF-8.
+        BadInput: the file is absent, a folder, unreadable, far too large, not UTF-8,
+            or holds NUL.
     """
     try:
-        size = path.stat().st_size
-        content = path.read_bytes() if size <= _LARGEST_FILE else b""
+        with Path(path).open("rb") as file:  # which may be a pipe, or have no end
+            content = file.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadInput(f"{path}: cannot be read: {reason}") from None
-    if size > _LARGEST_FILE:
+    if len(content) > _LARGEST_FILE:
         raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    if (place := content.find(0)) >= 0:
+        raise BadInput(f"{path}: byte {place} is NUL; expected a text file in UTF-8")
     try:
         return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
@@ -62,7 +65,7 @@ def read_text(path: Path) -> str:
         ) from None
 
 
-def read_toml(path: Path) -> "Table":
+def read_toml(path: Path | str) -> "Table":
     """Root table of a TOML file.
 
     Args:

@@ -90,7 +90,7 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def read_surface(path: Path, unit: str = "m") -> Surface:
+def read_surface(path: Path | str, unit: str = "m") -> Surface:
     """Read a surface and refuse what bounds no solid.
 
     Args:
@@ -150,6 +150,8 @@ def check_surface(
     """
     if len(triangles) == 0:
         raise BadInput(f"{name}: holds no triangles")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise BadInput(f"{name}: a triangle has a corner that is not among the points")
     _check_coordinates(points, triangles, name, unit)
     points, triangles, repairs = _merge(points, triangles)
     if len(triangles) < 4:

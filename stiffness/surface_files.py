@@ -13,7 +13,7 @@ from stiffness.reading import BadInput
 _FACETS = 48  # of a full circle, in STEP
 
 
-def read_triangles(path: Path) -> tuple[NDArray, NDArray]:
+def read_triangles(path: Path | str) -> tuple[NDArray, NDArray]:
     """Points and triangles of a surface file, in the file's unit; STEP in metres.
 
     Args:
@@ -26,6 +26,7 @@ def read_triangles(path: Path) -> tuple[NDArray, NDArray]:
         BadInput: the content is not what the name says, or the package that reads it
             is not installed.
     """
+    path = Path(path)
     suffix = path.suffix.lower()
     read = {".msh": _msh, ".step": _step, ".stp": _step}.get(suffix, _with_vtk)
     try:

@@ -541,12 +541,18 @@ def test_the_command_fails_with_status_1(monkeypatch):
     assert "FAIL" in said.output or "cannot" in said.output
 
 
-@pytest.mark.parametrize("name", ["slope.txt", "no/such/folder/slope.png"])
-def test_a_figure_that_cannot_be_written_is_bad_input(name, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("slope.txt", "expected a picture: .png or .svg or .pdf"),
+        ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
+    ],
+)
+def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
     said = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
                "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
     assert isinstance(said.exception, BadInput)
-    assert "cannot be written" in str(said.exception)
+    assert message in str(said.exception)
 
 
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])

@@ -312,10 +312,16 @@ def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):
 
 
 def test_what_cannot_be_done_is_said_before_any_work(tmp_path, small, run):
+    folder = tmp_path / "folder.toml"
+    folder.mkdir()
     for words, told in (
         (("nowhere",), "nowhere"),
         ((small, "--report", tmp_path / "no" / "d.html"), "no folder"),
-        ((small, "--save", tmp_path), "found a folder"),
+        ((small, "--report", tmp_path / "d.toml"), "expected an HTML page: .html or"),
+        ((small, "--save", folder), "found a folder"),
+        ((small, "--save", small / "robot.toml"), "not a robot file written by"),
+        ((small, "--save", small / "campaign.toml"), "it is not overwritten"),
+        ((small, "--json", small / "measurements.csv"), "expected a JSON file: .json"),
     ):
         status, out, err = run("validation", "diagnose", *words)
         assert (status, out) == (2, "")

@@ -33,7 +33,7 @@ OWNERS = {
         "stiffness/library.py",
     ),
     "pandas": ("assembly/tables.py",),
-    "h5netcdf": ("assembly/sweeps/dataset.py",),
+    "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")

@@ -13,6 +13,7 @@ import pytest
 from assembly.robots import load_robot
 from assembly.statistics.distributions import tolerance_sources
 from assembly.sweeps.cluster import cluster_solver, solve_task
+from assembly.sweeps.identity import question_hash
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import Sweep, run_sweep
 from assembly.sweeps.targets import grid_targets, parse_grid
@@ -35,11 +36,37 @@ def test_a_task_is_its_blocks():
     import pickle
 
     sweep = drawn_sweep("tx=0:0.02:0.01,ty=0.12:0.14:0.01")
-    question = pickle.dumps(sweep.question)
-    seconds, found = solve_task(question, [(0, sweep.points(0))])
+    question = pickle.dumps(sweep.question), question_hash(sweep.question)
+    seconds, found = solve_task(*question, [(0, sweep.points(0))])
     assert seconds > 0
     assert found[0][0] == 0
     assert np.isfinite(found[0][1].records["energy"]).all()
+
+
+def test_a_worker_with_another_question_refuses_it():
+    """As when a mesh differs there: its content is in the hash."""
+    import pickle
+
+    question = drawn_sweep("tx=0,ty=0.13").question
+    with pytest.raises(BadInput, match="a worker reads another robot"):
+        solve_task(pickle.dumps(question), "0" * 64, [])
+
+
+def test_workers_with_other_sources_are_refused():
+    from assembly.sweeps import cluster
+
+    class Client:
+        def wait_for_workers(self, *_, **__):
+            pass
+
+        def run(self, program):
+            assert program() == cluster._program()
+            return {
+                "tcp://h:1": program().replace("program_sha256 ", "program_sha256 0")
+            }
+
+    with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
+        cluster._check_workers(Client())
 
 
 def test_draws_do_not_depend_on_who_makes_them():

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -50,6 +51,13 @@ def whole(tmp_path_factory):
     return sweep, path.read_bytes(), kept
 
 
+def kept_blocks(sweep, path):
+    """The blocks of which a journal says that they are finished."""
+    kind = record_type(sweep.question)
+    with open_journal(path, sweep.identity, kind) as journal:
+        return sorted(journal.places)
+
+
 def go_on(sweep, folder, journal):
     """Finish a sweep from the bytes of a journal; its file's, and the points solved."""
     path, solved = folder / "map.nc", []
@@ -69,8 +77,7 @@ def test_a_journal_holds_each_block_as_soon_as_it_is_finished(whole, tmp_path):
     for blocks, journal in enumerate(kept.values()):
         path = tmp_path / "map.nc.journal"
         path.write_bytes(journal)
-        found = open_journal(path, sweep.identity, record_type(sweep.question))
-        assert sorted(found.places) == list(range(blocks))
+        assert kept_blocks(sweep, path) == list(range(blocks))
 
 
 def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
@@ -81,9 +88,8 @@ def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
     first_line = journal.index(b"\n") + 1
     for cut in [*range(0, first_line, 7), *range(first_line, len(journal) + 1, 3)]:
         path.write_bytes(journal[:cut])
-        found = open_journal(path, sweep.identity, record_type(sweep.question))
         whole_blocks = sum(size <= cut for size in sizes[1:])
-        assert sorted(found.places) == list(range(whole_blocks))
+        assert kept_blocks(sweep, path) == list(range(whole_blocks))
         assert path.stat().st_size == max(s for s in sizes if s <= max(cut, sizes[0]))
 
 
@@ -101,7 +107,130 @@ def test_a_damaged_record_is_solved_again(whole, tmp_path):
     spoilt = bytearray(kept[15])
     spoilt[len(kept[8]) + 100] ^= 1
     found, solved = go_on(sweep, tmp_path, bytes(spoilt))
-    assert (found, solved) == (expected, [2, 3])
+    assert (found, solved) == (expected, [2])
+
+
+def test_whatever_bit_of_a_journal_is_flipped_only_its_record_is_solved_again(
+    whole, tmp_path
+):
+    """The first line and the records' numbers and lengths are covered too."""
+    sweep, expected, kept = whole
+    journal, first_line = kept[15], kept[15].index(b"\n") + 1
+    ends = [len(content) for content in kept.values()]
+    path = tmp_path / "map.nc.journal"
+    heads = [place for end in ends[:-1] for place in range(end, end + 40)]
+    for place in [*range(0, first_line, 5), *heads, *range(first_line, ends[-1], 97)]:
+        spoilt = bytearray(journal)
+        spoilt[place] ^= 1 << (place % 8)
+        path.write_bytes(spoilt)
+        left = [b for b in range(4) if not ends[b] <= place < ends[b + 1]]
+        assert kept_blocks(sweep, path) == left
+        assert path.read_bytes()[:first_line] == journal[:first_line]
+    assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
+
+
+def test_a_record_of_another_sweep_is_not_believed(whole, tmp_path):
+    sweep, expected, kept = whole
+    other, path = small_sweep(near=0.5), tmp_path / "other.nc"
+    run_sweep(other, path, lambda *_: kept.update(other=read_if(journal_path(path))))
+    theirs = kept["other"][kept["other"].index(b"\n") + 1 :]
+    assert go_on(sweep, tmp_path, kept[4] + theirs) == (expected, [1, 2, 3])
+
+
+def read_if(path):
+    return path.read_bytes() if path.exists() else b""
+
+
+def test_a_block_changed_while_the_sweep_ran_is_one_message(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+
+    def spoil(done, total):
+        if done == total:
+            content = bytearray(journal_path(path).read_bytes())
+            content[-3] ^= 8
+            journal_path(path).write_bytes(content)
+
+    with pytest.raises(BadInput, match="block 3 was changed while the sweep ran"):
+        run_sweep(sweep, path, spoil)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
+    run_sweep(sweep, path)
+    assert path.read_bytes() == expected
+
+
+def test_two_runs_into_one_file_at_once_the_second_is_refused(whole, tmp_path):
+    """The second begins while the first is at work, and disturbs nothing."""
+    sweep, expected, _ = whole
+    path, said = tmp_path / "map.nc", []
+
+    def begin_again(done, _):
+        if done == 8:
+            with pytest.raises(BadInput) as error:
+                run_sweep(sweep, path)
+            said.append(str(error.value))
+
+    run_sweep(sweep, path, begin_again)
+    assert said[0].startswith(f"{path}.journal: another run holds this journal; ")
+    assert path.read_bytes() == expected
+    assert not journal_path(path).exists()
+
+
+def test_a_killed_run_holds_no_journal(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+    child = os.fork()
+    if not child:
+        run_sweep(sweep, path, lambda done, _: done < 8 or os.kill(os.getpid(), 9))
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    assert kept_blocks(sweep, journal_path(path)) == [0, 1]
+    run_sweep(sweep, path)
+    assert path.read_bytes() == expected
+
+
+def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
+    """The version is the same; a line of the sources is not."""
+    from assembly.sweeps import identity
+
+    sweep, _, kept = whole
+    copy = tmp_path / "sources" / "assembly"
+    shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
+    monkeypatch.setattr(identity.assembly, "__file__", str(copy / "__init__.py"))
+    identity.program_hash.cache_clear()
+    assert small_sweep().identity == sweep.identity  # wherever the sources lie
+    with (copy / "zone.py").open("a") as file:
+        file.write("# one line more\n")
+    identity.program_hash.cache_clear()
+    path = journal_path(tmp_path / "map.nc")
+    path.write_bytes(kept[8])
+    with pytest.raises(BadInput, match="found program_sha256 '.*expected program_sha"):
+        run_sweep(small_sweep(), tmp_path / "map.nc")
+    identity.program_hash.cache_clear()
+    assert path.read_bytes() == kept[8]
+
+
+@pytest.mark.parametrize(
+    "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
+               {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
+)  # fmt: skip
+def test_whatever_is_asked_is_in_the_questions_hash(change):
+    from dataclasses import replace
+
+    from assembly.sweeps.identity import question_hash
+
+    asked = small_sweep().question
+    assert question_hash(asked) == question_hash(small_sweep().question)
+    assert question_hash(replace(asked, **change)) != question_hash(asked)
+
+
+def test_designs_of_other_numbers_have_other_hashes(tmp_path):
+    from assembly.sweeps.identity import question_hash
+    from assembly.sweeps.parameters import load_design
+
+    design = load_design("five_bar")
+    path = next(p for p in design.paths if p.endswith("link.young"))
+    other = type(design)(design.changed({path: 1e11}), design.file, design.name)
+    moved = type(design)(design.content, "elsewhere.toml", design.name)
+    assert question_hash(design) == question_hash(moved) != question_hash(other)
 
 
 def test_blocks_may_come_in_any_order(whole, tmp_path):

@@ -23,7 +23,7 @@ from assembly.cli import (
     progress_bars,
 )
 from stiffness.message import BadInput
-from stiffness.writing import write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 from validation.campaign.cli import inspect
 from validation.diagnosis_cli import diagnose
 from validation.synthetic.cli import generate
@@ -137,6 +137,8 @@ def crosscheck(
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
@@ -160,10 +162,7 @@ def crosscheck(
     if figure is not None and isinstance(answer, Crosscheck):
         from validation.plot import slope_figure
 
-        try:
-            slope_figure(answer).savefig(figure, dpi=150)
-        except (OSError, ValueError) as error:
-            raise BadInput(f"--figure {figure}: cannot be written: {error}") from None
+        save_figure(slope_figure(answer), figure)
     if answer is None or not answer.passed:
         raise typer.Exit(1)
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from assembly.cli import JsonOption, progress_bars
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PAGE, ROBOT, check_writable, write_json
 from validation.campaign.cli import CampaignArgument
 
 
@@ -36,9 +36,9 @@ def diagnose(
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
 
-    for path in (report, save, Path(json) if json not in {None, "-"} else None):
+    for path, kind in ((report, PAGE), (save, ROBOT)):
         if path is not None:
-            check_writable(path)
+            check_writable(path, kind)
     data = read_campaign(campaign)
     with progress_bars() as update:
         found = trace(data, finite=exact, update=update)

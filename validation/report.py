@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assembly.zone import ASSEMBLABLE
 from stiffness.reading import BadInput
 from stiffness.screws import SCREW
-from stiffness.writing import write_json
+from stiffness.writing import write_json, write_text
 from validation.headline import verdict, worst_play
 from validation.html import (
     html_figure,
@@ -52,14 +52,12 @@ def write_study(results: StudyResults) -> Path:
     """
     from assembly.sweeps.dataset import save_dataset
 
-    folder = results.study.folder
+    folder, page = results.study.folder, report_page(results)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        page = folder / "report.html.part"
-        page.write_text(report_page(results), encoding="utf-8")
-        page.replace(folder / "report.html")
     except OSError as error:
         raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
+    write_text(page, folder / "report.html")
     write_json(results_table(results), str(folder / "results.json"))
     if results.maps is not None:
         save_dataset(results.maps, folder / "results.nc")

@@ -159,7 +159,7 @@ class StudyResults:
         )
 
 
-def read_study(path: Path | str, folder: Path | None = None) -> Study:
+def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     """A study from its file.
 
     Args:
@@ -191,7 +191,7 @@ def read_study(path: Path | str, folder: Path | None = None) -> Study:
         axes = parse_grid(grid) if grid else {}
     except BadInput as error:
         raise root.bad("", str(error)) from None
-    folder = folder or Path(asked)
+    folder = Path(folder or asked)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise BadInput(f"{folder}: found a file, expected a folder or nothing")
     return Study(

@@ -1,5 +1,6 @@
 """Robots that come with forcefit; each is a table of numbers in a file of its own."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def load_robot(name: str | Path) -> Robot:
     if str(name) in BUILT_IN:
         return BUILT_IN[str(name)]()
     path = Path(name)
-    if not path.suffix and not path.exists():
+    if not path.suffix and not os.path.exists(path):
         hint = nearest(str(name), BUILT_IN)
         raise BadInput(f'"{str(name)[:80]}": neither a built-in robot nor a file{hint}')
     return read_robot(path)

@@ -5,7 +5,7 @@ Importing this module adds them to the application.
 
 import sys
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -23,10 +23,9 @@ from assembly.cli import (
     parse_load,
     posture_of,
     progress_bars,
-    save_figure,
 )
 from stiffness.message import BadInput, nearest
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 
 PlayOption = Annotated[
     str,
@@ -86,6 +85,7 @@ def statistics(
     from assembly.statistics.plot import histogram_figure
     from assembly.statistics.quantities import parse_limit
     from assembly.statistics.summary import summarise, summary_text
+    from assembly.sweeps.dataset import check_dataset
 
     _check_play(play)
     _check_word("--by", by, ("source", "frame", "kind"))
@@ -94,8 +94,10 @@ def statistics(
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
         raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
     limits = dict(map(parse_limit, limit or ()))
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    if output is not None:
+        check_dataset(output, "draws")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
     wrench, g = parse_load(load), parse_gravity(gravity)
@@ -105,10 +107,11 @@ def statistics(
         precision=precision_for(limits),
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
-            None if importance is None else (importance, by), confidence,
+            None if importance is None else (importance, by), confidence, held,
         )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
@@ -118,6 +121,7 @@ def statistics(
         **summarise(data, limits, yield_strength, confidence),
     }  # fmt: skip
     write_json(summary, json)
+    held.close()
     if json != "-":
         print(summary_text(summary))
 
@@ -192,19 +196,22 @@ def tolerances(
         present_text,
         tolerance_dataset,
     )
-    from assembly.sweeps.dataset import save_dataset
+    from assembly.sweeps.dataset import check_dataset, save_dataset
 
     _check_play(play)
     _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure):
         raise BadInput("tolerances: --output and --figure need a --plan")
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    if output is not None:
+        check_dataset(output, "tolerances")
+    if figure is not None:
+        check_writable(figure, PICTURE)
     machine = load_robot(robot)
     asked = None if plan is None else replace(read_plan(plan, machine), play=play)
     postures = grid_postures(machine, grid)
     results: dict = {"robot": machine.name, "postures": len(postures)}
     said = []
+    held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
@@ -218,16 +225,17 @@ def tolerances(
             )
         if asked is not None:
             whose = identity_of(postures, asked, fresh)
-            with journalled(output, whose) as replay:
-                answer = allocate(postures, asked, fresh, update, replay)
-                results["allocation"] = allocation_of(answer)
-                said.append(allocation_text(results["allocation"]))
-                data = tolerance_dataset(answer)
-                if output is not None:
-                    save_dataset(data, output)
+            replay = held.enter_context(journalled(output, whose))
+            answer = allocate(postures, asked, fresh, update, replay)
+            results["allocation"] = allocation_of(answer)
+            said.append(allocation_text(results["allocation"]))
+            data = tolerance_dataset(answer)
+            if output is not None:
+                save_dataset(data, output)
             if figure is not None:
                 save_figure(allocation_figure(data), figure)
     write_json(results, json)
+    held.close()
     if json != "-":
         print("\n".join(said))
     check = results.get("allocation", {}).get("verification") or {}

@@ -80,9 +80,9 @@ def cheapest_within(
     """
     import cvxpy as cp
 
-    A = np.array(planes)
+    A = np.array(planes).reshape(-1, len(plan.names))
     # scaled: each alone would use up its plane at 1
-    steepest = np.maximum(A, 0.0).max(axis=0)
+    steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
     if plan.cost == "reciprocal":

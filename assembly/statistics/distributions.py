@@ -195,7 +195,7 @@ def tolerance_sources(
     )  # fmt: skip
 
 
-def read_sources(path: Path, robot: Robot) -> ErrorSources:
+def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
     """Error sources of a file; see ``docs/statistics.md``.
 
     Args:

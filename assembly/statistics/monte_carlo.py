@@ -8,6 +8,7 @@ The rows of a design that tells the importance of errors are blocks like any oth
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -27,8 +28,9 @@ from assembly.statistics.importance_table import (
 from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
 from assembly.sweeps.dataset import save_dataset
+from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
-from assembly.sweeps.sweep import journal_path, robot_hash
+from assembly.sweeps.sweep import journal_path
 from stiffness.screws import SCREW
 
 if TYPE_CHECKING:
@@ -41,11 +43,12 @@ _WAITING = 4  # blocks begun ahead of each thread
 def run_draws(
     experiment: Experiment,
     count: int,
-    path: Path | None = None,
+    path: Path | str | None = None,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
     importance: tuple[int, str] | None = None,
     level: float = 0.95,
+    held: ExitStack | None = None,
 ) -> "xarray.Dataset":
     """Solve draws 0 .. count - 1.
 
@@ -58,13 +61,28 @@ def run_draws(
         importance: base draws for the importance of errors, and what to group them by,
             see :func:`assembly.statistics.importance.source_groups`; not asked if None.
         level: of confidence of the importance's intervals.
+        held: keeps the journal until it is closed, as in
+            :func:`assembly.sweeps.sweep.run_sweep`.
 
     Returns:
         Data set over ``draw``, with the importance if asked; the file holds the same.
 
     Raises:
-        BadInput: the journal is another run's, or a file cannot be written.
+        BadInput: the journal is another run's or held by one, or a file cannot be
+            written.
     """
+    with ExitStack() as own:
+        return _run_draws(
+            experiment, count, path, workers, progress, importance, level, held or own
+        )
+
+
+def _run_draws(
+    experiment: Experiment, count: int, path: Path | str | None, workers: int,
+    progress: Callable[[int, int], None], importance: tuple[int, str] | None,
+    level: float, held: ExitStack,
+) -> "xarray.Dataset":  # fmt: skip
+    """The same; ``held`` keeps the journal."""
     design = None if importance is None else importance_design(experiment, *importance)
     more = 0 if design is None else len(design)
     # blocks of draws, then of the design: first row and number of rows of each
@@ -84,7 +102,9 @@ def run_draws(
         identity = provenance(experiment) | {
             "draws": count, "block": BLOCK, "importance": str(importance),
         }  # fmt: skip
-        journal = open_journal(journal_path(path), identity, experiment.record_type)
+        journal = held.enter_context(
+            open_journal(journal_path(path), identity, experiment.record_type)
+        )
         kept = {b: journal.read(b)[0] for b in journal.places}
     done = sum(map(len, kept.values()))
     progress(done, count + more)
@@ -103,7 +123,7 @@ def run_draws(
         data = data.merge(shares, combine_attrs="no_conflicts")
     if path is not None and journal is not None:
         save_dataset(data, path)
-        journal.path.unlink()
+        journal.remove_after(held)
     return data
 
 
@@ -154,6 +174,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "load": " ".join(map(repr, experiment.load or ())),
         "gravity": " ".join(map(repr, experiment.gravity or ())),
         "program": f"forcefit {version('forcefit')}",
+        "program_sha256": program_hash(),
     }
 
 

@@ -86,6 +86,6 @@ def journalled(
     if path is None:
         yield Replay()
         return
-    journal = open_journal(journal_path(path), whose, RECORD)
-    yield Replay(journal)
-    journal.path.unlink(missing_ok=True)
+    with open_journal(journal_path(path), whose, RECORD) as journal:
+        yield Replay(journal)
+        journal.path.unlink(missing_ok=True)

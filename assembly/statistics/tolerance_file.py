@@ -18,7 +18,7 @@ from stiffness.screws import SCREW
 _LOOSEST = (0.1, 0.01)  # [rad, m] beyond which no small screw is small
 
 
-def read_plan(path: Path, robot: Robot) -> Plan:
+def read_plan(path: Path | str, robot: Robot) -> Plan:
     """The plan of a tolerance file.
 
     Args:

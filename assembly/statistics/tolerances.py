@@ -20,7 +20,7 @@ from assembly.statistics.allocation import Allocation
 from assembly.statistics.play import PLAY
 from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
-from assembly.sweeps.sweep import robot_hash
+from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
 from stiffness.reading import BadInput
 from stiffness.screws import SCREW
@@ -63,6 +63,7 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
         "limits": str(dict(plan.limits)), "cost": plan.cost, "play": plan.play,
         "yield": plan.asked_yield, "draws": plan.draws, "seed": plan.seed,
         "fresh": fresh, "program": f"forcefit {version('forcefit')}",
+        "program_sha256": program_hash(),
     }  # fmt: skip
 
 

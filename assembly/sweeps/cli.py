@@ -4,6 +4,7 @@ Importing this module adds them to the application.
 """
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -20,10 +21,9 @@ from assembly.cli import (
     parse_gravity,
     parse_load,
     progress_bars,
-    save_figure,
 )
 from stiffness.message import BadInput, nearest
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import PICTURE, check_writable, save_figure, write_json
 
 
 @app.command()
@@ -93,29 +93,36 @@ def sweep(
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
     """
-    from assembly.sweeps.dataset import open_dataset
-    from assembly.sweeps.maps import figure_of
+    from assembly.sweeps.dataset import check_dataset, open_dataset
+    from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.request import ask_sweep, summary_of, summary_text
     from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
 
-    asked = ask_sweep(
-        robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-        seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
-        linearisation=linearisation, near=near, yield_strength=yield_strength,
-        load=parse_load(load) or (0.0,) * 6,
-        gravity=parse_gravity(gravity) or (0.0,) * 3,
-        under=parse_covariates(under),
-    )  # fmt: skip
     if workers is not None and scheduler is not None:
         raise BadInput("sweep: found --workers and --scheduler, expected one of them")
-    for path in filter(None, (output, figure)):
-        check_writable(path)
+    check_dataset(output, "a sweep")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    push, g = parse_load(load), parse_gravity(gravity)
+    covariates = parse_covariates(under)
+    with progress_bars() as update:
+        update("robot", 0, 1)  # where it is placed, code may be compiled
+        asked = ask_sweep(
+            robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
+            linearisation=linearisation, near=near, yield_strength=yield_strength,
+            load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
+        )  # fmt: skip
+        if figure is not None:
+            check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
+        update("robot", 1, 1)
     done = [0]
     solver: Solver = solve_here
     if workers is not None or scheduler is not None:
         from assembly.sweeps.cluster import cluster_solver
 
         solver = cluster_solver(workers, scheduler)
+    held = ExitStack()  # keeps the journal until all is written
     try:
         with progress_bars() as update:
 
@@ -123,7 +130,7 @@ def sweep(
                 done[0] = finished
                 update("points", finished, total)
 
-            run_sweep(asked, output, note, solver)
+            run_sweep(asked, output, note, solver, held)
     except KeyboardInterrupt:
         print(
             f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
@@ -136,6 +143,7 @@ def sweep(
         save_figure(figure_of(data), figure)
     summary = {"output": str(output)} | summary_of(data)
     write_json(summary, json)
+    held.close()
     if json != "-":
         print(summary_text(summary, data))
 
@@ -162,7 +170,7 @@ def plot(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
-    check_writable(output)
+    check_writable(output, PICTURE)
     places = {}
     for text in at or ():
         name, equals, value = (piece.strip() for piece in text.rpartition("="))

@@ -20,6 +20,7 @@ from importlib.metadata import version
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+from assembly.sweeps.identity import program_hash, question_hash
 from assembly.sweeps.points import Found, Points, solve_points
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import Solver, Sweep
@@ -126,7 +127,7 @@ def _spread(
     from distributed import KilledWorker, as_completed
 
     _check_workers(client)
-    question = pickle.dumps(sweep.question)
+    question = pickle.dumps(sweep.question), question_hash(sweep.question)
     size, flying, times = 1, 0, []
     waiting: Any = as_completed()
 
@@ -136,7 +137,7 @@ def _spread(
         threads = max(1, sum(client.nthreads().values()))
         while flying < _IN_FLIGHT * threads and (some := list(islice(blocks, size))):
             tasks = [(block, sweep.points(block)) for block in some]
-            waiting.add(client.submit(solve_task, question, tasks, pure=False))
+            waiting.add(client.submit(solve_task, *question, tasks, pure=False))
             flying += 1
 
     hand_out()
@@ -168,34 +169,36 @@ def _check_workers(client: "distributed.Client") -> None:
         raise BadInput(
             f"sweep: no worker joined the scheduler in {_PATIENCE:.0f} s"
         ) from None
-    ours = version("forcefit")
+    ours = _program()
     for worker, theirs in client.run(_program).items():
         if theirs != ours:
-            raise BadInput(
-                f"sweep: worker {worker} has forcefit {theirs}, expected {ours}"
-            )
+            raise BadInput(f"sweep: worker {worker} has {theirs}, expected {ours}")
 
 
 def _program() -> str:
-    """Version of the program on a worker."""
-    return version("forcefit")
+    """The program here: its version, and which sources and libraries it is made of."""
+    return f"forcefit {version('forcefit')}, program_sha256 {program_hash()[:12]}"
 
 
 def solve_task(
-    question: bytes, tasks: list[Task]
+    question: bytes, digest: str, tasks: list[Task]
 ) -> tuple[float, list[tuple[int, Found]]]:
     """On a worker: solve some blocks on one thread.
 
     Args:
         question: pickled.
+        digest: of the question where it was asked.
         tasks: number and points of each block.
 
     Returns:
         [s] that it took, and each block's number with what was found.
+
+    Raises:
+        BadInput: the question is another one here: a mesh or a library differs.
     """
     from threadpoolctl import threadpool_limits
 
-    asked = _question(question)
+    asked = _question(question, digest)
     start = time.perf_counter()
     with threadpool_limits(1):
         found = [(block, solve_points(asked, points)) for block, points in tasks]
@@ -203,7 +206,12 @@ def solve_task(
 
 
 @lru_cache(maxsize=4)
-def _question(content: bytes) -> Question:
+def _question(content: bytes, digest: str) -> Question:
     """The question, unpacked once on each worker: robots are prepared by identity."""
     question: Question = pickle.loads(content)
+    if question_hash(question) != digest:
+        raise BadInput(
+            "sweep: a worker reads another robot; expected its meshes and stiffness "
+            "libraries to be the same there, at the same paths"
+        )
     return question

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.sweeps.netcdf import forgive_damaged_files, netcdf_file
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
 from stiffness.reading import BadInput
+from stiffness.writing import NETCDF, check_writable
 
 if TYPE_CHECKING:
     import xarray
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     from assembly.sweeps.sweep import Sweep
 
 Texts = dict[str, dict[int, str]]
+# what commands write, and an attribute that none but such a file has
+KINDS = {
+    "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
+}  # fmt: skip
 _TEXT = {
     "status": "ok, or why there is no answer: " + ", ".join(STATUSES[1:]),
     "reason": "what was said where the status is not ok",
@@ -69,22 +75,14 @@ def write_sweep(
     Raises:
         BadInput: the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        _write(sweep, read, part)
-        part.replace(path)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise BadInput(f"{path}: cannot be written: {reason}") from None
-    finally:
-        part.unlink(missing_ok=True)
+    with netcdf_file(path) as file:
+        _write(sweep, read, file)
 
 
 def _write(
-    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
+    sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
     """The file, from its coordinates to its last block."""
-    import h5netcdf
     import h5py
 
     text = h5py.string_dtype()
@@ -92,32 +90,31 @@ def _write(
     sizes = dict(zip(sweep.dims, sweep.shape, strict=True))
     for one in asked.values():
         sizes |= {dim: len(labels) for dim, labels in one.dims.items()}
-    with h5netcdf.File(path, "w") as file:
-        file.dimensions = sizes
-        for name, (dims, values, attributes) in coordinates.items():
-            kind = text if values.dtype == object else values.dtype
-            variable = file.create_variable(name, dims, kind, data=values)
-            variable.attrs.update(attributes)
-        for name, one in asked.items():
-            dims = (*sweep.dims, *one.dims)
-            file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
-        for name, meaning in _TEXT.items():
-            variable = file.create_variable(name, sweep.dims, text)
-            variable.attrs["long_name"] = meaning
-        file.attrs.update(sweep.provenance)
-        beside = [name for name in coordinates if name not in sizes]
-        if beside:
-            file.attrs["coordinates"] = " ".join(beside)
-        for first in range(0, sweep.blocks, _TOGETHER):
-            last = min(first + _TOGETHER, sweep.blocks)
-            start = first * sweep.block_size
-            records, texts = _joined([read(block) for block in range(first, last)])
-            for name in (*asked, *_TEXT):
-                values = (
-                    _text_column(name, records, texts) if name in _TEXT
-                    else records[name]
-                )  # fmt: skip
-                _put(file[name], sweep.shape, start, values)
+    file.dimensions = sizes
+    for name, (dims, values, attributes) in coordinates.items():
+        kind = text if values.dtype == object else values.dtype
+        variable = file.create_variable(name, dims, kind, data=values)
+        variable.attrs.update(attributes)
+    for name, one in asked.items():
+        dims = (*sweep.dims, *one.dims)
+        file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
+    for name, meaning in _TEXT.items():
+        variable = file.create_variable(name, sweep.dims, text)
+        variable.attrs["long_name"] = meaning
+    file.attrs.update(sweep.provenance)
+    beside = [name for name in coordinates if name not in sizes]
+    if beside:
+        file.attrs["coordinates"] = " ".join(beside)
+    for first in range(0, sweep.blocks, _TOGETHER):
+        last = min(first + _TOGETHER, sweep.blocks)
+        start = first * sweep.block_size
+        records, texts = _joined([read(block) for block in range(first, last)])
+        for name in (*asked, *_TEXT):
+            values = (
+                _text_column(name, records, texts) if name in _TEXT
+                else records[name]
+            )  # fmt: skip
+            _put(file[name], sweep.shape, start, values)
 
 
 def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> None:
@@ -217,14 +214,42 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     Raises:
         BadInput: the file cannot be written.
     """
+    from xarray.backends import H5NetCDFStore
+
+    with netcdf_file(path) as file:
+        data.dump_to_store(H5NetCDFStore(file))
+
+
+def check_dataset(path: Path | str, what: str) -> None:
+    """Refuse a NetCDF file that could not be written, before the work.
+
+    Args:
+        path: of the file to be written later.
+        what: one of :data:`KINDS`; a file that stands there already must be one.
+
+    Raises:
+        BadInput: it is not, or as :func:`stiffness.writing.check_writable`.
+    """
+    check_writable(path, NETCDF)
     path = Path(path)
-    part = path.with_name(path.name + ".part")
+    if path.is_file() and path.stat().st_size and not _is(path, what):
+        raise BadInput(
+            f"{path}: found a NetCDF file that is not one of {what} by forcefit; "
+            "expected one, or nothing there: it is not overwritten"
+        )
+
+
+def _is(path: Path, what: str) -> bool:
+    """Whether a file says that it is ours and of a kind."""
+    import h5py
+
     try:
-        data.to_netcdf(part, engine="h5netcdf")
-        part.replace(path)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise BadInput(f"{path}: cannot be written: {reason}") from None
+        with h5py.File(path, "r") as file:
+            said = {str(name): file.attrs[name] for name in file.attrs}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError):
+        return False
+    ours = str(said.get("program", "")).startswith("forcefit ")
+    return ours and KINDS[what] in said
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
@@ -242,10 +267,11 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     import xarray
 
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file; expected a data set of a sweep")
+    forgive_damaged_files()
     try:
         return xarray.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError, KeyError) as error:
+    except Exception as error:  # of a damaged file HDF5 raises whatever it meets
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None

@@ -1,27 +1,34 @@
 """A sweep's journal: finished blocks on disk, whatever happens to the program.
 
-The file begins with one line of JSON that says whose it is.  Records follow, each
-appended by one write: a block's number, its length and a check sum, then its rows and
-texts.  A record cut short by a kill fails its check and is dropped when the file is
-opened again; all before it stand.  Records may come in any order, and twice.
+The file begins with one line of JSON that says whose it is, and its check sum.  Records
+follow, each appended by one write: a block's number, its length and a check sum, then
+its rows and texts.  Each check sum goes on from the first line's, so that a record says
+by itself whose it is.  What does not fit is not believed: a record cut short by a kill
+is dropped, a damaged one is passed over, all others stand.  Records may come in any
+order, and twice.  One program at a time holds the file.
 """
 
 import json
+import mmap
 import os
 import struct
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.locking import locked_file
 from stiffness.reading import BadInput
+from stiffness.writing import check_writable, unwritable
 
-_MAGIC = b"FFB1"
-_HEAD = struct.Struct("<4sQQI")  # magic, block, length of what follows, its check sum
-_KIND = "forcefit sweep journal 1"
+_MAGIC = b"FFB2"
+_HEAD = struct.Struct("<4sQQI")  # magic, block, length of what follows, check sum
+_KIND = "forcefit sweep journal 2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +38,15 @@ class Journal:
     Attributes:
         path: of the file.
         record_type: of the rows.
-        places: where each finished block stands: offset and length of its record.
+        owner: check sum of the first line, with which those of the records begin.
+        places: where each finished block stands: offset of its record's content, and
+            its length.
     """
 
     path: Path
     record_type: np.dtype
-    places: dict[int, tuple[int, int]] = field(default_factory=dict)
+    owner: int
+    places: dict[int, tuple[int, int]]
 
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
@@ -53,23 +63,52 @@ class Journal:
         """
         said = json.dumps(texts, separators=(",", ":"), sort_keys=True).encode()
         content = struct.pack("<Q", len(records)) + records.tobytes() + said
-        head = _HEAD.pack(_MAGIC, block, len(content), zlib.crc32(content))
+        check = _check(self.owner, block, content)
+        head = _HEAD.pack(_MAGIC, block, len(content), check)
         try:
             with self.path.open("ab", buffering=0) as file:
                 start = file.seek(0, os.SEEK_END)
                 written = file.write(head + content)
         except OSError as error:
-            raise BadInput(_unwritable(self.path, error)) from None
+            raise BadInput(unwritable(self.path, error)) from None
         if written != len(head) + len(content):
             raise BadInput(f"{self.path}: cannot be written: no space left")
         self.places[block] = start + len(head), len(content)
 
+    def remove_after(self, held: ExitStack) -> None:
+        """Remove the file when a block of code has ended well; a failure keeps it."""
+
+        def remove(kind: object, *_: object) -> None:
+            if kind is None:
+                self.path.unlink()
+
+        held.push(remove)
+
     def read(self, block: int) -> tuple[NDArray, dict[str, dict[int, str]]]:
-        """Rows and texts of a finished block."""
+        """Rows and texts of a finished block.
+
+        Args:
+            block: its number.
+
+        Returns:
+            Both, as they were added.
+
+        Raises:
+            BadInput: the file was changed meanwhile, or cannot be read.
+        """
         start, length = self.places[block]
-        with self.path.open("rb") as file:
-            file.seek(start)
-            content = file.read(length)
+        try:
+            with self.path.open("rb") as file:
+                file.seek(start - _HEAD.size)
+                head, content = file.read(_HEAD.size), file.read(length)
+        except OSError as error:
+            raise BadInput(f"{self.path}: cannot be read: {error.strerror}") from None
+        check = _check(self.owner, block, content)
+        if head != _HEAD.pack(_MAGIC, block, length, check):
+            raise BadInput(
+                f"{self.path}: block {block} was changed while the sweep ran; the same "
+                "command solves it again"
+            )
         (count,) = struct.unpack_from("<Q", content)
         end = 8 + count * self.record_type.itemsize
         records = np.frombuffer(content[8:end], dtype=self.record_type)
@@ -80,72 +119,108 @@ class Journal:
         }
 
 
-def open_journal(path: Path, whose: dict[str, Any], record_type: np.dtype) -> Journal:
-    """A new journal, or the one that a sweep left behind.
+@contextmanager
+def open_journal(
+    path: Path, whose: dict[str, Any], record_type: np.dtype
+) -> Generator[Journal, None, None]:
+    """A new journal, or the one that a sweep left behind, held until the block ends.
 
     Args:
         path: of the file.
         whose: plain values that say which sweep this is: all must be the same.
         record_type: of the rows.
 
-    Returns:
+    Yields:
         The journal, with the blocks that are finished.
 
     Raises:
-        BadInput: the file is another sweep's, or no journal, or cannot be written.
+        BadInput: another program holds the file; it is another sweep's, or no journal,
+            or cannot be written.
     """
-    header = json.dumps({"kind": _KIND} | whose).encode() + b"\n"
+    check_writable(path)
+    line = json.dumps({"kind": _KIND} | whose).encode()
+    header = b"%s %08x\n" % (line, zlib.crc32(line))
+    with ExitStack() as held:
+        try:
+            held.enter_context(locked_file(path, wait=False))
+        except BlockingIOError:
+            raise BadInput(
+                f"{path}: another run holds this journal; expected to be the only one "
+                "that writes this file (wait for it, or write to another file)"
+            ) from None
+        except OSError as error:
+            raise BadInput(unwritable(path, error)) from None
+        owner = zlib.crc32(header)
+        yield Journal(path, record_type, owner, _recover(path, header, owner))
+
+
+def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
+    """Places of the finished blocks; the first line is put right, a torn end cut."""
     try:
-        if not path.exists() or path.stat().st_size == 0:
-            path.write_bytes(header)
         with path.open("r+b") as file:
-            found = file.readline()
+            size = os.fstat(file.fileno()).st_size
+            found = file.read(len(header))
+            places: dict[int, tuple[int, int]] = {}
+            end = len(header)
+            if size > len(header):
+                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                    places, end = _scan(content, len(header), owner)
             if found != header:
-                if not found.endswith(b"\n") and header.startswith(found):
-                    # killed while the first line was written
+                # records that fit say whose they are: the line alone was damaged
+                if not places and not header.startswith(found):
                     file.seek(0)
-                    file.write(header)
-                else:
-                    raise BadInput(f"{path}: {_difference(found, header)}")
-            places, end = _scan(file, len(header), path.stat().st_size)
+                    raise BadInput(f"{path}: {_difference(file.readline(), header)}")
+                file.seek(0)
+                file.write(header)
             file.truncate(end)
     except OSError as error:
-        raise BadInput(_unwritable(path, error)) from None
-    return Journal(path, record_type, places)
-
-
-def _unwritable(path: Path, error: OSError) -> str:
-    """The message of a file that cannot be written."""
-    return f"{path}: cannot be written: {error.strerror}"
+        raise BadInput(unwritable(path, error)) from None
+    return places
 
 
 def _scan(
-    file: BinaryIO, start: int, size: int
+    content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Places of all whole records, and where the last one ends."""
-    places, end = {}, start
-    while len(head := file.read(_HEAD.size)) == _HEAD.size:
-        magic, block, length, check = _HEAD.unpack(head)
-        place = end + _HEAD.size
-        if magic != _MAGIC or length > size - place:
-            break
-        if zlib.crc32(file.read(length)) != check:
-            break
-        places[block] = place, length
-        end = place + length
+    """Places of all sound records, and where the last one ends."""
+    places: dict[int, tuple[int, int]] = {}
+    end = start
+    place = content.find(_MAGIC, start)
+    while 0 <= place <= len(content) - _HEAD.size:
+        _, block, length, check = _HEAD.unpack_from(content, place)
+        first = place + _HEAD.size
+        if (
+            length <= len(content) - first
+            and _check(owner, block, content[first : first + length]) == check
+        ):
+            places[block] = first, length
+            place = end = first + length
+        else:
+            place += 1
+        place = content.find(_MAGIC, place)
     return places, end
+
+
+def _check(owner: int, block: int, content: bytes) -> int:
+    """Check sum of a record: of whose it is, its number, its length and its content."""
+    head = struct.pack("<QQ", block, len(content))
+    return zlib.crc32(content, zlib.crc32(head, owner))
 
 
 def _difference(found: bytes, header: bytes) -> str:
     """How a journal differs from the one expected."""
-    expected = json.loads(header)
-    try:
-        other = json.loads(found)
-    except ValueError:
-        other = {}
-    if not isinstance(other, dict) or other.get("kind") != _KIND:
+    expected = json.loads(header.rpartition(b" ")[0])
+    line, _, check = found.rstrip(b"\n").rpartition(b" ")
+    if not found.startswith(b'{"kind": "forcefit sweep journal'):
         return "found no journal of a sweep; expected one, or no such file"
+    if check != b"%08x" % zlib.crc32(line):
+        return (
+            "the first line does not fit its check sum: a damaged journal, or one of "
+            "another version; expected this sweep's (delete it to begin anew)"
+        )
+    other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
+    # a hash of everything tells nothing where something is named
+    keys = [k for k in keys if k != "question_sha256"] or keys
     said = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)
     return (

@@ -49,18 +49,35 @@ def figure_of(
     Raises:
         BadInput: an axis is unknown, or more than two are left.
     """
+    if "energy" not in data or "status" not in data:
+        raise BadInput("figure: found no energy and status; expected those of a sweep")
     view, note = seen_at(data, at or {})
-    dims = [str(d) for d in view["energy"].dims]
-    if len(dims) > 2:
-        long = ", ".join(f"{d} ({view.sizes[d]})" for d in dims)
-        such = f"{dims[0]}={view[dims[0]].values.ravel()[0]}"
-        raise BadInput(f"figure: found axes {long}; choose with --at, such as {such}")
-    if not dims:
-        raise BadInput("figure: found a single point; expected an axis or two")
-    figure = map_figure(view) if len(dims) == 2 else path_figure(view)
+    axes = {str(d): view.sizes[d] for d in view["energy"].dims}
+    check_axes(axes)
+    figure = map_figure(view) if len(axes) == 2 else path_figure(view)
     if note:
         figure.text(0.995, 0.995, plot_label(note), ha="right", va="top", fontsize=8)
     return figure
+
+
+def check_axes(sizes: Mapping[str, int]) -> None:
+    """Refuse to draw what is neither a map nor a line.
+
+    Args:
+        sizes: number of values on each axis.
+
+    Raises:
+        BadInput: not one or two axes have more than one value, draws aside.
+    """
+    long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
+    if len(long) > 2:
+        said = ", ".join(f"{name} ({n})" for name, n in long.items())
+        raise BadInput(
+            f"figure: found axes {said}, expected one or two; forcefit assembly plot "
+            "draws a part of the file, with --at AXIS=VALUE"
+        )
+    if not long:
+        raise BadInput("figure: found a single point; expected an axis or two")
 
 
 def seen_at(
@@ -143,7 +160,7 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
     """
     from matplotlib.figure import Figure
 
-    data = data.squeeze(drop=True)
+    data = _along_numbers(data.squeeze(drop=True))
     names = [str(d) for d in data["energy"].dims]
     if len(names) != 2:
         raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
@@ -178,11 +195,9 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
     """
     from matplotlib.figure import Figure
 
-    data = data.squeeze(drop=True)
+    data = _along_numbers(data.squeeze(drop=True))
     (x,) = (str(d) for d in data["energy"].dims)
-    along = (
-        data[x].values if data[x].dtype.kind == "f" else np.arange(data.sizes[x]) + 1
-    )
+    along = data[x].values
     near = _near(data)
     figure = Figure(figsize=(11, 9), layout="constrained")
     axes = figure.subplots(3, 2).ravel()
@@ -202,6 +217,15 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
         )
     figure.suptitle(_caption(data), fontsize=10)
     return figure
+
+
+def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
+    """The same with rising numbers on each axis: labels become 1, 2, .."""
+    for name in map(str, data["energy"].dims):
+        if data[name].dtype.kind not in "fiu":
+            data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
+        data = data.sortby(name)
+    return data
 
 
 def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:

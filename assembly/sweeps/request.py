@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 
 def ask_sweep(
-    robot: str,
+    robot: str | Path,
     *,
     grid: str | None = None,
-    poses: Path | None = None,
+    poses: Path | str | None = None,
     vary: Sequence[str] = (),
-    errors: Path | None = None,
+    errors: Path | str | None = None,
     draws: int | None = None,
     seed: int = 1,
     reading: str = "frozen",
@@ -138,7 +138,7 @@ def _check_readings(question: Question) -> None:
         )
 
 
-def _targets(robot: Robot, grid: str | None, poses: Path | None) -> Targets:
+def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
     """The postures."""
     if poses is not None:
         return read_targets(poses, robot)
@@ -170,10 +170,10 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
     return found
 
 
-def _command(robot: str, options: Mapping[str, Any]) -> str:
+def _command(robot: str | Path, options: Mapping[str, Any]) -> str:
     """The command that asks for the same numbers, options at their default left out."""
     default = {"seed": 1, "reading": "frozen", "near": 0.02}
-    words = ["forcefit", "assembly", "sweep", robot]
+    words = ["forcefit", "assembly", "sweep", str(robot)]
     for key, value in options.items():
         name = "--" + key.replace("_", "-")
         if value is True:
@@ -182,7 +182,8 @@ def _command(robot: str, options: Mapping[str, Any]) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default.get(key):
             words += [name, str(value)]
-    return shlex.join(words)
+    # names of files may hold bytes that are not UTF-8
+    return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
@@ -199,19 +200,14 @@ def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
 
     Returns:
         Axes, how many points have each status, and of each quantity the least, median
-        and largest finite value with its unit.
+        and largest finite value with its unit; None where no value is finite.
     """
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     axes = {str(d): data.sizes[d] for d in data["status"].dims}
     table = {}
     for name, variable in data.data_vars.items():
         if variable.dtype.kind == "f":
-            values = variable.values[np.isfinite(variable.values)]
-            spread = [np.min(values), np.median(values), np.max(values)]
-            table[str(name)] = {
-                "units": variable.attrs.get("units", ""),
-                **dict(zip(("min", "median", "max"), spread, strict=True)),
-            } if values.size else None  # fmt: skip
+            table[str(name)] = _spread(variable)
     return {
         **{str(k): v for k, v in data.attrs.items() if k != "coordinates"},
         "axes": axes,
@@ -219,6 +215,17 @@ def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
         "status": dict(zip(names.tolist(), counts.tolist(), strict=True)),
         "quantities": table,
     }
+
+
+def _spread(variable: "xarray.DataArray") -> dict[str, Any] | None:
+    """Least, median and largest finite value; None where no value is finite."""
+    values = variable.values[np.isfinite(variable.values)]
+    if not values.size:
+        return None
+    return {
+        "units": variable.attrs.get("units", ""),
+        "min": np.min(values), "median": np.median(values), "max": np.max(values),
+    }  # fmt: skip
 
 
 def summary_text(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:

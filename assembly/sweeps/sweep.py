@@ -10,7 +10,7 @@ import json
 import signal
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.robot import LibraryLink, MeshLink, Robot
-from assembly.robot_file import robot_table
+from assembly.robot import Robot
 from assembly.sweeps.dataset import sweep_dataset, write_sweep
+from assembly.sweeps.identity import program_hash, question_hash, robot_hash
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.parameters import unit_of
 from assembly.sweeps.points import Found, Points, solve_points
@@ -120,11 +120,13 @@ class Sweep:
             "robot": asked.robot.name,
             "robot_sha256": robot_hash(asked.robot),
             "program": f"forcefit {version('forcefit')}",
+            "program_sha256": program_hash(),
             "reading": asked.reading or "none",
             "near": repr(asked.near),
         }
         if asked.sources is not None:
-            said |= {"seed": asked.seed, "errors_sha256": _sources_hash(asked)}
+            drawn = {k: v for k, v in vars(asked.sources).items() if k != "robot"}
+            said |= {"seed": asked.seed, "errors_sha256": question_hash(drawn)}
         if self.command:
             said["command"] = self.command
         return said
@@ -148,15 +150,9 @@ class Sweep:
             "strength": str(asked.strength),
             "situation": str((asked.load, asked.gravity, dict(asked.under))),
             "block": str(self.block_size),
+            # whatever is not named above
+            "question_sha256": question_hash(asked),
         }
-
-
-def _sources_hash(question: Question) -> str:
-    """SHA-256 of how errors are drawn."""
-    sources = question.sources
-    arrays = {k: v for k, v in vars(sources).items() if isinstance(v, np.ndarray)}
-    said = [k.encode() + np.ascontiguousarray(v).tobytes() for k, v in arrays.items()]
-    return hashlib.sha256(b"".join(said)).hexdigest()
 
 
 def solve_here(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
@@ -194,6 +190,7 @@ def run_sweep(
     path: Path | str,
     progress: Progress = lambda done, total: None,
     solve: Solver = solve_here,
+    held: ExitStack | None = None,
 ) -> None:
     """Solve a sweep into a NetCDF file, going on from its journal if there is one.
 
@@ -207,26 +204,34 @@ def run_sweep(
         progress: called at the start and after each block with the number of points
             that are in the journal, and of all.
         solve: solves blocks: :func:`solve_here`, or :mod:`assembly.sweeps.cluster`.
+        held: keeps the journal until it is closed, for what is still made of the
+            file: killed meanwhile, the same sweep has nothing to solve again.
 
     Raises:
-        BadInput: the journal is another sweep's, or a file cannot be written.
+        BadInput: the journal is another sweep's, another run holds it, or a file
+            cannot be written.
     """
     path = Path(path)
     kind = record_type(sweep.question)
-    journal = open_journal(journal_path(path), sweep.identity, kind)
-    done = sum(_length(sweep, block) for block in journal.places)
-    progress(done, sweep.size)
-    waiting = [b for b in range(sweep.blocks) if b not in journal.places]
-    for block, found in solve(sweep, waiting):
-        journal.add(block, found.records, found.texts)
-        done += _length(sweep, block)
+    with ExitStack() as own:
+        held = own if held is None else held
+        journal = held.enter_context(
+            open_journal(journal_path(path), sweep.identity, kind)
+        )
+        done = sum(_length(sweep, block) for block in journal.places)
         progress(done, sweep.size)
-    write_sweep(sweep, journal.read, path)
-    journal.path.unlink()
+        waiting = [b for b in range(sweep.blocks) if b not in journal.places]
+        for block, found in solve(sweep, waiting):
+            journal.add(block, found.records, found.texts)
+            done += _length(sweep, block)
+            progress(done, sweep.size)
+        write_sweep(sweep, journal.read, path)
+        journal.remove_after(held)
 
 
-def journal_path(path: Path) -> Path:
+def journal_path(path: Path | str) -> Path:
     """Where the journal of a file stands."""
+    path = Path(path)
     return path.with_name(path.name + ".journal")
 
 
@@ -283,21 +288,6 @@ def sweep_poses(
     targets = grid_targets(axes)
     question = Question(robot, components=targets.names, reading=reading)
     return sweep_in_memory(Sweep(question, targets), progress)
-
-
-def robot_hash(robot: Robot) -> str:
-    """SHA-256 of all that a robot file says, and of the meshes it names."""
-    from stiffness.library import read_compliance
-
-    table = robot_table(robot)
-    table.pop("description", None)
-    digest = hashlib.sha256(json.dumps(table, default=str).encode())
-    for frame in robot.frames:
-        if isinstance(frame.link, MeshLink):
-            digest.update(Path(frame.link.surface).read_bytes())
-        if isinstance(frame.link, LibraryLink):
-            digest.update(read_compliance(frame.link.library, frame.link.key).tobytes())
-    return digest.hexdigest()
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:

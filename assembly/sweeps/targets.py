@@ -173,7 +173,7 @@ def parse_values(whose: str, spec: str) -> NDArray:
     return start + step * np.arange(int(np.floor(count + 1e-9)) + 1)
 
 
-def read_targets(path: Path, robot: Robot) -> Targets:
+def read_targets(path: Path | str, robot: Robot) -> Targets:
     """Postures of a table: columns ``pose.tx`` .. or ``q.<frame>``, perhaps ``id``.
 
     Args:
@@ -187,6 +187,7 @@ def read_targets(path: Path, robot: Robot) -> Targets:
     Raises:
         BadInput: not such a table; the line and the column are named.
     """
+    path = Path(path)
     lines = read_text(path).splitlines()
     rows = [
         row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))

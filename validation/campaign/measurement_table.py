@@ -60,7 +60,7 @@ class MeasurementTable:
         ])
 
 
-def read_table(path: Path, robot: Robot, dialect: Dialect) -> MeasurementTable:
+def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementTable:
     """A table of measurements.
 
     Args:
@@ -74,6 +74,7 @@ def read_table(path: Path, robot: Robot, dialect: Dialect) -> MeasurementTable:
     Raises:
         BadInput: not such a table; the line and the column are named.
     """
+    path = Path(path)
     lines, rows = _cells(path, dialect)
     if not rows:
         raise BadInput(f"{path}: empty; expected a header and one row a measurement")

@@ -3,7 +3,7 @@
 import html
 from pathlib import Path
 
-from stiffness.reading import BadInput
+from stiffness.writing import write_text
 from validation.campaign.text import open_text
 from validation.diagnosis.diagnose import Diagnosis
 from validation.diagnosis.figures import (
@@ -20,7 +20,7 @@ from validation.html import html_figure, html_page, html_table
 
 
 def write_report(
-    found: Diagnosis, path: Path, tally: Calibration | None = None
+    found: Diagnosis, path: Path | str, tally: Calibration | None = None
 ) -> None:
     """Write the page, whole or not at all.
 
@@ -32,12 +32,7 @@ def write_report(
     Raises:
         BadInput: it cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(report_page(found, tally), encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from None
+    write_text(report_page(found, tally), path)
 
 
 def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:

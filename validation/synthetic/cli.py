@@ -7,7 +7,7 @@ import typer
 
 from assembly.cli import JsonOption, RobotArgument, progress_bars
 from stiffness.message import BadInput
-from stiffness.writing import check_writable, write_json
+from stiffness.writing import check_json, write_json
 
 DEFAULT_STRENGTH = 5.0  # [-] sigmas
 
@@ -140,7 +140,7 @@ def generate(
     )  # fmt: skip
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
     check_folder(folder)
-    check_writable(truth)
+    check_json(str(truth))
     if folder.resolve() in truth.resolve().parents:
         raise BadInput(
             f"--truth {truth}: found a place inside {folder}, for all to see"

@@ -21,7 +21,7 @@ from assembly.robot import Robot
 from assembly.robot_file import write_robot
 from stiffness.display import html_table, short_repr
 from stiffness.reading import BadInput
-from stiffness.writing import check_writable
+from stiffness.writing import check_writable, unwritable, write_text
 from validation.synthetic.design import Design, Plan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row
@@ -249,7 +249,7 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
-def check_folder(folder: Path) -> None:
+def check_folder(folder: Path | str) -> None:
     """Refuse a folder that a campaign cannot be written to, before the work.
 
     Args:
@@ -258,7 +258,8 @@ def check_folder(folder: Path) -> None:
     Raises:
         BadInput: it holds something already, or where it should be is closed to us.
     """
-    check_writable(folder.parent / "file")
+    folder = Path(folder)
+    check_writable(folder.parent / f"{folder.name}.new")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadInput(f"{folder}: found something there, expected a new folder")
 
@@ -280,11 +281,13 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
     try:
         part.mkdir()
         write_robot(campaign.robot, part / "robot.toml")
-        (part / "campaign.toml").write_text(_toml(campaign), encoding="utf-8")
-        (part / "measurements.csv").write_text(_table(campaign), encoding="utf-8")
+        write_text(_toml(campaign), part / "campaign.toml")
+        write_text(_table(campaign), part / "measurements.csv")
         part.replace(folder)
     except OSError as error:
-        raise BadInput(f"{folder}: cannot be written: {error.strerror}") from None
+        raise BadInput(unwritable(folder, error)) from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def _toml(campaign: Synthetic) -> str:

@@ -1,0 +1,92 @@
+"""NetCDF files, written whole or not at all, also when the disk is full."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from io import SEEK_SET, FileIO
+from pathlib import Path
+from typing import Any
+
+from stiffness.reading import BadInput
+from stiffness.writing import unwritable, whole_file
+
+
+@contextmanager
+def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
+    """Write a NetCDF file.
+
+    Args:
+        path: of the file; it appears when the block ends well.
+
+    Yields:
+        The open ``h5netcdf.File``.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    import h5netcdf
+
+    with whole_file(path) as part, FileIO(part, "w+") as file:
+        target = _Target(file)
+        try:
+            with h5netcdf.File(target, "w") as content:
+                yield content
+        finally:
+            if target.failure is not None:
+                raise BadInput(unwritable(path, target.failure)) from None
+
+
+def forgive_damaged_files() -> None:
+    """Let h5netcdf close what it could not open; else it writes to stderr."""
+    import h5netcdf
+
+    h5netcdf.File._writable = False  # until a file says otherwise
+
+
+class _Target:
+    """Where HDF5 writes; a failure is kept until HDF5 has closed its file.
+
+    HDF5 crashes the whole process at its end when a file could not be closed.
+    """
+
+    def __init__(self, file: FileIO) -> None:
+        self.file = file
+        self.failure: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        """Write all of it, or note why not and say that it is written."""
+        left = memoryview(content).cast("B")
+        size = len(left)
+        try:
+            while left and self.failure is None:
+                count = self.file.write(left)
+                left = left[count:]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def readinto(self, content: Any) -> int:
+        """Read what was written before."""
+        return self.file.readinto(content) or 0
+
+    def read(self, size: int = -1) -> bytes:
+        """The same as bytes."""
+        return self.file.read(size) or b""
+
+    def seek(self, offset: int, whence: int = SEEK_SET) -> int:
+        """Go to a place of the file."""
+        return self.file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """The place where it is."""
+        return self.file.tell()
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the file's size, or note why not."""
+        try:
+            return self.file.truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+    def flush(self) -> None:
+        """Nothing waits here."""

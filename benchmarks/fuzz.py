@@ -1,0 +1,393 @@
+"""Gives every reader and every command's options what nobody should, and counts.
+
+Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]``. Each
+input is a sound command of ``fuzz_seeds.py`` with its files or its words changed by
+``fuzz_mutations.py``, run in a process forked from one that has imported and compiled
+everything. Input i of a seed is always the same; ``--only I`` shows one.
+
+What is asked of each: an exit status of 0, 1, 2 or 130; with 2 one line that begins
+``forcefit: `` and no new file; nothing on stderr but that and progress; only whole
+files, none that was there changed; nothing left beside them or in the temporary
+folder. A command that takes longer than LIMIT of processor time is interrupted, as by
+Ctrl-C, and asked the same.
+"""
+
+import argparse
+import json
+import os
+import pickle
+import re
+import resource
+import shlex
+import shutil
+import signal
+import struct
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
+
+import typer  # noqa: E402
+from fuzz_mutations import change_file, change_words  # noqa: E402
+from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
+
+import forcefit  # noqa: E402
+
+LIMIT = 2.0  # [s] of processor time, then Ctrl-C
+PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
+BATCH = 50  # inputs to a process
+MEMORY = 8 << 30  # [byte] of addresses
+_HEAD = struct.Struct("<Q")
+# progress, verdicts and what meshing says
+_OURS = re.compile(
+    r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
+    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
+)
+
+
+def options_of() -> dict[str, list[tuple[str, bool]]]:
+    """By command: names of its options, and whether they take a value."""
+    found = {}
+
+    def walk(command, path):
+        for name, inner in getattr(command, "commands", {}).items():
+            walk(inner, (*path, name))
+        if not hasattr(command, "commands"):
+            found[" ".join(path)] = [
+                (p.opts[0], not getattr(p, "is_flag", False))
+                for p in command.params
+                if p.param_type_name == "option"
+            ]
+
+    walk(typer.main.get_command(forcefit.app), ())
+    return found
+
+
+def prepare(folder: Path, warm: bool) -> None:
+    """Sound files of all kinds; if asked each sound command once, which compiles."""
+    write_seeds(folder)
+    os.chdir(folder)
+    for command in MADE:
+        status, _, err = run(shlex.split(command))
+        assert status == 0, f"{command}: {status}\n{err}"
+    for command in KILLED:
+        child = os.fork()
+        if not child:
+            import assembly.statistics.monte_carlo
+            import assembly.sweeps.sweep
+
+            assembly.sweeps.sweep.write_sweep = lambda *_: os._exit(0)
+            assembly.statistics.monte_carlo.save_dataset = lambda *_: os._exit(0)
+            run(shlex.split(command))
+            os._exit(1)
+        assert os.waitpid(child, 0)[1] == 0, command
+    assert {p.name for p in folder.glob("*.journal")} == {
+        "kept.nc.journal", "drawn.nc.journal"
+    }  # fmt: skip
+    for name in ("notes.json", "notes.png", "notes.nc"):
+        shutil.copy(folder / "notes.txt", folder / name)
+    for _, command in COMMANDS if warm else ():
+        with tempfile.TemporaryDirectory() as other:
+            shutil.copytree(folder, other, dirs_exist_ok=True)
+            os.chdir(other)
+            began = time.process_time()
+            status, _, err = run(shlex.split(command))
+            took = time.process_time() - began
+            if took > 0.5:
+                print(f"{took:6.1f} s  {command[:90]}", flush=True)
+            # some of them are refused for one word, to be quick
+            if status not in {0, 1} and ",x" not in command and "solid" not in command:
+                print(f"not sound, {status}: {command}\n   {err[-300:]}")
+    os.chdir(folder)
+
+
+def run(words: list[str]) -> tuple[object, str, str]:
+    """The command in this process: exit status, standard output, error output."""
+    saved = [os.dup(1), os.dup(2)]
+    files = [tempfile.TemporaryFile(), tempfile.TemporaryFile()]
+    sys.stdout.flush()
+    for number, file in enumerate(files, 1):
+        os.dup2(file.fileno(), number)
+    before = sys.argv, sys.stdout, sys.stderr
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    sys.stderr = os.fdopen(
+        os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1
+    )
+    sys.argv = ["forcefit", *words]
+    try:
+        forcefit.main()
+        status: object = 0
+    except SystemExit as done:
+        status = done.code
+    except BaseException:
+        traceback.print_exc()
+        status = "traceback"
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        sys.argv, sys.stdout, sys.stderr = before
+        for number, copy in enumerate(saved, 1):
+            os.dup2(copy, number)
+            os.close(copy)
+    said = []
+    for file in files:
+        file.seek(0)
+        said.append(file.read().decode("utf-8", errors="replace"))
+        file.close()
+    return status, *said
+
+
+def changed(number: int, seed: int, options: dict) -> tuple[list[str], list[str]]:
+    """The words of an input, in the current folder, whose files it changes."""
+    random = Random(f"{seed}:{number}")
+    weights, commands = zip(*COMMANDS, strict=True)
+    words = shlex.split(random.choices(commands, weights)[0])
+    files = [Path(word.partition("#")[0]) for word in words]
+    files = [path for path in files if path.exists()]
+    files += [Path(f"{word}.journal") for word in words]
+    inside = [p for path in files if path.is_dir() for p in sorted(path.iterdir())]
+    files = [path for path in [*files, *inside] if path.is_file()]
+    if "study" in words[0] or "arm.toml" in words:
+        files += (
+            [Path("bar.toml")]
+            if words[0] == "study"
+            else sorted(Path("links").iterdir())
+        )
+    done = []
+    if files and random.random() < 0.6:
+        path = random.choice(files)
+        done.append(f"{path}: {change_file(path, random)}")
+    if not done or random.random() < 0.1:
+        name = " ".join(words[:3]) if words[1] == "library" else " ".join(words[:2])
+        name = "study" if words[0] == "study" else name
+        words = change_words(words, options.get(name, []), random)
+        done.append("words")
+    return words, done
+
+
+def snapshot() -> dict[str, bytes]:
+    """All files here, by name."""
+    return {
+        str(p): p.read_bytes() if p.is_file() else b""
+        for p in sorted(Path().rglob("*"))
+        if p.is_file() or not any(p.iterdir())
+    }
+
+
+def faults(words, status, out, err, before, after, left) -> list[str]:
+    """What is wrong with a result; nothing if it is as it should be."""
+    found = []
+    if status not in {0, 1, 2, 130}:
+        found.append(f"status {status}")
+    if "Traceback" in err:
+        last = [line for line in err.splitlines() if line.strip()][-1]
+        places = re.findall(r'File "([^"]+)", line (\d+)', err)
+        ours = [f"{Path(f).name}:{n}" for f, n in places if "site-packages" not in f]
+        return [f"traceback at {ours[-1] if ours else '?'}: {last[:100]}"]
+    strange = [line for line in err.splitlines() if not _OURS.match(line)]
+    if strange:
+        found.append(f"on stderr: {strange[0][:100]}")
+    said = [line for line in err.splitlines() if line.startswith("forcefit: ")]
+    if status == 2 and len(said) != 1:
+        found.append(f"{len(said)} messages")
+    if any(len(line) > 1000 for line in said):
+        found.append("a message of more than 1000 characters")
+    if status in {0, 1} and "-" in words[-1:] and "--json" in words[-2:]:
+        try:
+            json.loads(out)
+        except ValueError:
+            found.append("stdout is not JSON")
+    new = {name: content for name, content in after.items() if name not in before}
+    other = [
+        n for n in before if after.get(n) != before[n] and not may_change(n, after)
+    ]
+    if other:
+        found.append(f"changed: {other[0]}")
+    if left:
+        found.append(f"left in the temporary folder: {left[0]}")
+    for name, content in new.items():
+        journal = name.endswith(".journal") and status in {1, 2, 130}
+        library = name.startswith(("built", "links", "newfolder"))
+        if status == 2 and not journal and not library:
+            found.append(f"written although refused: {name}")
+        elif not journal and not is_whole(name, content):
+            found.append(f"not whole: {name}")
+    return found
+
+
+def may_change(name: str, after: dict[str, bytes]) -> bool:
+    """Whether a file that was there may be another now: ours, of the same kind."""
+    journal = name.endswith(".journal")
+    return journal or (name in after and is_whole(name, after[name]))
+
+
+def is_whole(name: str, content: bytes) -> bool:
+    """Whether a file is one of those that commands write, from end to end."""
+    path = Path(name)
+    if path.suffix == ".json":
+        try:
+            return isinstance(json.loads(content), dict)
+        except ValueError:
+            return False
+    ends = {
+        ".png": (b"\x89PNG", b"IEND\xaeB`\x82"), ".svg": (b"<?xml", b"</svg>\n"),
+        ".pdf": (b"%PDF", b"%%EOF\n"), ".html": (b"<!doctype", b"</html>\n"),
+        ".toml": (b"", b"\n"), ".csv": (b"", b"\n"), ".nc": (b"\x89HDF", b""),
+        ".jpg": (b"\xff\xd8", b"\xff\xd9"), ".tif": (b"II", b""), ".bmp": (b"BM", b""),
+    }  # fmt: skip
+    first, last = ends.get(path.suffix.lower(), (None, b""))
+    return first is not None and content.startswith(first) and content.endswith(last)
+
+
+def one(number: int, seed: int, options: dict, seeds: Path) -> dict:
+    """One input, from its files to what is wrong with it."""
+    place = Path(tempfile.mkdtemp(dir=f"{seeds}.inputs"))
+    here, temporary = place / "here", place / "tmp"
+    shutil.copytree(seeds, here)
+    (here / "empty").mkdir()
+    temporary.mkdir()
+    os.chdir(here)
+    words, done = changed(number, seed, options)
+    before = snapshot()
+    stopped: list[bool] = []
+
+    def stop(*_):
+        stopped.append(True)
+        signal.raise_signal(signal.SIGINT)
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT, LIMIT)
+    tempfile.tempdir = None
+    os.environ["TMPDIR"] = str(temporary)
+    began = time.process_time()
+    try:
+        status, out, err = run(words)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+    took = time.process_time() - began
+    after = snapshot()
+    left = [str(p.name) for p in temporary.iterdir()]
+    os.chdir("/")
+    shutil.rmtree(place)
+    wrong = faults(words, status, out, err, before, after, left)
+    if status == 130 and not stopped:
+        wrong.append("130 without Ctrl-C")
+    return {"words": words, "done": done, "status": status, "err": err, "out": out,
+            "stopped": bool(stopped), "took": took, "wrong": wrong}  # fmt: skip
+
+
+def tell(numbers: list[int], seed: int, options: dict, seeds: Path, say: int) -> None:
+    """In a child: inputs one after the other, each result into a pipe."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with os.fdopen(say, "wb") as file:
+        for number in numbers:
+            content = pickle.dumps(one(number, seed, options, seeds))
+            file.write(_HEAD.pack(len(content)) + content)
+            file.flush()
+
+
+def batch(numbers: list[int], seed: int, options: dict, seeds: Path) -> list:
+    """Inputs in a forked process, or in several if one dies of an input."""
+    results = []
+    while numbers:
+        listen, say = os.pipe()
+        child = os.fork()
+        if not child:
+            try:
+                tell(numbers, seed, options, seeds, say)
+                os._exit(0)
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(1)
+        os.close(say)
+        with os.fdopen(listen, "rb") as file:
+            while numbers:
+                signal.alarm(int(PATIENCE))
+                try:
+                    head = file.read(_HEAD.size)
+                except TimeoutError:
+                    head = b""
+                signal.alarm(0)
+                if len(head) < _HEAD.size:
+                    break
+                found = pickle.loads(file.read(_HEAD.unpack(head)[0]))
+                results.append((numbers.pop(0), found))
+        if numbers:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        if numbers:
+            died = os.WTERMSIG(status) if os.WIFSIGNALED(status) else status
+            what = "hangs" if died == signal.SIGKILL else f"dies of signal {died}"
+            found = {"words": [], "done": [], "status": what, "err": "", "out": "",
+                     "stopped": False, "took": PATIENCE, "wrong": [what]}  # fmt: skip
+            results.append((numbers.pop(0), found))
+    return results
+
+
+def main() -> int:
+    """Run, count and print; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=5000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, nargs="+")
+    asked = parser.parse_args()
+
+    def too_late(*_):
+        raise TimeoutError
+
+    signal.signal(signal.SIGALRM, too_late)
+    counts, wrong, slow = Counter(), {}, []
+    with tempfile.TemporaryDirectory() as folder:
+        seeds = Path(folder)
+        os.environ["FORCEFIT_CACHE"] = f"{folder}.cache"
+        Path(f"{folder}.inputs").mkdir()
+        os.environ.pop("DISPLAY", None)
+        prepare(seeds, asked.only is None)
+        options = options_of()
+        if asked.only is not None:
+            for number, found in batch(asked.only, asked.seed, options, seeds):
+                print(number, shlex.join(found["words"]), found["done"], sep="\n")
+                print(found["out"][-2000:], found["err"], sep="\n")
+                print(found["status"], found["wrong"])
+            return 0
+        began = time.monotonic()
+        for first in range(0, asked.count, BATCH):
+            numbers = list(range(first, min(first + BATCH, asked.count)))
+            for number, found in batch(numbers, asked.seed, options, seeds):
+                counts["inputs"] += 1
+                counts[f"exit status {found['status']}"] += 1
+                counts["stopped by Ctrl-C"] += found["stopped"]
+                slow.append((found["took"], number, shlex.join(found["words"])[:100]))
+                for fault in found["wrong"]:
+                    kind = re.sub(r"[\d.]{4,}|0x\w+", "#", fault)
+                    wrong.setdefault(kind, []).append(number)
+        os.chdir("/")
+    for name in ("cache", "inputs"):
+        shutil.rmtree(f"{folder}.{name}", ignore_errors=True)
+    used = sum(resource.getrusage(r).ru_utime + resource.getrusage(r).ru_stime
+               for r in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))  # fmt: skip
+    for name, count in sorted(counts.items()):
+        print(f"{name:24s} {count}")
+    print(
+        f"{'processor time':24s} {used:.0f} s, {time.monotonic() - began:.0f} s passed"
+    )
+    for took, number, said in sorted(slow, reverse=True)[:8]:
+        print(f"  {took:5.1f} s  {number}: {said}")
+    print(f"{'faults':24s} {sum(map(len, wrong.values()))} of {len(wrong)} kinds")
+    for kind, numbers in sorted(wrong.items(), key=lambda item: -len(item[1])):
+        print(f"  {len(numbers):4d}  {kind}   [--only {numbers[0]}]")
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

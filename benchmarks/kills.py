@@ -1,0 +1,393 @@
+"""Stops commands at random moments until they are done, and counts what was lost.
+
+Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``. Four
+commands, ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
+diagnose``, run in children forked from a process in which everything is imported and
+compiled. They are stopped by SIGKILL, SIGTERM or Ctrl-C, or their disk is full: files
+may not grow beyond a random size, or the folder is a small tmpfs where mounting one is
+allowed. Between, journals are cut or one of their bits is turned. Then the same command
+runs to its end, and its files are compared with those of a run that nobody disturbed.
+
+Lost is a point that a child had put into the journal, that no cut or turned bit hit,
+and that is not there or is solved again. Half-written is a file that stands under its
+name without being one of those of the undisturbed run.
+"""
+
+import argparse
+import io
+import mmap
+import os
+import resource
+import shlex
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
+
+import numpy as np
+
+import assembly.statistics.monte_carlo as monte_carlo
+import assembly.sweeps.sweep as sweeps
+import forcefit
+from assembly.sweeps import journal
+
+ERRORS = """
+[[errors]]
+frames = ["elbow", "arm"]
+most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
+"""
+PLAN = """
+yield = 0.9
+draws = 100
+[limits]
+margin_free = 1.0
+[[tolerance]]
+frames = ["elbow"]
+components = ["TX", "TY", "TZ"]
+most = 1e-4
+"""
+COMMANDS = {
+    "sweep": "assembly sweep five_bar --grid tx=-0.04:0.04:0.01,ty=0.1:0.15:0.01 "
+    "--errors errors.toml --draws 20 --reading none -o out.nc --json out.json",
+    "statistics": "assembly statistics five_bar --errors errors.toml --draws 20000 "
+    "--pose ty=0.13 --no-margins -o out.nc --json out.json",
+    "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "
+    "--plan plan.toml --fresh 50 -o out.nc --figure out.png --json out.json",
+    "diagnose": "validation diagnose campaign --json out.json --report out.html "
+    "--save out.toml",
+}
+SHARES = {"sweep": 6, "statistics": 5, "tolerances": 3, "diagnose": 3}
+WAYS = {signal.SIGKILL: 12, signal.SIGTERM: 2, signal.SIGINT: 3, "full": 3}
+
+
+@dataclass
+class Case:
+    """A command and what it does undisturbed.
+
+    Attributes:
+        words: of the command.
+        seconds: that it takes.
+        files: by name, what it writes.
+        header: first line of its journal; empty without one.
+        points: in the journal at the end.
+    """
+
+    words: list[str]
+    seconds: float = 0.0
+    files: dict[str, bytes] = field(default_factory=dict)
+    header: bytes = b""
+    points: int = 0
+
+
+SOLVED, KEPT = 0, 8  # places of two numbers that a child shares with its parent
+shared = mmap.mmap(-1, 16)
+
+
+def count(place: int, more: int) -> None:
+    """Add to a number that the parent reads after the child's death."""
+    struct.pack_into("<q", shared, place, counted(place) + more)
+
+
+def counted(place: int) -> int:
+    """A number of the last child."""
+    return struct.unpack_from("<q", shared, place)[0]
+
+
+def watch() -> None:
+    """Count points solved, and points that the journal said are kept."""
+    solve, draw, add = (
+        sweeps.solve_points,
+        monte_carlo.Experiment.solve,
+        journal.Journal.add,
+    )
+
+    def solve_and_count(question, points):
+        found = solve(question, points)
+        count(SOLVED, len(points.rows))
+        return found
+
+    def draw_and_count(self, first, number):
+        rows = draw(self, first, number)
+        count(SOLVED, number)
+        return rows
+
+    def add_and_count(self, block, records, texts):
+        add(self, block, records, texts)
+        count(KEPT, len(records))
+
+    sweeps.solve_points = solve_and_count
+    monte_carlo.Experiment.solve = draw_and_count
+    journal.Journal.add = add_and_count
+
+
+def start(words: list[str], limit: int | None = None) -> int:
+    """The command in a child, in the current folder; its pid."""
+    shared[:] = bytes(16)
+    child = os.fork()
+    if child:
+        return child
+    status, said = 99, io.StringIO()
+    said.close = lambda: None  # type: ignore[method-assign]
+    try:
+        with Path("/dev/null").open("w") as nothing:
+            os.dup2(nothing.fileno(), 1)
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+        sys.stdout, sys.stderr = io.StringIO(), said
+        sys.argv = ["forcefit", *words]
+        forcefit.main()
+    except SystemExit as done:
+        status = done.code if isinstance(done.code, int) else 98
+        if status not in {0, 130} and limit is None:  # or it may not write that
+            os.write(2, said.getvalue()[-300:].encode())
+    except BaseException:
+        with suppress(OSError):
+            os.write(2, traceback.format_exc().encode())
+    finally:
+        os._exit(status)
+
+
+def run_here(words: list[str]) -> None:
+    """The command in this process, so that children find everything compiled."""
+    before = sys.argv, sys.stdout, sys.stderr
+    sys.argv, sys.stdout, sys.stderr = (
+        ["forcefit", *words],
+        io.StringIO(),
+        io.StringIO(),
+    )
+    try:
+        forcefit.main()
+    except SystemExit as done:
+        if done.code:
+            raise RuntimeError(
+                f"{words}: {done.code}\n{sys.stderr.getvalue()}"
+            ) from None
+    finally:
+        sys.argv, sys.stdout, sys.stderr = before
+
+
+def finish(child: int) -> int:
+    """Wait for a child: exit status, or less than 0 by which signal it died."""
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def records(content: bytes, case: Case) -> list[tuple[int, int, int]]:
+    """Where each sound record of a journal begins and ends, and its points."""
+    owner = zlib.crc32(case.header)
+    places, _ = journal._scan(content, len(case.header), owner)
+    head = journal._HEAD.size
+    return [
+        (start - head, start + length, struct.unpack_from("<Q", content, start)[0])
+        for start, length in places.values()
+    ]
+
+
+def points_in(path: Path, case: Case) -> int:
+    """Points in a journal; none if there is none."""
+    if not case.header or not path.exists():
+        return 0
+    return sum(points for *_, points in records(path.read_bytes(), case))
+
+
+def undisturbed(command: str) -> Case:
+    """Run a command here to compile, once for its files, once for its journal."""
+    case = Case(shlex.split(command))
+    run_here(case.words)
+    began = time.monotonic()
+    status = finish(start(case.words))
+    case.seconds = time.monotonic() - began
+    assert status == 0, f"{command}: {status}"
+    case.files = {p.name: p.read_bytes() for p in Path().glob("out.*")}
+    assert not [name for name in case.files if name.endswith((".part", ".journal"))]
+    path = Path("out.nc.journal")
+    if "five_bar" in command and "tolerances" not in command:
+        child = start(case.words)
+        while not counted(KEPT):
+            time.sleep(0.001)
+        os.kill(child, signal.SIGKILL)
+        finish(child)
+        case.header = path.read_bytes().partition(b"\n")[0] + b"\n"
+        assert points_in(path, case) == counted(KEPT)
+        assert finish(start(case.words)) == 0
+        case.points = points_in_all(case)
+    for name in case.files:
+        Path(name).unlink()
+    return case
+
+
+def points_in_all(case: Case) -> int:
+    """Points of a whole run: those of the last child and of the one before it."""
+    return {"sweep": 54 * 20, "statistics": 20000}[case.words[1]]
+
+
+def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
+    """Cut a journal or turn a bit of it, or neither; points that should be left."""
+    content = bytearray(path.read_bytes())
+    sound = records(bytes(content), case)
+    everything = sum(points for *_, points in sound)
+    how = random.random()
+    if how < 0.6 or not content:
+        return everything
+    at = random.randrange(len(content))
+    if how < 0.8:
+        counts["journals cut"] += 1
+        path.write_bytes(content[:at])
+        return sum(points for _, end, points in sound if end <= at)
+    counts["journals with a bit turned"] += 1
+    content[at] ^= 1 << random.randrange(8)
+    if at < len(case.header) and not sound:
+        path.unlink()  # nothing in it says whose it is: refused, and begun anew
+        return 0
+    path.write_bytes(content)
+    return sum(points for start, end, points in sound if not start <= at < end)
+
+
+def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
+    """Disturb a command some times, let it end, and compare."""
+    path, standing = Path("out.nc.journal"), 0
+    while random.random() < 0.75:
+        (way,) = random.choices(list(WAYS), list(WAYS.values()))
+        limit = None
+        if way == "full" and not small:
+            largest = max(map(len, case.files.values()))
+            limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
+        child = start(case.words, limit)
+        if way == "full":
+            status = finish(child)
+            counts["disks full"] += status == 2
+            counts["wrong exit status"] += wrong(status, {0, 2}, case, way)
+        else:
+            time.sleep(case.seconds * random.uniform(0, 1.15))
+            os.kill(child, way)
+            status = finish(child)
+            counts[f"stopped by {way.name}"] += status != 0
+            counts["wrong exit status"] += wrong(status, {0, -way, 130}, case, way)
+        counts["lost"] += solved_again(case, standing)
+        counts["half-written"] += check(case, counts, status)
+        if status == 0 or (case.header and not path.exists() and standing):
+            standing = 0  # all is done, or the last of it was
+            counts["half-written"] += any(not Path(n).exists() for n in case.files)
+            continue
+        standing += counted(KEPT)
+        found = points_in(path, case)
+        counts["lost"] += max(0, standing - found)
+        standing = spoil(path, case, random, counts) if path.exists() else 0
+    if small:
+        subprocess.run(["mount", "-o", "remount,size=64m", "."], check=True)
+    status = finish(start(case.words))
+    counts["wrong exit status"] += wrong(status, {0}, case, "nothing")
+    counts["lost"] += solved_again(case, standing)
+    found = {p.name: p.read_bytes() for p in Path().glob("out.*")}
+    counts["different at the end"] += found != case.files
+    counts["ended"] += 1
+    for name in found:
+        Path(name).unlink()
+
+
+def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
+    """Whether an exit status is none of the right ones; it is then told."""
+    if status in right:
+        return False
+    print(f"exit status {status} of {case.words[1]} after {way}")
+    return True
+
+
+def solved_again(case: Case, standing: int) -> int:
+    """Points that the last child solved although they stood in the journal."""
+    return max(0, counted(SOLVED) - (case.points - standing)) if case.header else 0
+
+
+def check(case: Case, counts: Counter, status: int) -> int:
+    """Files that are not whole; politely stopped, nothing may be beside one."""
+    found = 0
+    for path in Path().glob("out.*"):
+        if path.suffix == ".part":
+            counts["left beside a file"] += status in {2, 130}
+        elif path.suffix != ".journal":
+            found += path.read_bytes() != case.files[path.name]
+    return found
+
+
+def mounted(folder: Path, kilobytes: int) -> bool:
+    """Whether a small tmpfs could be mounted on a folder."""
+    command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", str(folder)]
+    return subprocess.run(command, check=False, capture_output=True).returncode == 0
+
+
+def inputs(folder: Path) -> None:
+    """What the commands read."""
+    from tests.test_diagnosis import measure
+
+    (folder / "errors.toml").write_text(ERRORS)
+    (folder / "plan.toml").write_text(PLAN)
+    measure(folder / "campaign", configurations=8, passes=2, offset=(0, 8e-5))
+
+
+def main() -> int:
+    """Disturb, count and print; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kills", nargs="?", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    random = Random(asked.seed)
+    counts = Counter(dict.fromkeys(
+        ("lost", "half-written", "left beside a file", "different at the end",
+         "wrong exit status"), 0
+    ))  # fmt: skip
+    watch()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        inputs(folder)
+        os.chdir(folder)
+        cases = {}
+        for name, command in COMMANDS.items():
+            cases[name] = undisturbed(command)
+            print(f"{name}: {cases[name].seconds:.2f} s undisturbed", flush=True)
+        warm = time.monotonic() - began
+        disturbed = 0
+        while disturbed < asked.kills:
+            (name,) = random.choices(list(SHARES), list(SHARES.values()))
+            here = folder / "trial"
+            here.mkdir()
+            small = random.random() < 0.1 and mounted(
+                here, random.choice([64, 128, 256])
+            )
+            for path in ("errors.toml", "plan.toml"):
+                shutil.copy(folder / path, here)
+            shutil.copytree(folder / "campaign", here / "campaign")
+            os.chdir(here)
+            counts["of them on a small tmpfs"] += small
+            trial(cases[name], random, counts, small)
+            os.chdir(folder)
+            if small:
+                subprocess.run(["umount", str(here)], check=True)
+            shutil.rmtree(here)
+            disturbed = counts["disks full"] + sum(
+                counts[f"stopped by {way.name}"] for way in WAYS if way != "full"
+            )
+        os.chdir("/")
+    for name, number in counts.items():
+        print(f"{name:28s} {number}")
+    print(f"{'disturbed in all':28s} {disturbed}")
+    print(
+        f"{warm:.0f} s to compile and warm up, {time.monotonic() - began - warm:.0f} s"
+    )
+    return int(any(list(counts.values())[:5]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
