@@ -398,7 +398,7 @@ def error(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Certified bounds of the platform's largest pose error, problem (27)."""
+    """Certified bounds of the largest pose error, problem (27)."""
     from assembly.effects.acting import act
     from assembly.joint_file import LARGEST_LENGTH
     from assembly.reach import READINGS

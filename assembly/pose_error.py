@@ -29,8 +29,6 @@ from assembly.energy import Assembly
 from assembly.reach import Reach, reachable_screws
 from stiffness.display import Figures, bracket, html_table, short_repr
 
-_MOST_SUPPORTS = 400
-
 
 @dataclass(frozen=True, eq=False)
 class PoseError:
@@ -134,7 +132,7 @@ def _farthest(
     if reach.unbounded(part):
         return (np.inf, np.inf), reach.centre, 0
     body = reach.body
-    search = begin(body, part, tolerance, _MOST_SUPPORTS, empty_polytope())
+    search = begin(body, part, tolerance, empty_polytope())
     while advance(cone_solvers(), body, search) == NEEDED:
         found = reach.support(search.direction @ np.eye(6)[part : part + 3])
         learn(body, search, found.height, found.screw, found.pulls)

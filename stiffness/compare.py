@@ -69,8 +69,10 @@ class Comparison:
             angle: _turned_difference(self, np.radians(angle) * axis)
             for angle in _TURNS
         }
-        best = min(left, key=lambda angle: left[angle])
         noise = 2 * self.fea.relative_error_estimate
+        # of turns that are the same but for the mesh and rounding, the smallest
+        least = min(left.values()) + noise + 1e-9 * worst
+        best = min(angle for angle in left if left[angle] <= least)
         found = left[best] < _MUCH_BETTER * worst and worst > noise
         return (best, left[best]) if found else (0, worst)
 

@@ -55,14 +55,16 @@ def read_text(path: Path | str) -> str:
         raise BadInput(f"{path}: cannot be read: {reason}") from None
     if len(content) > _LARGEST_FILE:
         raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
-    if (place := content.find(0)) >= 0:
-        raise BadInput(f"{path}: byte {place} is NUL; expected a text file in UTF-8")
     try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise BadInput(
             f"{path}: byte {error.start} is not UTF-8; expected a text file in UTF-8"
         ) from None
+    if (place := text.find("\0")) >= 0:
+        line = text.count("\n", 0, place) + 1
+        raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
+    return text
 
 
 def read_toml(path: Path | str) -> "Table":

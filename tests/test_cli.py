@@ -270,3 +270,41 @@ def test_the_installed_command_refuses_without_a_traceback():
     assert done.returncode == 2
     assert done.stderr.startswith('forcefit: "x": neither a built-in robot nor a file')
     assert done.stdout == ""
+
+
+@pytest.mark.slow
+def test_processes_that_compile_at_once_leave_everything_compiled(tmp_path):
+    """Three on an empty cache; a fourth then compiles nothing, and says nothing."""
+    command = [sys.executable, "-m", "forcefit", "warm-up"]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    runs = [
+        subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    for run in runs:
+        _, said = run.communicate(timeout=900)
+        assert (run.returncode, said.count("compiling its solvers")) == (0, 1), said
+    again = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (again.returncode, "compiling its solvers" in again.stderr) == (0, False)
+
+
+@pytest.mark.slow
+def test_every_compiled_function_is_warmed_up_and_has_one_signature(tmp_path):
+    """Others would be compiled later, or by each process under the same name."""
+    code = """
+import importlib, pathlib, assembly.warm_up
+from numba.core.dispatcher import Dispatcher
+assembly.warm_up.warm_up()
+for path in sorted(pathlib.Path("assembly").rglob("*.py")):
+    if "import kernel" in path.read_text():
+        module = importlib.import_module(".".join(path.with_suffix("").parts))
+        for name, one in vars(module).items():
+            if isinstance(one, Dispatcher) and len(one.signatures) != 1:
+                print(module.__name__, name, len(one.signatures))
+"""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True,
+        cwd=Path(__file__).parents[1], check=True,
+    )  # fmt: skip
+    assert run.stdout == ""

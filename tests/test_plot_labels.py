@@ -57,8 +57,9 @@ def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
 
 
 def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
+    attrs = {"robot": ODD[0], "seed": 1, "play": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
-    drawn(histogram_figure(xarray.Dataset(draws, attrs={"robot": ODD[0], "seed": 1})))
+    drawn(histogram_figure(xarray.Dataset(draws, attrs=attrs)))
     shares = np.full((1, len(ODD), 3), 0.5)
     axes = ("quantity", "group", "estimate")
     coords = {"quantity": ["energy"], "group": ODD}

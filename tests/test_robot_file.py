@@ -863,8 +863,8 @@ dh = { d = 0.1 }
     assert json.loads(out)["remarks"] == [told]
 
     class Plotter:
-        def screenshot(self, name):
-            Path(name).write_bytes(b"")
+        def screenshot(self, *_, **__):
+            return np.zeros((2, 2, 3), dtype=np.uint8)
 
         def close(self):
             pass

@@ -204,7 +204,7 @@ poisson = 0.3
         (("round", "rond"), 'unknown "rond"; did you mean "round"?'),
         (("radius", "radios"), 'unknown length "radios"'),
         (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
-        (("0.01", '"a"'), "expected a number, or a list"),
+        (("0.01", '"a"'), "expected a finite number, or a list"),
         (("[0.2, 0.3]", "[0.2, 0.2]"), "a value stands there twice"),
         (("young = 6e10", ""), "young: missing"),
         (('"beam"', '"bem"'), '"beam"'),

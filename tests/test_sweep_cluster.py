@@ -26,7 +26,7 @@ def drawn_sweep(grid):
     """The five-bar robot with three draws of errors at each posture."""
     robot = load_robot("five_bar")
     targets = grid_targets(parse_grid(grid, robot))
-    sources = tolerance_sources(robot, np.array([1e-4] * 3 + [1e-5] * 3))
+    sources = tolerance_sources(robot, np.array([1e-2] * 3 + [1e-3] * 3))
     question = Question(robot, None, (), targets.names, sources, 7)
     return Sweep(question, targets, (), 3, block_size=32)
 

@@ -38,6 +38,7 @@ _MAY = {
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "assembly/cli.py",  # pixels of a screenshot
     "validation/html.py",  # into memory
+    "assembly/statistics/replay.py",  # likewise
     "validation/report.py",  # likewise
 }
 

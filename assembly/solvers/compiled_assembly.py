@@ -29,7 +29,7 @@ from assembly.solvers.compiled_reduction import (
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 from assembly.solvers.householder import triangulate, turn
-from assembly.solvers.vectors import copy, divide, inner
+from assembly.solvers.vectors import copy, divide, inner, into_cones
 
 NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
 _RANK = 1e-10  # as in assembly.solvers.reduction, and so is the noise floor
@@ -268,22 +268,9 @@ def small_answer(
     ):  # fmt: skip
         inside, _, _ = solvers.interior_point(G, h, d, H, none, starts, most, stop)
         copy(inside, u)
-        _into_cones(starts, u)
+        into_cones(starts, u)
         if solvers.dual_newton(
             Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
         ) >= 0:  # fmt: skip
             break
     return INTERIOR
-
-
-@kernel
-def _into_cones(starts: NDArray, u: NDArray) -> None:
-    """Cones' vectors shortened to length 1 where rounding made them longer."""
-    for c in range(len(starts) - 1):
-        size = 0.0
-        for i in range(starts[c], starts[c + 1]):
-            size += u[i] * u[i]
-        if size > 1.0:
-            size = np.sqrt(size)
-            for i in range(starts[c], starts[c + 1]):
-                u[i] /= size

@@ -27,10 +27,9 @@ from assembly.solvers.householder import triangulate, turn_all
 from assembly.solvers.interior import LANES
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import Body
-from assembly.solvers.vectors import copy
+from assembly.solvers.vectors import copy, into_cones
 
 SOLVED, HANDED_BACK = range(2)
-MOST_SUPPORTS = 400
 _RANK = 1e-10  # as in assembly.solvers.reduction
 _UNBOUNDED = 1e-8  # as in assembly.pose_error
 _CLEAR = 10.0  # what is within this factor of a threshold decides nothing
@@ -110,7 +109,7 @@ def bound_all(
             out.road[i] = HANDED_BACK
             continue
         for half in range(2):
-            search = begin(body, 3 * half, tolerance[half], MOST_SUPPORTS, outer)
+            search = begin(body, 3 * half, tolerance[half], outer)
             if advance(solvers, body, search) != DONE:
                 out.road[i] = HANDED_BACK
             out.supports[i] += search.counts[1]
@@ -189,7 +188,7 @@ def body_of(
     turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
     rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
     centre = centre.copy()
-    _shift(centre, offset)
+    _shift(centre.reshape(6, 1), offset)
     nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
     if rank < 0:
         return False, Body(centre, *nothing)
@@ -218,11 +217,11 @@ def body_of(
             at += 1
         cones += 1
         starts[cones] = at
-    _into_cones(start, starts, cones)
-    for j in range(kept):
-        _shift(X[:, j], offset)
+    starts = starts[: cones + 1].copy()
+    into_cones(starts, start)
+    _shift(X, offset)
     decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
-    return decided, Body(centre, X, B, start, starts[: cones + 1].copy())
+    return decided, Body(centre, X, B, start, starts)
 
 
 @kernel
@@ -259,7 +258,10 @@ def _within_bounds(
 ) -> bool:  # fmt: skip
     """Whether no play takes a passive joint past its bound; see assembly.reach."""
     nq, m = F.shape
-    if not np.any(s.free_bound < np.inf):
+    bounded = False
+    for q in range(nq):
+        bounded = bounded or s.free_bound[q] < np.inf
+    if not bounded:
         return True
     middle, most = motions.copy(), np.zeros(nq)
     moved, step = np.zeros(m), np.zeros(nq)
@@ -277,7 +279,8 @@ def _within_bounds(
             for q in range(nq):
                 middle[q] -= step[q] * clearances[i]
                 squares[q] += step[q] * step[q]
-        most += np.sqrt(squares)
+        for q in range(nq):
+            most[q] += np.sqrt(squares[q])
     for q in range(nq):
         # written so that what is not a number is not within
         if s.free_bound[q] < np.inf:
@@ -303,20 +306,10 @@ def _move_platform(
 
 
 @kernel
-def _shift(screw: NDArray, offset: NDArray) -> None:
-    """Read a screw at another point of the platform."""
-    for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        screw[3 + a] += screw[b] * offset[c] - screw[c] * offset[b]
-
-
-@kernel
-def _into_cones(u: NDArray, starts: NDArray, cones: int) -> None:
-    """Cones' vectors shortened to length 1 where rounding made them longer."""
-    for c in range(cones):
-        size = 0.0
-        for i in range(starts[c], starts[c + 1]):
-            size += u[i] * u[i]
-        if size > 1.0:
-            for i in range(starts[c], starts[c + 1]):
-                u[i] /= np.sqrt(size)
+def _shift(screws: NDArray, offset: NDArray) -> None:
+    """Read screws, the columns, at another point of the platform."""
+    for j in range(screws.shape[1]):
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            moved = screws[b, j] * offset[c] - screws[c, j] * offset[b]
+            screws[3 + a, j] += moved

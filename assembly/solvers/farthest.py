@@ -33,6 +33,7 @@ from assembly.solvers.vectors import copy, divide, fill, inner
 DONE, NEEDED, GAVE_UP = range(3)
 _CLIMBING, _BOXING, _CUTTING = range(3)
 _CLIMBS = 8
+_MOST_SUPPORTS = 400  # after which a search gives up
 _GAIN = 1e-3  # [tolerances] a climb that gains less is over
 _SHARE = 0.1  # of the tolerance that a support is asked to leave open at most ..
 _POOR = 0.5  # .. and with which the search still goes on
@@ -50,7 +51,7 @@ class Search(NamedTuple):
         axes: (3, 3) rows of the box.
         heights: (2, 3) of the box, low and high, NaN where not known.
         cuts: (32, 4) planes found before there was a box.
-        counts: (5,) stage, supports, planes kept, whether the last improved, most.
+        counts: (4,) stage, supports, planes kept, whether the last improved.
         outer: what the planes leave.
     """
 
@@ -67,16 +68,13 @@ class Search(NamedTuple):
 
 
 @kernel
-def begin(
-    body: Body, part: int, tolerance: float, most: int, outer: Polytope
-) -> Search:
+def begin(body: Body, part: int, tolerance: float, outer: Polytope) -> Search:
     """A search that has not looked anywhere yet.
 
     Args:
         body: what is searched.
         part: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] asked of upper minus lower bound.
-        most: supports after which it gives up.
         outer: room for the planes.
 
     Returns:
@@ -89,12 +87,11 @@ def begin(
     size = np.sqrt(size)
     search = Search(
         part, tolerance, np.empty(2), best, np.zeros(3), np.zeros((3, 3)),
-        np.empty((2, 3)), np.empty((32, 4)), np.zeros(5, np.int64), outer,
+        np.empty((2, 3)), np.empty((32, 4)), np.zeros(4, np.int64), outer,
     )  # fmt: skip
     search.bounds[0], search.bounds[1] = size, np.inf
     fill(search.heights[0], np.nan)
     fill(search.heights[1], np.nan)
-    search.counts[4] = most
     if body.map.shape[1]:
         _first_direction(body, search)
     else:
@@ -161,7 +158,7 @@ def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
     while True:
         if search.bounds[1] - search.bounds[0] <= search.tolerance:
             return DONE
-        if search.counts[1] >= search.counts[4]:
+        if search.counts[1] >= _MOST_SUPPORTS:
             return GAVE_UP
         height, v, pulls, n = support(
             solvers, body, search.part, search.direction, _SHARE * search.tolerance

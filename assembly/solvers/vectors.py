@@ -40,3 +40,21 @@ def divide(v: NDArray, divisor: float) -> NDArray:
     for j in range(len(v)):
         quotient[j] = v[j] / divisor
     return quotient
+
+
+@kernel
+def into_cones(starts: NDArray, u: NDArray) -> None:
+    """Cones' vectors shortened to length 1 where rounding made them longer.
+
+    Args:
+        starts: (cones + 1,) first column of each cone, and nu.
+        u: (nu,) to shorten.
+    """
+    for c in range(len(starts) - 1):
+        size = 0.0
+        for i in range(starts[c], starts[c + 1]):
+            size += u[i] * u[i]
+        if size > 1.0:
+            size = np.sqrt(size)
+            for i in range(starts[c], starts[c + 1]):
+                u[i] /= size
