@@ -67,7 +67,7 @@ def forcefit(
 
 @app.command()
 def study(
-    file: Annotated[Path, typer.Argument(help="Study file (TOML).")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Study file (TOML).")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder to write.")
     ] = None,

@@ -450,14 +450,14 @@ def show(
     exaggeration: Annotated[
         float | None, typer.Option(help="Factor on displacements.", min=1e-6)
     ] = None,
-    errors: Annotated[
+    error_body: Annotated[
         str | None,
         typer.Option(help="Also the body of possible errors: translation | rotation."),
     ] = None,
     reading: Annotated[
         str | None,
         typer.Option(
-            help="Of the errors: frozen | free | budget; default budget, of a loaded "
+            help="Of that body: frozen | free | budget; default budget, of a loaded "
             "robot frozen."
         ),
     ] = None,
@@ -476,7 +476,7 @@ def show(
     elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
         raise BadInput("no display to open a window on; name a file with --output")
     for option, value, valid in (
-        ("--errors", errors, PARTS), ("--reading", reading, READINGS)
+        ("--error-body", error_body, PARTS), ("--reading", reading, READINGS)
     ):  # fmt: skip
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
@@ -484,7 +484,7 @@ def show(
         raise BadInput(f"--exaggeration: found {exaggeration}, expected a finite one")
     wrench = parse_load(load)
     loaded = wrench is not None and any(wrench)
-    if loaded and errors is not None and reading == "budget":
+    if loaded and error_body is not None and reading == "budget":
         raise BadInput(
             "--reading: found budget with --load, and a loaded robot has no such "
             "reading; expected frozen or free"
@@ -496,7 +496,7 @@ def show(
     try:
         answer = solve_assembly(posture, wrench)
         plotter = draw_assembly(
-            answer, exaggeration, errors, reading, output is not None
+            answer, exaggeration, error_body, reading, output is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")

@@ -195,7 +195,7 @@ COMMANDS = [
     (1, "assembly show bar.toml -o new.png --exaggeration 20"),
     (5, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --near 0.1"),
     (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --reading none "
-        "--wrench elbow"),
+        "--wrench-of elbow"),
     (4, "assembly sweep bar.toml --grid q.crank=1:1.1:0.1 -o new.nc --errors "
         "errors.toml --draws 3 --seed 2 --reading none --vary "
         "elbow.link.young=7e10,2e11"),

@@ -49,7 +49,7 @@ Masses = Annotated[
     list[str] | None,
     typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
 ]
-Seconds = Annotated[float, typer.Option(help="Budget of time [s].")]
+TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]
 Json = Annotated[
     str | None,
     typer.Option(

@@ -19,10 +19,10 @@ from stiffness.arguments import (
     Parts,
     Poisson,
     Radius,
-    Seconds,
     SectionText,
     Surface,
     Theory,
+    TimeLimit,
     Tip,
     Unit,
     Up,
@@ -157,7 +157,7 @@ def fea(
     density: Density = 0.0,
     part: Parts = None,
     mass: Masses = None,
-    seconds: Seconds = 300.0,
+    time_limit: TimeLimit = 300.0,
     json: Json = None,
 ) -> None:
     """K_E by finite elements, refined to the asked accuracy."""
@@ -171,7 +171,7 @@ def fea(
     E, nu = BeamOptions(young, poisson).material()
     held, moved = _interfaces(base, tip)
     density = checked("--density", density, "kg/m^3", least=0)
-    budget = Budget(seconds=checked("--seconds", seconds, "s", above=0))
+    budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
     accuracy = _accuracy(accuracy)
     materials = [Material(E, nu, density)]
     materials += [parse_part("--part", text) for text in part or ()]

@@ -44,7 +44,7 @@ def test_the_picture_shows_links_bodies_and_the_exaggeration():
     ("words", "message"),
     [
         (["-o", "x.xyz"], 'x.xyz: found the ending ".xyz", expected a picture: .png'),
-        (["-o", "x.png", "--load", "fx=1", "--errors", "translation", "--reading",
+        (["-o", "x.png", "--load", "fx=1", "--error-body", "translation", "--reading",
           "budget"], "--reading: found budget with --load"),
         (["-o", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
     ],
@@ -76,7 +76,7 @@ def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monke
 
     monkeypatch.setattr(assembly.plot, "reachable_screws", noted)
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
-    words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--errors",
+    words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
              "translation", "-o", tmp_path / "x.jpg"]  # fmt: skip
     for load in (["--load", "fx=10"], []):
         assert run("assembly", "show", *words, *load) == (0, "", "")

@@ -110,7 +110,7 @@ def test_beam_refuses_with_the_options_name(options, message):
         (["--accuracy", "0"], "--accuracy: found 0"),
         (["--accuracy", "nan"], "--accuracy: found nan"),
         (["--density", "-1"], "--density: found -1"),
-        (["--seconds", "0"], "--seconds: found 0"),
+        (["--time-limit", "0"], "--time-limit: found 0"),
         (["--unit", "mile"], "unit: found 'mile'"),
         (["--interface", "rigd"], "interface: found 'rigd'"),
         (["--part", "z=0..1"], "--part: found 'z=0..1', expected"),

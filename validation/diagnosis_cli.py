@@ -19,9 +19,11 @@ def diagnose(
     calibrate: Annotated[
         int, typer.Option(help="Simulate this many campaigns on the same design.")
     ] = 0,
-    exact: Annotated[
+    finite_motions: Annotated[
         bool,
-        typer.Option("--exact", help="Motions of the declared model are finite."),
+        typer.Option(
+            "--finite-motions", help="Motions of the declared model are finite."
+        ),
     ] = False,
     save: Annotated[
         Path | None, typer.Option(help="Also write the robot with the effects found.")
@@ -41,7 +43,7 @@ def diagnose(
             check_writable(path, kind)
     data = read_campaign(campaign)
     with progress_bars() as update:
-        found = trace(data, finite=exact, update=update)
+        found = trace(data, finite=finite_motions, update=update)
     tally = None
     if calibrate:
         from validation.diagnosis.verdict import calibrate as simulate

@@ -61,7 +61,7 @@ def sweep(
     play_alone: Annotated[
         bool, typer.Option("--play-alone", help="The pose error also without errors.")
     ] = False,
-    wrench: Annotated[
+    wrench_of: Annotated[
         list[str] | None, typer.Option(help="A frame whose wrench is kept.")
     ] = None,
     linearisation: Annotated[
@@ -109,7 +109,7 @@ def sweep(
         update("robot", 0, 1)  # where it is placed, code may be compiled
         asked = ask_sweep(
             robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench or (),
+            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
             linearisation=linearisation, near=near, yield_strength=yield_strength,
             load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
         )  # fmt: skip

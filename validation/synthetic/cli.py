@@ -93,7 +93,7 @@ def generate(
     ] = False,
     rotation: Annotated[float, typer.Option(help="[rad] 1 sigma.")] = 1e-5,
     position: Annotated[float, typer.Option(help="[m] 1 sigma.")] = 5e-6,
-    errors: Annotated[
+    error_size: Annotated[
         float,
         typer.Option(help="[rad] Declared errors drawn up to it, 0.5 mm per mrad."),
     ] = 0.0,
@@ -146,9 +146,9 @@ def generate(
             f"--truth {truth}: found a place inside {folder}, for all to see"
         )
     machine = without_clearance(load_robot(robot))
-    if errors:
+    if error_size:
         drawn = np.random.default_rng(seed + 1).uniform(
-            -errors, errors, (len(machine.frames), 6)
+            -error_size, error_size, (len(machine.frames), 6)
         )
         machine = machine.with_errors(drawn * np.repeat([1.0, 0.5], 3))
     try:
