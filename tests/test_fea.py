@@ -419,6 +419,7 @@ def test_a_bar_of_two_materials_end_to_end(cache):
     assert two.stiffness[5, 5] / one.stiffness[5, 5] == pytest.approx(4 / 3, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_budget_that_is_used_up_says_so(cache):
     solution = solve_link(
         bar_surface(), *PLANES, [Material(E, NU)], accuracy=1e-5,

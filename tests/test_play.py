@@ -144,6 +144,7 @@ def near_the_edge(margin):
 
 
 @pytest.mark.parametrize("margin", [0.9, pytest.param(0.99, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_near_the_edge_of_a_zone_longer_walks_change_no_distribution(margin):
     """All mixed; and four mixed walks in a row end nowhere else."""
     one, errors = near_the_edge(margin)
@@ -189,6 +190,7 @@ def test_play_changes_neither_energy_nor_bounds(drawn, play):
     assert np.abs(settled - found.platform_screw).max() > 1e-5
 
 
+@pytest.mark.slow
 def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
     one, found = drawn
     push = np.array([rng.normal(size=6) for rng in generators(600)])

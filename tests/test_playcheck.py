@@ -197,6 +197,7 @@ def irsbot2():
     return robot.with_errors(errors)
 
 
+@pytest.mark.slow
 def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
     """Within 2 per cent at no error; the optimality gap falls with the square."""
     answer = playcheck(place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25))
@@ -218,6 +219,7 @@ def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
     assert abs(answer.energies["linear"][0]) > 1e-2
 
 
+@pytest.mark.slow
 def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
     """Clearances a fifth larger in the linear model move its least energy."""
     import assembly.closure

@@ -159,6 +159,7 @@ def test_springs_in_a_row_share_the_energy():
     assert upper == pytest.approx(lower, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_with_a_yield_a_single_error_may_leave_the_play_that_often():
     """Uniform within t: the share within play is play / t, so t = play / yield.
 
@@ -275,6 +276,7 @@ def test_a_pose_error_is_shared_by_lagranges_multipliers():
     assert found.price_alike == pytest.approx((c / alike).sum(), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_with_a_yield_pose_errors_add_up_as_squares():
     """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
 
