@@ -138,7 +138,3 @@ def _complain(message: str, status: int) -> int:
     if message:
         print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
     return status
-
-
-if __name__ == "__main__":
-    main()

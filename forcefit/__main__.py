@@ -1,0 +1,5 @@
+"""``python -m forcefit`` is the command ``forcefit``."""
+
+from forcefit import main
+
+main()
