@@ -187,10 +187,7 @@ def build_library(
     Raises:
         BadInput: the folder cannot be made, or an entry cannot be computed.
     """
-    try:
-        spec.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{spec.folder}: cannot be made: {error.strerror}") from None
+    _make_folder(spec.folder, write=False)
     wanted: list[dict[str, float] | SurfaceLink] = [*spec.points(), *spec.links]
     files = [spec.folder / f"{_key(spec, one)}.json" for one in wanted]
     tell = update or (lambda done, total: None)
@@ -218,6 +215,18 @@ def build_library(
     return files
 
 
+def _make_folder(folder: Path, write: bool = True) -> None:
+    """The folder of a library; without ``write`` only whether there can be one."""
+    try:
+        made = [one for one in (folder, *folder.parents) if not one.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"{folder}: cannot be made: {error.strerror}") from None
+    if not write:
+        for one in made:
+            one.rmdir()
+
+
 def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
     """Name of an entry of either kind."""
     if isinstance(wanted, SurfaceLink):
@@ -235,6 +244,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
         link, geometry = _solve_point(spec, wanted)
         parameters, about = wanted, {"shape": spec.shape, "geometry": geometry}
     key = _key(spec, wanted)
+    _make_folder(spec.folder)
     content = (
         link_results(link)
         | about
@@ -316,6 +326,7 @@ def _entry(file: Path) -> Entry:
             for name in ("stiffness", "stiffness_error", "tip")
         ]
         parameters = {str(k): float(v) for k, v in about["parameters"].items()}
+        float(about["relative_error_estimate"])
     except BadInput:
         raise
     except (ValueError, OverflowError, LookupError, TypeError, AttributeError) as error:

@@ -1,6 +1,7 @@
 """A link's surface from a file: read, checked, repaired with the repair named."""
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -183,7 +184,7 @@ def _check_coordinates(
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
         raise BadInput(f"{name}: {wrong.sum()} vertices are not finite numbers")
-    size = float(np.linalg.norm(np.ptp(used, axis=0)))
+    size = math.hypot(*np.ptp(used, axis=0))
     if not _SMALLEST_LINK <= size <= _LARGEST_LINK:
         hint = "mm" if size > _LARGEST_LINK and unit == "m" else "m"
         raise BadInput(

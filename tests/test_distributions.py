@@ -94,6 +94,7 @@ def test_sizes_with_random_signs_leave_the_gap_between_empty():
         (('"literal"', '"positive"'), 'signs: found "positive"'),
         (('"middle"', '"crank_pin"'), 'found "crank_pin.RX" again'),
         (("most = [0, 1.5e-3", "most = [0, 0"), "most: expected more than 0"),
+        (("most = [1e-3, 0", "most = [1e300, 0"), "most: found"),
         (("deviation = [0, 1e-3, 0, 0, 0, 1e-5]", "deviation = [0, -1, 0, 0, 0, 0]"),
          "deviation: expected numbers >= 0"),
     ],

@@ -341,7 +341,7 @@ def test_a_surface_without_its_interface_is_refused_and_nothing_written(
     spec.write_text(LINKS.replace("z=0.08", "z=0.09"))
     with pytest.raises(BadInput, match='link "bar": .*tip'):
         build_library(read_spec(spec))
-    assert list((tmp_path / "links").iterdir()) == []
+    assert not (tmp_path / "links").exists()
 
 
 def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch):
@@ -529,3 +529,17 @@ def test_the_shipped_library_refuses_outside(length):
     )
     assert isinstance(result.exception, BadInput)
     assert "outside the grid, 0.2 .. 0.45" in str(result.exception)
+
+
+def test_a_build_that_fails_leaves_no_folder(tmp_path, monkeypatch):
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC)
+    spec = read_spec(path)
+
+    def fail(*_):
+        raise BadInput("no link")
+
+    monkeypatch.setattr("stiffness.library._solve_point", fail)
+    with pytest.raises(BadInput, match="no link"):
+        build_library(spec)
+    assert not spec.folder.exists()

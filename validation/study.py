@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.energy import Assembly, solve_assembly
+from assembly.joint_file import LARGEST_LENGTH
 from assembly.links import link_compliance
 from assembly.mesh_link import mesh_link_stiffness
 from assembly.posture import POSE, Posture, place_robot
@@ -231,8 +232,10 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
         table.integer("seed"),
         table.choice("signs", SIGNS, "literal"),
     )
-    if np.any(np.array(draw.least) > np.array(draw.most)):
-        raise table.bad("least", "larger than most; expected least <= most")
+    least, most = np.array(draw.least), np.array(draw.most)
+    if not ((least >= 0) & (least <= most) & (most <= LARGEST_LENGTH)).all():
+        expected = f"expected 0 <= least <= most <= {LARGEST_LENGTH:g}"
+        raise table.bad("least", f"{expected} in every component")
     table.finish()
     said = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {said}"

@@ -31,6 +31,7 @@ from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")
+_LARGEST = 1e3  # [rad, m] beyond any error
 _WORDS = 4  # numbers that one step of Philox gives
 
 
@@ -242,10 +243,10 @@ def _rows(table: Table, robot: Robot) -> list[tuple]:
     if kind not in KINDS:
         raise table.bad("distribution", f"found {quoted(kind)}{nearest(kind, KINDS)}")
     zero = np.zeros(6)
-    centre = table.array("centre", (6,), "rad, m", zero)
+    centre = table.array("centre", (6,), "rad, m", zero, largest=_LARGEST)
     least, limit, signed = zero, np.full(6, np.inf), True
     if kind == "uniform":
-        scale = table.array("most", (6,), "rad, m")
+        scale = table.array("most", (6,), "rad, m", largest=_LARGEST)
         least = table.array("least", (6,), "rad, m", zero)
         if not ((0 <= least) & (least <= scale)).all():
             raise table.bad("least", "expected 0 <= least <= most in every component")
@@ -255,7 +256,7 @@ def _rows(table: Table, robot: Robot) -> list[tuple]:
         signed = signs == "signed"
         least = least / np.where(scale > 0, scale, 1.0)
     else:
-        scale = table.array("deviation", (6,), "rad, m")
+        scale = table.array("deviation", (6,), "rad, m", largest=_LARGEST)
         if kind == "truncated":
             most = table.array("most", (6,), "rad, m")
             if not (most[scale > 0] > 0).all():

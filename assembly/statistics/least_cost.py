@@ -104,7 +104,10 @@ def _planes(work: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
     size = shares[places, draws]
     relative = slopes / t  # slopes of the share with every tolerance
     if work.plan.asked_yield < 1.0:
-        relative = (relative / size[:, None]).mean(axis=0, keepdims=True)
+        # a draw that uses up nothing of a limit says nothing of its slopes
+        used = size > 0
+        relative = (relative[used] / size[used, None]).sum(axis=0, keepdims=True)
+        relative /= max(1, len(size))
         size = np.ones(1)
     right = 1.0 - size + relative @ t
     return [a / b for a, b in zip(relative, right, strict=True) if b > 0]
