@@ -264,6 +264,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
+        before = set(Path().glob("*.part"))  # of one that was killed
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)
@@ -277,7 +278,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             right = {0, -way, 130} | ({2} if small else set())  # it may be full before
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
-        counts["half-written"] += check(case, counts, status)
+        counts["half-written"] += check(case, counts, status, before)
         if status == 0 or (case.header and not path.exists() and standing):
             standing = 0  # all is done, or the last of it was
             counts["half-written"] += any(not Path(n).exists() for n in case.files)
@@ -311,12 +312,13 @@ def solved_again(case: Case, standing: int) -> int:
     return max(0, counted(SOLVED) - (case.points - standing)) if case.header else 0
 
 
-def check(case: Case, counts: Counter, status: int) -> int:
+def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
     """Files that are not whole; politely stopped, nothing may be beside one."""
     found = 0
     for path in Path().glob("out.*"):
         if path.suffix == ".part":
-            counts["left beside a file"] += status in {2, 130}
+            left = status in {2, 130} and path not in before
+            counts["left beside a file"] += left
         elif path.suffix != ".journal":
             found += path.read_bytes() != case.files[path.name]
     return found
