@@ -251,6 +251,7 @@ def test_the_commands_from_files_to_figures(tmp_path):
     [
         (["--errors", "none.toml"], "none.toml: cannot be read"),
         (["--errors", "errors.toml", "--play", "mots"], "--play"),
+        (["--errors", "errors.toml", "--seed", "9" * 40], "--seed"),
         (["--errors", "errors.toml", "--limit", "enrgy=3"], 'quantity "enrgy"'),
         (["--errors", "errors.toml", "--limit", "margin=1", "--no-margins"],
          "the margins were left out"),

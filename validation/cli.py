@@ -48,7 +48,7 @@ ErrorsOption = Annotated[
         help="How errors are distributed (TOML); one draw of them, not the robot's own."
     ),
 ]
-SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0)]
+SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0, max=2**63 - 1)]
 
 
 def _with_errors(posture: "Posture", errors: Path | None, seed: int) -> "Posture":

@@ -45,7 +45,7 @@ def statistics(
     load: LoadOption = None,
     gravity: GravityOption = None,
     draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
-    seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     play: PlayOption = "worst",
     limit: Annotated[
         list[str] | None,

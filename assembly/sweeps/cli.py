@@ -54,7 +54,7 @@ def sweep(
     draws: Annotated[
         int | None, typer.Option(help="Draws of errors at each point.", min=1)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 1,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     reading: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
