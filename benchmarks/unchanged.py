@@ -1,0 +1,167 @@
+"""Stores what every command answers, and tells what a change of the code did to it.
+
+    python benchmarks/unchanged.py store FOLDER     # before the change
+    python benchmarks/unchanged.py compare FOLDER   # after it
+
+For all built-in robots with errors drawn once (and stored as robot files): ``solve``,
+``zone``, ``exact``, ``error``; and one sweep, one statistics run, one diagnosis, one
+cross-check, one K_E by finite elements and one by beams.  Numbers are equal to the last
+bit or the largest relative difference is printed; times and versions are left out.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+ROBOTS = ("irsbot2", "four_bar", "five_bar", "3rrr", "hexapod", "delta", "orthoglide")
+# what differs from one run to the next
+PASSING = ("seconds", "time", "version", "digest", "created", "path", "file")
+
+
+def questions(folder: Path) -> dict[str, list[str]]:
+    """The words after ``forcefit`` for each answer; NetCDF goes to ``{out}``."""
+    asked = {
+        f"{command} {robot}": ["assembly", command, str(folder / f"{robot}.toml")]
+        for robot in (*ROBOTS, "arm6")
+        for command in ("solve", "zone", "exact", "error")
+    }
+    irsbot2 = str(folder / "irsbot2.toml")
+    asked["loaded"] = [
+        "assembly",
+        "solve",
+        irsbot2,
+        "--load",
+        "fz=-50",
+        "--gravity",
+        "z=-9.81",
+    ]
+    errors = str(ROOT / "examples" / "irsbot2_errors.toml")
+    grid = "tx=-0.2:0.2:0.1,tz=-0.5"
+    asked["sweep"] = ["assembly", "sweep", irsbot2, "--grid", grid, "-o", "{out}.nc"]
+    asked["statistics"] = [
+        "assembly", "statistics", "irsbot2", "--errors", errors, "--draws", "200",
+        "--limit", "energy=5",
+    ]  # fmt: skip
+    campaign = str(ROOT / "tests" / "campaigns" / "self_weight")
+    asked["diagnosis"] = ["validation", "diagnose", campaign]
+    asked["cross-check"] = [
+        "validation", "crosscheck", "irsbot2", "--errors", errors,
+        "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5,0.25",
+    ]  # fmt: skip
+    material = ["--young", "6e10", "--poisson", "0.3"]
+    asked["K_E of a mesh"] = [
+        "stiffness", "fea", str(ROOT / "meshes" / "distal_plain.stl"),
+        "--base", "z=0", "--tip", "z=0.452", *material,
+    ]  # fmt: skip
+    beam = ["--length", "0.452", "--radius", "0.04"]
+    asked["K_E of a beam"] = ["stiffness", "beam", *beam, *material]
+    return asked
+
+
+def write_robots(folder: Path) -> None:
+    """Each built-in robot with one draw of errors, as a robot file."""
+    from assembly.robot_file import write_robot
+    from assembly.robots import load_robot
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (*ROBOTS, "arm6"):
+        robot = load_robot(name)
+        rng = np.random.default_rng(sum(map(ord, name)))
+        scales = [1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 5e-4]
+        errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * scales
+        write_robot(robot.with_errors(errors), folder / f"{name}.toml")
+
+
+def answer(words: list[str]) -> Any:
+    """The exit status and the JSON of one command, and of its data set the arrays."""
+    with tempfile.TemporaryDirectory() as scratch:
+        out = str(Path(scratch) / "out")
+        words = [word.replace("{out}", out) for word in words]
+        command = [sys.executable, "-m", "forcefit", *words, "--json", f"{out}.json"]
+        ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+        results: dict[str, Any] = {"status": ran.returncode}
+        if Path(f"{out}.json").exists():
+            results["json"] = json.loads(Path(f"{out}.json").read_text())
+        else:
+            results["message"] = ran.stderr.strip().splitlines()[-1:]
+        if Path(f"{out}.nc").exists():
+            import xarray as xr
+
+            with xr.open_dataset(f"{out}.nc", engine="h5netcdf") as dataset:
+                for name, array in dataset.load().data_vars.items():
+                    if array.dtype.kind in "fi":
+                        results[f"nc {name}"] = array.values.tolist()
+        return results
+
+
+def leaves(value: Any, place: str = "") -> dict[str, Any]:
+    """Numbers, words and truths with their places."""
+    if isinstance(value, dict):
+        kept = {k: v for k, v in value.items() if not any(p in k for p in PASSING)}
+        return {
+            k: v
+            for key, one in kept.items()
+            for k, v in leaves(one, f"{place}/{key}").items()
+        }
+    if isinstance(value, list):
+        return {
+            k: v
+            for i, one in enumerate(value)
+            for k, v in leaves(one, f"{place}/{i}").items()
+        }
+    return {place: value}
+
+
+def difference(was: Any, now: Any) -> tuple[float, list[str]]:
+    """Largest difference, relative to its array's largest number; what else differs."""
+    before, after = leaves(was), leaves(now)
+    gap, other = 0.0, sorted(before.keys() ^ after.keys())
+    sizes: dict[str, float] = {}
+    for place, one in before.items():
+        if isinstance(one, float) and np.isfinite(one):
+            array = "/".join(p for p in place.split("/") if not p.isdigit())
+            sizes[array] = max(sizes.get(array, 0.0), abs(one))
+    for place in before.keys() & after.keys():
+        one, two = before[place], after[place]
+        if one == two or (one != one and two != two):
+            continue
+        if isinstance(one, float | int) and isinstance(two, float | int):
+            array = "/".join(p for p in place.split("/") if not p.isdigit())
+            gap = max(gap, abs(one - two) / (sizes.get(array) or 1.0))
+        else:
+            other.append(f"{place}: {one} -> {two}")
+    return gap, other
+
+
+def main() -> None:
+    """Store, or compare: exit status 1 where more than rounding differs."""
+    what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
+    if what == "store":
+        write_robots(folder)
+        stored = {name: answer(words) for name, words in questions(folder).items()}
+        (folder / "answers.json").write_text(json.dumps(stored))
+        print(f"{len(stored)} answers in {folder}")
+        return
+    stored = json.loads((folder / "answers.json").read_text())
+    worst = 0
+    for name, words in questions(folder).items():
+        # as JSON writes it, NaN and infinity included
+        now = json.loads(json.dumps(answer(words)))
+        gap, other = difference(stored[name], now)
+        count = len(leaves(stored[name]))
+        told = "the same" if not gap and not other else f"differs by {gap:.1e}"
+        print(f"{name:24} {count:6} values  {told}")
+        for line in other[:5]:
+            print(f"    {line[:120]}")
+        worst |= gap > 1e-9 or bool(other)
+    sys.exit(worst)
+
+
+if __name__ == "__main__":
+    main()
