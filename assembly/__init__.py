@@ -1,1 +1,4 @@
-"""What pose, what energy, what error?"""
+"""What pose, what energy, what error?  The virtual-joint model of the manipulator.
+
+Begin at ``model/robot.py``, then ``kinematics/posture.py`` and ``linear/energy.py``.
+"""

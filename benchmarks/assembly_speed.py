@@ -7,7 +7,7 @@ grid of its workspace.  Printed, in this order:
 - microseconds of processor time a point for the energy (22), at the errors times 1 and
   times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``assembly.solvers.reduction`` (reduction counted), ``solve_assembly`` and
+  reduced by ``assembly.linear.reduction`` (reduction counted), ``solve_assembly`` and
   ``minimise_energies`` (linearisation, reduction and certificate counted), with the
   ratio of cvxpy's DPP to each;
 - the same for the margin (21), both readings;
@@ -37,16 +37,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
-from assembly import reference
-from assembly.closure import linearise, virtual_joints
-from assembly.energy import solve_assembly
-from assembly.posture import Posture, place_many
-from assembly.robot import Robot
+from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.kinematics.posture import Posture, place_many
+from assembly.linear import reference
+from assembly.linear.closure import linearise, virtual_joints
+from assembly.linear.energy import solve_assembly
+from assembly.linear.reduction import reduce_problem
+from assembly.linear.zone import zone_margin
+from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from assembly.solvers import conic
-from assembly.solvers.batch import minimise_energies, zone_margins
-from assembly.solvers.reduction import reduce_problem
-from assembly.zone import zone_margin
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways

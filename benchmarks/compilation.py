@@ -17,7 +17,7 @@ with tempfile.TemporaryDirectory() as cache:
     os.environ["NUMBA_CACHE_DIR"] = cache  # before numba is imported
     from numba.core import event
 
-    from assembly.warm_up import warm_up
+    from forcefit.commands.warm_up import warm_up
 
     seconds: Counter[str] = Counter()
 

@@ -10,12 +10,12 @@ import time
 import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot, three_rrr
 
-from assembly.energy import solve_assembly
-from assembly.posture import Posture, home_posture, place_robot
-from stiffness.reading import BadInput
+from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from forcefit.inputs.table import BadInput
+from validation.crosscheck.pair import exact_answer
+from validation.crosscheck.playcheck import FLOOR_ENERGY
 from validation.multibody.simulation import SimulationFailed, simulate_assembly
-from validation.pair import exact_answer
-from validation.playcheck import FLOOR_ENERGY
 
 
 def posture(name: str, seed: int) -> Posture:

@@ -7,7 +7,7 @@ planar 3-RRR, which in space is overconstrained six-fold.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
 
 PLAY = Clearance(radial=2e-5, axial=2e-5, tilt=5e-4)

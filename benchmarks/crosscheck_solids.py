@@ -9,9 +9,9 @@ from pathlib import Path
 
 from crosscheck_robots import papers_robot
 
-from assembly.posture import place_robot
-from assembly.robot import MeshLink
-from validation.crosscheck import crosscheck
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import MeshLink
+from validation.crosscheck.crosscheck import crosscheck
 
 SURFACE = Path(__file__).parents[1] / "meshes" / "distal_plain.stl"
 

@@ -20,15 +20,14 @@ import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
 
-from assembly.links import link_compliance
-from assembly.posture import Posture, place_robot
-from assembly.robot import BeamLink, MeshLink, Robot
+from assembly.kinematics.posture import Posture, place_robot
+from assembly.linear.zone import zone_margin
+from assembly.model.links import link_compliance
+from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.solvers.conic import SolverFailed
-from assembly.zone import zone_margin
-from validation.bushes import bush_margin
-from validation.multibody.simulation import without_clearance
-from validation.round_bars import bar_compliance, bar_stiffness, with_bars
-from validation.validity import (
+from validation.assumptions.bushes import bush_margin
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
+from validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
@@ -36,6 +35,7 @@ from validation.validity import (
     link_cost,
     spread_cost,
 )
+from validation.multibody.simulation import without_clearance
 
 FORKS = Path(__file__).parents[1] / "meshes" / "distal_forks.stl"
 REFERENCES = Path(__file__).with_name("stiffness_references.json")

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 from random_robots import draw_robot
 
-from stiffness.reading import BadInput
-from stiffness.writing import plain, write_json
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import plain, write_json
 from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.design import Design
 from validation.synthetic.draws import NotApplicable, draw_effect

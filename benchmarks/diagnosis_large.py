@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from random_robots import draw_robot
 
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import diagnose
 from validation.multibody.simulation import SimulationFailed

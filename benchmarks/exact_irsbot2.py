@@ -11,9 +11,9 @@ import time
 
 import numpy as np
 
-from assembly.energy import solve_assembly
-from assembly.exact import solve_exact
-from assembly.posture import place_many
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import place_many
+from assembly.linear.energy import solve_assembly
 from assembly.solvers.conic import SolverFailed
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 

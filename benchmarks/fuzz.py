@@ -30,14 +30,14 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
+from forcefit.commands import app as command
+
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import typer  # noqa: E402
 from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
-
-import forcefit  # noqa: E402
 
 LIMIT = 2.0  # [s] of processor time, then Ctrl-C
 PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
@@ -65,7 +65,7 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
                 if p.param_type_name == "option"
             ]
 
-    walk(typer.main.get_command(forcefit.app), ())
+    walk(typer.main.get_command(command.app), ())
     return found
 
 
@@ -121,7 +121,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
     )
     sys.argv = ["forcefit", *words]
     try:
-        forcefit.main()
+        command.main()
         status: object = 0
     except SystemExit as done:
         status = done.code

@@ -14,10 +14,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from assembly.energy import solve_assembly
-from assembly.pose_error import bound_pose_error
-from assembly.posture import place_robot
-from assembly.zone import zone_margin
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
 from tests.robots_for_tests import NUMBERS, irsbot2_with, paper_frame
 
 

@@ -34,6 +34,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
+from forcefit.commands import app as command
+
 sys.path.insert(0, str(Path(__file__).parent.parent))
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 
@@ -41,7 +43,6 @@ import numpy as np
 
 import assembly.statistics.monte_carlo as monte_carlo
 import assembly.sweeps.sweep as sweeps
-import forcefit
 from assembly.sweeps import journal
 
 ERRORS = """
@@ -148,7 +149,7 @@ def start(words: list[str], limit: int | None = None) -> int:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
         sys.stdout, sys.stderr = io.StringIO(), said
         sys.argv = ["forcefit", *words]
-        forcefit.main()
+        command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
         if status not in {0, 130} and limit is None:  # or it may not write that
@@ -169,7 +170,7 @@ def run_here(words: list[str]) -> None:
         io.StringIO(),
     )
     try:
-        forcefit.main()
+        command.main()
     except SystemExit as done:
         if done.code:
             raise RuntimeError(

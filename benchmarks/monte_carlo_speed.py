@@ -5,7 +5,7 @@ up to a share of the paper's.  Printed for each share: how many of the draws cos
 nothing, how many were certified and how many went the slower road; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-road of :mod:`assembly.solvers.batch`, which reduces each draw anew, per second of
+road of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second of
 processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.draw import frames_named
-from assembly.posture import place_robot
+from assembly.batch.many_draws import OnePosture, prepare_energies
+from assembly.batch.many_postures import minimise_energies
+from assembly.kinematics.posture import place_robot
+from assembly.model.error_distributions import ErrorSources
+from assembly.model.random_errors import frames_named
 from assembly.robots import load_robot
-from assembly.solvers.batch import minimise_energies
-from assembly.solvers.one_posture import OnePosture, prepare_energies
-from assembly.statistics.distributions import ErrorSources
 
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]

@@ -35,14 +35,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly.energy import solve_assembly
-from assembly.pose_error import bound_pose_error
-from assembly.posture import Posture, place_many
-from assembly.reach import Reach, reachable_screws
-from assembly.robot import Robot
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.kinematics.posture import Posture, place_many
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import Reach, reachable_screws
+from assembly.model.robot import Robot
 from assembly.solvers import conic
-from assembly.solvers.batch import minimise_energies, zone_margins
-from assembly.solvers.batch_error import bound_pose_errors
 from benchmarks.assembly_speed import paper_robot, workspace
 
 SAMPLE = 6  # points of the other solvers

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import home_posture
-from assembly.robot import BeamLink, Frame, Robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import delta, five_bar, hexapod, three_rrr
 from assembly.robots.delta import Parameters as Delta
 from assembly.robots.five_bar import Parameters as FiveBar

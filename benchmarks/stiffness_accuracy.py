@@ -17,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffness.compare import entries_that_matter
-from stiffness.condense import KINDS
-from stiffness.fea import Budget, first_mesh, interface_center
-from stiffness.interface import parse_interface
-from stiffness.level import estimated_error, finer, solve_level
+from stiffness.fem.adaptive_step import estimated_error, finer, solve_level
+from stiffness.fem.condensation import KINDS
+from stiffness.fem.fea import Budget, first_mesh, interface_center
+from stiffness.fem.material import Material
 from stiffness.link import scaled
-from stiffness.material import Material
+from stiffness.report.compare import entries_that_matter
 from stiffness.screws import SCREW
-from stiffness.surface import read_surface
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.surface import read_surface
 
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
 MESHES = Path(__file__).parents[1] / "meshes"

@@ -24,11 +24,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fea import solve_link
-from stiffness.interface import parse_interface
+from stiffness.fem.fea import solve_link
+from stiffness.fem.material import Material
 from stiffness.link import scaled
-from stiffness.material import Material
-from stiffness.surface import Surface, check_surface
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.surface import Surface, check_surface
 
 YOUNG = 60e9  # [Pa]; errors do not depend on it
 SEEDS = {"training": 1, "test": 2}  # of the factors in stiffness/, and of their judges

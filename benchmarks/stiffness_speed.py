@@ -62,9 +62,9 @@ def true_error(name, K):
 
 def given(name):
     """A link's surface, interfaces and their centres."""
-    from stiffness.fea import interface_center
-    from stiffness.interface import parse_interface
-    from stiffness.surface import read_surface
+    from stiffness.fem.fea import interface_center
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
 
     surface = read_surface(HERE.parent / "meshes" / f"{name}.stl")
     faces = [parse_interface(text) for text in INTERFACES[name]]
@@ -74,9 +74,9 @@ def given(name):
 
 def ours(name, accuracy):
     """From the surface to K, and the last mesh once more by itself."""
-    from stiffness.condense import condense
-    from stiffness.fea import Budget, solve_link
-    from stiffness.material import Material
+    from stiffness.fem.condensation import condense
+    from stiffness.fem.fea import Budget, solve_link
+    from stiffness.fem.material import Material
 
     surface, faces, _ = given(name)
     with tempfile.TemporaryDirectory() as folder:
@@ -109,12 +109,12 @@ def ngsolve(name, order, layers, finer):
 
 def quadratic(name, accuracy):
     """Quadratic elements whose true error is as asked, their K and unknowns."""
-    from stiffness.condense import condense
-    from stiffness.elements import isoparametric
-    from stiffness.fea import Budget, first_mesh
-    from stiffness.layers import ENDS, layered
-    from stiffness.level import finer, solve_level
-    from stiffness.material import Material
+    from stiffness.fem.adaptive_step import finer, solve_level
+    from stiffness.fem.condensation import condense
+    from stiffness.fem.elements import isoparametric
+    from stiffness.fem.fea import Budget, first_mesh
+    from stiffness.fem.material import Material
+    from stiffness.mesh.edge_grading import ENDS, layered
 
     surface, faces, centers = given(name)
     solid = first_mesh(surface, *faces, Budget())

@@ -18,11 +18,12 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from distributed import Client, LocalCluster
 
+from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
-from assembly.statistics.distributions import tolerance_sources
 from assembly.sweeps.cluster import cluster_solver
+from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import Sweep, run_sweep, solve_here
+from assembly.sweeps.sweep import run_sweep, solve_here
 from assembly.sweeps.targets import grid_targets, parse_grid
 
 

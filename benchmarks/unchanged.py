@@ -66,7 +66,7 @@ def questions(folder: Path) -> dict[str, list[str]]:
 
 def write_robots(folder: Path) -> None:
     """Each built-in robot with one draw of errors, as a robot file."""
-    from assembly.robot_file import write_robot
+    from assembly.files.robot_file import write_robot
     from assembly.robots import load_robot
 
     folder.mkdir(parents=True, exist_ok=True)

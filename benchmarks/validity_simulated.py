@@ -10,12 +10,12 @@ from collections.abc import Iterator
 import numpy as np
 from crosscheck_validity import GRAVITY, POSES, free_of_errors, postures
 
-from assembly.energy import solve_assembly
-from assembly.exact import solve_exact
-from assembly.posture import Posture
-from validation.bushes import solve_bushes
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import solve_assembly
+from validation.assumptions.bushes import solve_bushes
+from validation.assumptions.spread_weight import energy_between_ends
 from validation.multibody.simulation import simulate_assembly
-from validation.spread_weight import energy_between_ends
 
 ELEMENTS = 8  # of each beam under its weight
 

@@ -2,9 +2,9 @@
 
 The paper's geometric errors delta l, one small screw at every frame, are unknown all at
 once, beside effects given by their signatures and one base pose for each group of rows.
-The model is the library's own: frames from ``assembly.nominal``, paths M_j (eq. 14) as
-derivatives, forces from ``assembly.load``.  After each step the errors found are
-built into the frames, so the answer is that of the finite geometry.
+The model is the library's own: frames from ``assembly.kinematics.nominal``, paths M_j
+(eq. 14) as derivatives, forces from ``assembly.linear.load``.  After each step the
+errors found are built into the frames, so the answer is that of the finite geometry.
 
 Frames are over-complete (some errors cannot be told apart), so every unknown has a
 prior spread; what the data do not see stays at zero.
@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions, as_declared
-from assembly.load import forces_on, weights
-from assembly.nominal import Target, follow
-from assembly.posture import Posture, home_posture
-from assembly.robot import Robot
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import Posture, home_posture
+from assembly.linear.load import forces_on, weights
+from assembly.measurement.conditions import Conditions, as_declared
+from assembly.model.robot import Robot
 from examples.campaign_folder import base_pose
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map, transform
 from validation.campaign.campaign import Campaign

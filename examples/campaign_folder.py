@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import Robot
-from assembly.robot_file import write_robot
-from stiffness.reading import BadInput
+from assembly.files.robot_file import write_robot
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_vector
 from validation.campaign.campaign import READING
 

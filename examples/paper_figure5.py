@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.draw import SIGNS, ErrorDraw, draw_errors, frames_named
-from assembly.robot_file import write_robot
+from assembly.files.robot_file import write_robot
+from assembly.linear.zone import ASSEMBLABLE
+from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.robots import load_robot
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.request import ask_sweep
 from assembly.sweeps.sweep import run_sweep
-from assembly.zone import ASSEMBLABLE
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
 LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] the paper's section IV

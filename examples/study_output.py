@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.reading import BadInput
-from stiffness.writing import write_json
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import write_json
 
 
 def arguments(doc: str | None, output: str) -> argparse.Namespace:

@@ -1,140 +1,77 @@
-"""The command ``forcefit``: mounts the three folders' commands, plus ``study``."""
+"""forcefit: forced assembly of parallel manipulators, and the proof of each number.
 
-import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+``import forcefit as ff; ff.load_robot("irsbot2")``: every public name, each imported
+when it is first asked for.  Files come in through :mod:`forcefit.inputs`; the commands
+are :mod:`forcefit.commands`.
+"""
 
-import typer
-
-import assembly.cli
-import assembly.statistics.cli  # noqa: F401  adds its commands
-import assembly.sweeps.cli  # noqa: F401  likewise
-import stiffness.cli
-import validation.cli
-from stiffness.message import BadInput, one_line
-from stiffness.writing import write_json
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     __version__: str
 
-app = typer.Typer(
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.add_typer(stiffness.cli.app, name="stiffness", help="How stiff is a link?")
-app.add_typer(assembly.cli.app, name="assembly", help="What pose, energy, error?")
-app.add_typer(validation.cli.app, name="validation", help="Is it true?")
+# where each public name is defined: the whole of the interface
+_OWNERS = {
+    "forcefit.inputs.errors": ("BadInput",),
+    "stiffness.beam.beam": ("beam_compliance",),
+    "stiffness.beam.sections": ("Section", "rectangular_section", "round_section"),
+    "stiffness.fem.fea": ("mesh_link",),
+    "stiffness.link": ("LinkStiffness",),
+    "stiffness.report.library": ("build_library", "look_up", "read_library"),
+    "stiffness.surface.interface": ("Interface", "parse_interface"),
+    "assembly.exact.exact": ("solve_exact",),
+    "assembly.files.robot_file": ("read_robot", "write_robot"),
+    "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
+    "assembly.linear.energy": ("Assembly", "CannotAssemble", "solve_assembly"),
+    "assembly.linear.mobility": ("mobility",),
+    "assembly.linear.pose_error": ("PoseError", "bound_pose_error"),
+    "assembly.linear.zone": ("zone_margin",),
+    "assembly.model.error_distributions": ("read_sources",),
+    "assembly.model.random_errors": ("draw_errors",),
+    "assembly.model.robot": (
+        "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
+    ),
+    "assembly.robots": ("load_robot",),
+    "assembly.statistics.allocation": ("allocate",),
+    "assembly.statistics.experiment": ("Experiment",),
+    "assembly.statistics.monte_carlo": ("run_draws",),
+    "assembly.statistics.summary": ("summarise",),
+    "assembly.sweeps.dataset": ("open_dataset",),
+    "assembly.sweeps.maps": ("figure_of",),
+    "assembly.sweeps.request": ("ask_sweep",),
+    "assembly.sweeps.sweep": ("run_sweep", "sweep_in_memory"),
+    "validation.assumptions.validity": ("check_validity",),
+    "validation.campaign.campaign_file": ("read_campaign",),
+    "validation.crosscheck.crosscheck": ("crosscheck",),
+    "validation.diagnosis.diagnose": ("diagnose",),
+    "validation.inspection.inspection": ("inspect_campaign",),
+    "validation.study.report": ("write_study",),
+    "validation.study.study": ("read_study", "run_study"),
+}  # fmt: skip
+_OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
+__all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
-def __getattr__(name: str) -> str:
-    """``__version__``: of the installed package, whose one source is pyproject.toml."""
-    if name != "__version__":
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first asked for."""
+    if name == "__version__":
+        return _version()
+    if name not in _OWNER_OF:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
+    return getattr(import_module(_OWNER_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    """The public names and nothing else."""
+    return __all__
+
+
+def _version() -> str:
+    """Of the installed package, whose one source is pyproject.toml."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
         return version("forcefit")
     except PackageNotFoundError:
         return "0+not.installed"
-
-
-def _print_version(asked: bool) -> None:
-    """What ``--version`` does."""
-    if asked:
-        print(f"forcefit {__getattr__('__version__')}")
-        raise typer.Exit
-
-
-@app.callback()
-def forcefit(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version",
-            is_eager=True,
-            callback=_print_version,
-            help="Show the version and exit.",
-        ),
-    ] = False,
-) -> None:
-    """Forced assembly of parallel manipulators, and the proof of each number.
-
-    Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
-    """
-
-
-@app.command()
-def study(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Study file (TOML).")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder to write.")
-    ] = None,
-    json: assembly.cli.JsonOption = None,
-) -> None:
-    """Run the main job: every check of a study file, one report.
-
-    Writes report.html (self-contained), results.json and results.nc into the folder
-    the study file names.  Exit status 1 if a check fails.
-    """
-    from validation.report import results_table, verdict, write_study
-    from validation.study import read_study, run_study
-
-    asked = read_study(file, output)
-    with assembly.cli.progress_bars() as update:
-        results = run_study(asked, update)
-        update("report", 0, 1)
-        folder = write_study(results)
-        update("report", 1, 1)
-    write_json(results_table(results), json)
-    if json != "-":
-        print(verdict(results))
-        print(f"report: {folder / 'report.html'}")
-    if not results.passed:
-        raise typer.Exit(1)
-
-
-@app.command("warm-up")
-def warm_up() -> None:
-    """Compile the solvers now, once on this machine.
-
-    What is compiled is kept on disk; later commands then start at once.
-    """
-    from assembly.warm_up import warm_up as compile_all
-
-    with assembly.cli.progress_bars() as update:
-        compile_all(lambda done, total: update("compiling", done, total))
-
-
-def main() -> None:
-    """Run the command; bad input is one line on stderr and exit status 2."""
-    try:
-        status = app(prog_name="forcefit", standalone_mode=False)
-    except BadInput as error:
-        sys.exit(_complain(str(error), 2))
-    except (KeyboardInterrupt, typer.Abort):
-        sys.exit(_complain("interrupted", 130))
-    except SystemError as error:
-        # Ctrl-C while compiled code ran
-        if not isinstance(error.__cause__, KeyboardInterrupt):
-            raise
-        sys.exit(_complain("interrupted", 130))
-    except typer.Exit as error:
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
-    except Exception as error:
-        # an option misspelt or missing: the parser's own kind of error
-        if not hasattr(error, "format_message"):
-            raise
-        sys.exit(_complain(error.format_message(), 2))
-    sys.exit(status if isinstance(status, int) else 0)
-
-
-def _complain(message: str, status: int) -> int:
-    """A message on stderr, if there is one: help without a command has none."""
-    if message:
-        print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
-    return status

@@ -1,5 +1,5 @@
-"""``python -m forcefit`` is the command ``forcefit``."""
+"""``python -m forcefit``: the same command."""
 
-from forcefit import main
+from forcefit.commands.app import main
 
 main()

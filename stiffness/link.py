@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffness.display import Figures, html_table, numbers, short_repr
-from stiffness.reading import BadInput
+from forcefit.inputs.display import Figures, html_table, numbers, short_repr
+from forcefit.inputs.table import BadInput
 
 
 @dataclass(frozen=True, eq=False)

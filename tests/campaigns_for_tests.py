@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assembly.robot import Frame, Robot
+from assembly.model.robot import Frame, Robot
 from validation.campaign.campaign import Campaign
 
 ARM = """

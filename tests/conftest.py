@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-import forcefit
+from forcefit.commands import app as command
 
 # The same cases in every run: a commit is judged by what it changes, not by luck.
 # Others, on purpose: pytest --hypothesis-profile search --hypothesis-seed N
@@ -42,7 +42,7 @@ def run(capsys, monkeypatch):
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
         with pytest.raises(SystemExit) as done:
-            forcefit.main()
+            command.main()
         out, err = capsys.readouterr()
         return done.value.code, out, err
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 

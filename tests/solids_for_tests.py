@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial import Delaunay
 
-from stiffness.mesh import Solid, boundary_faces
-from stiffness.shapes import Cone, Plane
+from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.surface.primitives import Cone, Plane
 
 Z = np.array([0.0, 0.0, 1.0])
 

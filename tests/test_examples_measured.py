@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.conditions import as_declared
-from assembly.energy import solve_assembly
-from assembly.posture import Posture, place_many, place_robot
-from assembly.robot_file import read_robot
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import Posture, place_many, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.measurement.conditions import as_declared
 from assembly.robots.arm6 import arm6
 from examples.calibration import Rows, calibrate, joint_springs, residuals, rows_of
 from examples.campaign_folder import base_pose, data_folder
@@ -28,7 +28,7 @@ from examples.ipa_ur10.convert import last_direction
 from examples.study_output import rms_position
 from examples.voron import study as voron
 from examples.voron.convert import convert as convert_voron
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 from stiffness.screws import transform
 from validation.campaign.campaign_file import read_campaign
 

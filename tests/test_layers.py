@@ -12,27 +12,27 @@ BELOW = {"stiffness": (), "assembly": ("stiffness",)}
 BELOW["validation"] = ("stiffness", "assembly")
 SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
-    "pytetwild": ("stiffness/mesh_worker.py",),
-    "skfem": ("stiffness/lagrange.py",),
-    "meshio": ("stiffness/surface_files.py",),
-    "gmsh": ("stiffness/surface_files.py",),
+    "pytetwild": ("stiffness/mesh/mesh_worker.py",),
+    "skfem": ("stiffness/mesh/lagrange.py",),
+    "meshio": ("stiffness/surface/surface_files.py",),
+    "gmsh": ("stiffness/surface/surface_files.py",),
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
-        "assembly/reference.py",
+        "assembly/linear/reference.py",
         "assembly/statistics/cutting_planes.py",
         "assembly/statistics/worst_case.py",
     ),
     "exudyn": (SIMULATION,),
-    "numba": ("assembly/compiled.py", "assembly/solvers/cone_solvers.py"),
+    "numba": ("assembly/solvers/compiled.py", "assembly/solvers/cone_solvers.py"),
     "xarray": (
         "assembly/sweeps/dataset.py",
         "assembly/statistics/monte_carlo.py",
         "assembly/statistics/importance_table.py",
         "assembly/statistics/tolerances.py",
-        "assembly/tables.py",
-        "stiffness/library.py",
+        "assembly/report/tables.py",
+        "stiffness/report/library.py",
     ),
-    "pandas": ("assembly/tables.py",),
+    "pandas": ("assembly/report/tables.py",),
     "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
 }
@@ -78,7 +78,7 @@ def wrong_imports(tree):
                 foreign = top in OWNERS and file not in OWNERS[top]
                 alone = file.startswith(INDEPENDENT)
                 shared = alone and top == "assembly"
-                shared = shared and not f"{module}.".startswith("assembly.robot.")
+                shared = shared and not f"{module}.".startswith("assembly.model.robot.")
                 if upward or foreign or shared:
                     yield f"{file} imports {module}"
 
@@ -120,7 +120,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(module):
 def test_nothing_heavy_is_imported_with_all_files_at_once():
     files = [path for folder in BELOW for path in (ROOT / folder).rglob("*.py")]
     # files of compiled loops, and the one that says how they are compiled
-    loops = {"assembly.compiled.kernel", "numba.njit"}
+    loops = {"assembly.solvers.compiled.kernel", "numba.njit"}
     files = [path for path in files if not loops & set(imports(path))]
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
     modules = sorted(name.removesuffix(".__init__") for name in names)
@@ -147,7 +147,7 @@ def test_a_command_imports_only_what_it_uses(words, left_out):
 import sys, forcefit
 sys.argv = ["forcefit", *{words.split()}]
 try:
-    forcefit.main()
+    command.main()
 except SystemExit as done:
     assert not done.code
 """
@@ -158,15 +158,23 @@ except SystemExit as done:
 @pytest.mark.parametrize(
     ("file", "code", "message"),
     [
-        ("stiffness/a.py", "import assembly.robot", "imports assembly.robot"),
+        (
+            "stiffness/a.py",
+            "import assembly.model.robot",
+            "imports assembly.model.robot",
+        ),
         ("stiffness/a.py", "def f():\n import forcefit", "imports forcefit"),
         ("assembly/a.py", "from validation import x", "imports validation.x"),
         ("assembly/a/b.py", "import xarray as xr", "imports xarray"),
-        ("assembly/zone.py", "def f():\n from clarabel import y", "imports clarabel.y"),
+        (
+            "assembly/linear/zone.py",
+            "def f():\n from clarabel import y",
+            "imports clarabel.y",
+        ),
         ("validation/a.py", "if x:\n import cvxpy", "imports cvxpy"),
         (
             "validation/multibody/simulation.py",
-            "import assembly.energy",
+            "import assembly.linear.energy",
             "imports assembly.en",
         ),
         (
@@ -176,7 +184,7 @@ except SystemExit as done:
         ),
         (
             "validation/multibody/simulation.py",
-            "import assembly.robot_file",
+            "import assembly.files.robot_file",
             "imports assembly.r",
         ),
     ],

@@ -1,1 +1,4 @@
-"""Is it true?"""
+"""Is it true?  Against a multibody simulation, and against measured data.
+
+Begin at ``crosscheck/crosscheck.py`` and at ``diagnosis/diagnose.py``.
+"""

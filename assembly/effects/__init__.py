@@ -6,7 +6,6 @@ become elastic first; the foundation adds a frame, so it comes last.
 
 from collections.abc import Mapping
 
-from assembly.conditions import Conditions
 from assembly.effects.base_compliance import BASE_COMPLIANCE
 from assembly.effects.contact_stiffening import CONTACT_STIFFENING
 from assembly.effects.drift import DRIFT
@@ -23,6 +22,7 @@ from assembly.effects.modulus_scale import MODULUS_SCALE
 from assembly.effects.registration import REGISTRATION
 from assembly.effects.self_weight import SELF_WEIGHT
 from assembly.effects.thermal_expansion import THERMAL_EXPANSION
+from assembly.measurement.conditions import Conditions
 
 LIBRARY: dict[str, Effect] = {
     effect.name: effect

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.conditions import Conditions, as_declared
 from assembly.effects import LIBRARY, apply_effects
-from assembly.posture import Posture
-from assembly.predict import assemble_row, read
-from assembly.robot import Robot
-from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput, nearest
+from assembly.kinematics.posture import Posture
+from assembly.measurement.conditions import Conditions, as_declared
+from assembly.measurement.predict import assemble_row, read
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, nearest
 
 COVARIATES = ("temperature", "time", "approach")
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import RIGID, Effect, Unknown, Values
-from assembly.robot import BASE, Frame, Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import BASE, Frame, Robot
 from stiffness.screws import SCREW
 
 FOUNDATION = "foundation"

@@ -6,10 +6,10 @@ Sources:
 
 from dataclasses import replace
 
-from assembly.conditions import Conditions, ContactLaw
 from assembly.effects.effect import RIGID, Effect, Unknown, Values
 from assembly.effects.places import drives, own_unit
-from assembly.robot import Robot
+from assembly.measurement.conditions import Conditions, ContactLaw
+from assembly.model.robot import Robot
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from assembly.conditions import Conditions
-from assembly.robot import Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 
 Values = Mapping[str, float]
 RIGID = 1e-12  # [rad/(N m), m/N] a fitted compliance below it is none

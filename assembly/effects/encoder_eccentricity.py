@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import own_screw, turning_drives, with_screws
-from assembly.robot import Robot
+from assembly.effects.places import turning_drives, with_screws
+from assembly.measurement.conditions import Conditions
+from assembly.model.links import own_screw
+from assembly.model.robot import Robot
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

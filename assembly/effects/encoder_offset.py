@@ -1,8 +1,9 @@
 """The actual coordinate of a drive is the command plus a constant."""
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import drives, own_screw, own_unit, with_screws
+from assembly.effects.places import drives, own_unit, with_screws
+from assembly.measurement.conditions import Conditions
+from assembly.model.links import own_screw
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

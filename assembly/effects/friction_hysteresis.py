@@ -1,10 +1,10 @@
 """Friction holds an elastic joint back: torque -tau x direction of approach."""
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import own_screw, own_unit, with_screws
-from assembly.links import joint_compliances
-from assembly.robot import Frame, Robot
+from assembly.effects.places import own_unit, with_screws
+from assembly.measurement.conditions import Conditions
+from assembly.model.links import joint_compliances, own_screw
+from assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import with_frame
-from assembly.robot import Clearance, Frame, Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
 _TIGHT = 1e-9  # [m, rad] play below it is none

@@ -1,8 +1,8 @@
 """A body is longer than declared, along its beam's axis."""
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import beams, lengthening, with_screws
+from assembly.measurement.conditions import Conditions
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

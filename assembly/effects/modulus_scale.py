@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import with_frame
-from assembly.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 
 
 def links(robot: Robot) -> tuple[str, ...]:

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions
-from assembly.robot import BeamLink, Frame, Robot, beam_axis
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
@@ -51,11 +51,6 @@ def with_frame(
     return replace(here, robot=replace(here.robot, frames=tuple(frames)))
 
 
-def own_screw(frame: Frame) -> NDArray:
-    """(6,) unit screw of a joint's own motion."""
-    return np.eye(6)[frame.own_axis]
-
-
 def lengthening(frame: Frame) -> NDArray:
     """(6,) screw of a beam that is longer by 1 m, in the frame's axes."""
     return np.concatenate([np.zeros(3), beam_axis(frame)[1]])
@@ -65,30 +60,3 @@ def own_unit(robot: Robot, parameter: str) -> str:
     """``rad`` or ``m``, as the joint moves whose name begins a parameter's."""
     frame = next(f for f in robot.frames if f.name == parameter)
     return "m" if frame.joint == "prismatic" else "rad"
-
-
-def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """K_B with a spring put in series in one direction of its own axes.
-
-    Args:
-        stiffness: (6, 6) declared, None if rigid.
-        row: which direction.
-        compliance: [rad/(N m) or m/N] of the spring added.
-
-    Returns:
-        (6, 6) with ``inf`` on the diagonal where rigid.
-    """
-    K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
-    free = np.diag(K) == 0.0  # in series with what resists nothing, nothing resists
-    K[free, free] = np.inf
-    soft = np.isfinite(np.diag(K))
-    C = np.zeros((6, 6))
-    if soft.any():
-        C[np.ix_(soft, soft)] = np.linalg.inv(K[np.ix_(soft, soft)])
-    C[row, row] += compliance
-    soft = np.diag(C) > 0
-    K = np.diag(np.full(6, np.inf))
-    if soft.any():
-        K[np.ix_(soft, soft)] = np.linalg.inv(C[np.ix_(soft, soft)])
-    K[free], K[:, free] = 0.0, 0.0
-    return K

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.robot import Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 from stiffness.screws import SCREW, rotation_matrix, rotation_vector
 
 BASE = tuple(f"base.{axis.lower()}" for axis in SCREW)

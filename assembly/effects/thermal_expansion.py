@@ -1,9 +1,9 @@
 """A body lengthens along its beam's axis by coefficient x length x temperature."""
 
-from assembly.conditions import Conditions
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import beams, lengthening, with_screws
-from assembly.robot import beam_axis
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import beam_axis
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:

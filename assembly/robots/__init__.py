@@ -4,8 +4,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from assembly.robot import Robot
-from assembly.robot_file import read_robot
+from assembly.files.robot_file import read_robot
+from assembly.model.robot import Robot
 from assembly.robots.arm6 import arm6
 from assembly.robots.delta import delta
 from assembly.robots.five_bar import five_bar
@@ -14,7 +14,7 @@ from assembly.robots.hexapod import hexapod
 from assembly.robots.irsbot2 import irsbot2
 from assembly.robots.orthoglide import orthoglide
 from assembly.robots.three_rrr import three_rrr
-from stiffness.reading import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest
 
 BUILT_IN: dict[str, Callable[[], Robot]] = {
     "irsbot2": irsbot2,

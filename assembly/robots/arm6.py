@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import drive_stiffness
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 

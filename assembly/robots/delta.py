@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import (
     Placed,
     at,
@@ -25,7 +25,7 @@ from assembly.robots.placing import (
     drive_stiffness,
     place_frames,
 )
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] of the legs
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import Placed, pin, place_frames
 from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 

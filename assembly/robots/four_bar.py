@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BASE, BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import Placed, drive_stiffness, pin, place_frames
 from assembly.robots.planar import direction, in_plane
 

@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
-from stiffness.reading import BadInput
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_vector, transform
 
 NAMES = (

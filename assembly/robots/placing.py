@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import BASE, Clearance, Frame, Link
+from assembly.model.robot import BASE, Clearance, Frame, Link
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 Placed = tuple[Frame, NDArray]  # a frame, and (4, 4) where it stands at home

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import BeamLink, Clearance, Frame
+from assembly.model.robot import BeamLink, Clearance, Frame
 from assembly.robots.placing import Placed, at, drive_stiffness, pin
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import Placed, pin, place_frames
 from assembly.robots.planar import (
     PlanarLeg,

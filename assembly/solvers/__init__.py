@@ -1,1 +1,5 @@
-"""The compiled and conic programmes under problems (21), (22) and (27)."""
+"""Cone programmes and polytopes over plain arrays; they know no robot.
+
+Begin at ``conic.py``, the second-order cone programme, and ``interior.py``, its
+compiled interior-point method.
+"""

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from numba import cfunc, types
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
 from assembly.solvers import dual_newton, interior
+from assembly.solvers.compiled import kernel
 
 _row = types.Array(types.float64, 1, "C")
 # read only: what may be written to is accepted, too

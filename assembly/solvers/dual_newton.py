@@ -21,7 +21,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 from assembly.solvers.interior import LANES, add, dot, layers_of
 
 FAST = {"contract", "reassoc"}

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box

@@ -11,7 +11,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 from assembly.solvers.interior import LANES
 
 _CLEAR = 10.0  # a pivot within this factor of the threshold decides nothing

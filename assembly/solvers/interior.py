@@ -20,7 +20,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the way to the nearest cone's boundary

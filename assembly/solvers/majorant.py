@@ -20,7 +20,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 
 _LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
 _SWEEPS, _STEPS = 12, 60

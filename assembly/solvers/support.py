@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 from assembly.solvers.vectors import divide, inner
 

@@ -7,7 +7,7 @@ and its error messages into every kernel that calls it: ten times the code to co
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 
 
 @kernel

@@ -1,1 +1,4 @@
-"""What errors drawn at random do, and how loose tolerances may be."""
+"""What errors drawn at random do, and how loose tolerances may be.
+
+Begin at ``monte_carlo.py``; ``allocation.py`` for tolerances.
+"""

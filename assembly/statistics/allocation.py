@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import Posture
+from assembly.kinematics.posture import Posture
 from assembly.statistics.cutting_planes import cut_planes
 from assembly.statistics.least_cost import least_cost
 from assembly.statistics.replay import Replay
 from assembly.statistics.requirement import SCALING, TRAINING, Plan, Requirement
 from assembly.statistics.scaling import draw_samples, fit, with_worst_corners
 from assembly.statistics.verification import prove_worst, verify
-from stiffness.display import html_table, short_repr
+from forcefit.inputs.display import html_table, short_repr
 
 if TYPE_CHECKING:
     import xarray

@@ -7,7 +7,7 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 
 FLIGHT = 2.0  # mean time; Dikin's ellipsoid is crossed in about one
 MIRRORS = 20  # of a flight at most, for each dimension

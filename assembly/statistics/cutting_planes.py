@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 _TOLERANCE = 1e-3  # of a limit: by how much the programme may still violate it
 _MOST_CUTS = 200

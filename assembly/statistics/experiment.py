@@ -7,17 +7,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.link_stress import peak_stresses, stressed_links
-from assembly.posture import Posture
-from assembly.solvers.one_posture import OnePosture, prepare_energies
-from assembly.solvers.posture_margins import PostureMargins, prepare_margins
-from assembly.solvers.reduction import FreeMotion
-from assembly.statistics.distributions import ErrorSources, draw_generator
+from assembly.batch.many_draws import OnePosture, prepare_energies
+from assembly.batch.many_margins import PostureMargins, prepare_margins
+from assembly.kinematics.posture import Posture
+from assembly.linear.reduction import FreeMotion
+from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.play import PLAY, PLAY_STREAM, settle_play
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.worst_play import PRECISION, bound_play
-from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
 
 _SHARP = 1e-3  # of a limit: how far apart the bounds may be that it judges
 _READINGS = {"margin": "rigid", "margin_free": "free"}

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.distributions import ErrorSources
+from assembly.model.error_distributions import ErrorSources
 
-STREAMS = (2, 3)  # of random numbers, see assembly.statistics.distributions
+STREAMS = (2, 3)  # of random numbers, see assembly.model.error_distributions
 MOST_FAILED = 0.05  # of the draws compared: more, and errors depend on each other
 _RESAMPLES = 200
 

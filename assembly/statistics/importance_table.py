@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.distributions import ErrorSources
+from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import (
     MOST_FAILED,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.posture import POSE
+from assembly.kinematics.posture import POSE
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
     importance_dataset,

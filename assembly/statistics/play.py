@@ -17,9 +17,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.nominal import size_of
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.kinematics.nominal import size_of
 from assembly.solvers.conic import minimise_energy
-from assembly.solvers.one_posture import Draws, OnePosture
 
 PLAY = {
     "worst": "play anywhere it may be, the largest pose errors count, eq. (27)",
@@ -37,7 +38,7 @@ def settle_play(
 
     Args:
         one: the posture.
-        found: of :meth:`~assembly.solvers.one_posture.OnePosture.solve`, k draws.
+        found: of :meth:`~assembly.batch.many_draws.OnePosture.solve`, k draws.
         play: one of :data:`PLAY` but the worst.
         generators: of random numbers, one for each draw.
 

@@ -7,7 +7,7 @@ import numpy as np
 from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import POSE_ERRORS
-from stiffness.message import plot_label
+from forcefit.inputs.errors import plot_label
 
 if TYPE_CHECKING:
     import xarray

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.compiled import kernel
+from assembly.solvers.compiled import kernel
 from assembly.solvers.cone_solvers import ConeSolvers
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stiffness.reading import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest
 
 UNITS = {
     "energy": "J", "duality_gap": "J", "margin": "1", "margin_free": "1",

@@ -7,16 +7,16 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import Posture
-from assembly.solvers.posture_margins import prepare_margins
-from assembly.statistics.distributions import ErrorSources
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.posture import Posture
+from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.replay import Replay
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import Corner, worst_corner
-from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")

@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.link_stress import LinkStress, stressed_links
-from assembly.solvers.one_posture import Draws, OnePosture
-from assembly.solvers.posture_margins import PostureMargins
-from assembly.statistics.distributions import ErrorSources, draw_generator
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.batch.many_margins import PostureMargins
+from assembly.model.error_distributions import ErrorSources, draw_generator
+from assembly.model.link_stress import LinkStress, stressed_links
 from assembly.statistics.play import PLAY_STREAM, settle_play
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from assembly.statistics.estimates import proportion
 from assembly.statistics.requirement import Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 _FINE = 1e-4  # of the limits: how nearly the samples are to use them up
 _MOST_TRIALS = 80

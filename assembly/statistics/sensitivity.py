@@ -22,11 +22,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.energy import Assembly
-from assembly.posture import Posture
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_PLAY
-from assembly.solvers.one_posture import Draws, OnePosture
-from assembly.solvers.posture_margins import prepare_margins
 
 _USED_UP = 1e-7  # of the largest pull on any cone: less is none
 _RANK = 1e-10  # of the equations: directions that nothing decides stay
@@ -65,7 +66,7 @@ def margin_slopes(posture: Posture, compliant: str = "free") -> MarginSlopes:
 
     Args:
         posture: where the robot stands, with its errors.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.zone`.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
         The margin and its slopes.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.zone import ASSEMBLABLE
 from assembly.statistics.estimates import (
     bracketed,
     mean,
@@ -21,8 +22,7 @@ from assembly.statistics.estimates import (
 from assembly.statistics.importance_table import importance_report, importance_text
 from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
-from assembly.zone import ASSEMBLABLE
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 if TYPE_CHECKING:
     import xarray

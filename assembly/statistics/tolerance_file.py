@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.draw import frames_named
-from assembly.robot import Robot
-from assembly.statistics.distributions import KINDS, ErrorSources
+from assembly.model.error_distributions import KINDS, ErrorSources
+from assembly.model.random_errors import frames_named
+from assembly.model.robot import Robot
 from assembly.statistics.quantities import UNITS, limit_names
 from assembly.statistics.requirement import COSTS, Plan
-from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
+from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
 _LOOSEST = (0.1, 0.01)  # [rad, m] beyond which no small screw is small

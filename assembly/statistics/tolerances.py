@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.energy import CannotAssemble, solve_assembly
-from assembly.posture import Posture, place_many
-from assembly.robot import Robot
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.posture import Posture, place_many
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.posture_margins import prepare_margins
 from assembly.statistics.allocation import Allocation
 from assembly.statistics.play import PLAY
 from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
 from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 from stiffness.screws import SCREW
 
 if TYPE_CHECKING:

@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.energy import CannotAssemble, solve_assembly
-from assembly.pose_error import bound_pose_error
-from assembly.solvers.batch_error import bound_pose_errors
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.one_posture import Draws, OnePosture
-from assembly.solvers.reduction import FreeMotion
 from assembly.statistics.play import free_starts, loaded_clearances, play_rows
 from assembly.statistics.quantities import POSE_ERRORS
 

@@ -21,10 +21,11 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from assembly.sweeps.identity import program_hash, question_hash
+from assembly.sweeps.plan import Sweep
 from assembly.sweeps.points import Found, Points, solve_points
 from assembly.sweeps.quantities import Question
-from assembly.sweeps.sweep import Solver, Sweep
-from stiffness.reading import BadInput
+from assembly.sweeps.sweep import Solver
+from forcefit.inputs.table import BadInput
 
 if TYPE_CHECKING:
     import distributed

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from assembly.sweeps.netcdf import forgive_damaged_files, netcdf_file
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
-from stiffness.reading import BadInput
-from stiffness.writing import NETCDF, check_writable
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import NETCDF, check_writable
 
 if TYPE_CHECKING:
     import xarray
 
-    from assembly.sweeps.sweep import Sweep
+    from assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
 # what commands write, and an attribute that none but such a file has
@@ -228,7 +228,7 @@ def check_dataset(path: Path | str, what: str) -> None:
         what: one of :data:`KINDS`; a file that stands there already must be one.
 
     Raises:
-        BadInput: it is not, or as :func:`stiffness.writing.check_writable`.
+        BadInput: it is not, or as :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)
     path = Path(path)

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 import assembly
+import forcefit.inputs
 import stiffness
-from assembly.robot import LibraryLink, MeshLink, Robot
-from assembly.robot_file import robot_table
+from assembly.files.robot_file import robot_table
+from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 
 # what computes with our sources: another version may round otherwise
 _LIBRARIES = ("numpy", "scipy", "numba", "clarabel")
@@ -29,7 +30,7 @@ _LIBRARIES = ("numpy", "scipy", "numba", "clarabel")
 def program_hash() -> str:
     """SHA-256 of the sources that numbers come from and of the libraries they use."""
     digest = hashlib.sha256()
-    for package in (stiffness, assembly):
+    for package in (forcefit.inputs, stiffness, assembly):
         root = Path(str(package.__file__)).parent
         for path in sorted(root.rglob("*.py")):
             # line ends are the checkout's
@@ -53,7 +54,7 @@ def robot_hash(robot: Robot) -> str:
     Raises:
         BadInput: a mesh or a library cannot be read.
     """
-    from stiffness.library import read_compliance
+    from stiffness.report.library import read_compliance
 
     table = robot_table(robot)
     table.pop("description", None)

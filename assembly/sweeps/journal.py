@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.locking import locked_file
-from stiffness.reading import BadInput
-from stiffness.writing import check_writable, unwritable
+from forcefit.inputs.locking import locked_file
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import check_writable, unwritable
 
 _MAGIC = b"FFB2"
 _HEAD = struct.Struct("<4sQQI")  # magic, block, length of what follows, check sum

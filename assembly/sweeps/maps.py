@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.message import plot_label
-from stiffness.reading import BadInput, nearest, quoted
+from forcefit.inputs.errors import plot_label
+from forcefit.inputs.table import BadInput, nearest, quoted
 
 if TYPE_CHECKING:
     import xarray

@@ -6,8 +6,8 @@ from io import SEEK_SET, FileIO
 from pathlib import Path
 from typing import Any
 
-from stiffness.reading import BadInput
-from stiffness.writing import unwritable, whole_file
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import unwritable, whole_file
 
 
 @contextmanager

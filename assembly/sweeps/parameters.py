@@ -14,9 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from assembly.robot import Robot
-from assembly.robot_file import declared_robot, robot_of, robot_table
-from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
+from assembly.files.robot_file import declared_robot, robot_of, robot_table
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
 _ABSENT: dict[str, Any] = {  # what a frame says that does not mention it

@@ -11,18 +11,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.closure import closure_signs
-from assembly.conditions import Conditions
-from assembly.energy import CannotAssemble
-from assembly.exact import ExactAssembly
-from assembly.link_stress import peak_stresses
-from assembly.nominal import size_of
-from assembly.posture import Posture, place_many, place_many_joints
-from assembly.predict import assemble_row, read
-from assembly.robot import Robot
-from assembly.singularity import KINDS, find_singularities
-from assembly.solvers.batch import Energies, minimise_energies, zone_margins
-from assembly.solvers.batch_error import bound_pose_errors
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.batch.many_postures import Energies, minimise_energies, zone_margins
+from assembly.exact.exact import ExactAssembly
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.linear.closure import closure_signs
+from assembly.linear.energy import CannotAssemble
+from assembly.linear.singularity import KINDS, find_singularities
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import assemble_row, read
+from assembly.model.link_stress import peak_stresses
+from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.sweeps.situations import (
@@ -31,7 +31,7 @@ from assembly.sweeps.situations import (
     situations,
 )
 from assembly.sweeps.targets import goals_of, of_joints
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 from stiffness.screws import screw_map
 
 _PAGE = 256  # draws made at a time

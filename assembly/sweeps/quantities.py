@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.link_stress import stressed_names
-from assembly.robot import Robot
-from assembly.singularity import KINDS
+from assembly.linear.singularity import KINDS
+from assembly.model.link_stress import stressed_names
+from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design
-from stiffness.display import html_table, short_repr
+from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
-    from assembly.statistics.distributions import ErrorSources
+    from assembly.model.error_distributions import ErrorSources
 
 STATUSES = (
     "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot",

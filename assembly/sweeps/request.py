@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects.acting import check_covariates
-from assembly.link_stress import stressed_names
-from assembly.posture import home_posture
-from assembly.reach import READINGS
-from assembly.robot import Robot
+from assembly.kinematics.posture import home_posture
+from assembly.linear.reach import READINGS
+from assembly.model.link_stress import stressed_names
+from assembly.model.robot import Robot
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
+from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.situations import is_loaded, situations
-from assembly.sweeps.sweep import Sweep
 from assembly.sweeps.targets import (
     Targets,
     grid_targets,
@@ -25,7 +25,7 @@ from assembly.sweeps.targets import (
     parse_values,
     read_targets,
 )
-from stiffness.reading import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest
 from stiffness.screws import WRENCH
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def ask_sweep(
     if (errors is None) != (draws is None):
         raise BadInput("sweep: --errors and --draws go together; found one of them")
     if errors is not None:
-        from assembly.statistics.distributions import read_sources
+        from assembly.model.error_distributions import read_sources
 
         sources = read_sources(errors, machine)
         drawn = [path for path in varied if ".geometric_error." in path]

@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.closure import virtual_joints
-from assembly.conditions import Conditions, as_declared
+from assembly.batch.many_postures import Energies
 from assembly.effects import apply_effects
-from assembly.energy import Assembly, CannotAssemble
-from assembly.posture import Posture
-from assembly.predict import assemble_row
-from assembly.results import failure_status
-from assembly.robot import Robot
-from assembly.solvers.batch import Energies
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import virtual_joints
+from assembly.linear.energy import Assembly, CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.measurement.conditions import Conditions, as_declared
+from assembly.measurement.predict import assemble_row
+from assembly.model.robot import Robot
+from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
-from assembly.solvers.reduction import FreeMotion
 from assembly.sweeps.quantities import Question
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import POSE
-from assembly.robot import Robot
-from stiffness.reading import BadInput, nearest, quoted, read_text
+from assembly.kinematics.posture import POSE
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, nearest, quoted, read_text
 
 LARGEST_GRID = 10_000_000  # points; more is a slip of the step
 _JOINT = "q."
@@ -58,7 +58,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """What :mod:`assembly.posture` is asked for.
+    """What :mod:`assembly.kinematics.posture` is asked for.
 
     Args:
         names: of the components, of one kind.

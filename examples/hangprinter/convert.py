@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.robot import Frame, Robot
+from assembly.model.robot import Frame, Robot
 from assembly.robots.placing import (
     Placed,
     at,

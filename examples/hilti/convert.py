@@ -11,16 +11,16 @@ import numpy as np
 import yaml  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from assembly.nominal import Target, follow
-from assembly.posture import home_posture
-from assembly.robot import Frame, Robot
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
 from examples.campaign_folder import (
     base_pose,
     data_folder,
     deviation_columns,
     write_campaign,
 )
-from stiffness.reading import BadInput
+from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 NAME = "hilti_trailblazer"

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.nominal import Target, follow
-from assembly.posture import home_posture
-from assembly.robot import Frame, Robot
-from assembly.robot_file import read_robot
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
 from examples.campaign_folder import (
     base_pose,
     data_folder,

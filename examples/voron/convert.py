@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot_file import read_robot
+from assembly.files.robot_file import read_robot
 from examples.campaign_folder import data_folder, write_campaign
 
 NAME = "voron_frame_expansion"

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.conditions import as_declared
 from assembly.effects import apply_effects
-from assembly.posture import Posture
-from assembly.predict import predict
+from assembly.kinematics.posture import Posture
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
 from examples.study_output import arguments, print_table, run, write_results
 from examples.voron.convert import convert
 from validation.campaign.campaign import Campaign

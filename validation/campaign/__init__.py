@@ -1,1 +1,4 @@
-"""Measured data: what is there, and what can it tell?"""
+"""Measured data: the folder, read and checked.
+
+Begin at ``campaign.py``; the format is ``docs/campaigns.md``.
+"""

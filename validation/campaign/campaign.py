@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import Robot
-from stiffness.display import Figures, html_table, short_repr
+from assembly.model.robot import Robot
+from forcefit.inputs.display import Figures, html_table, short_repr
 
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, as in a screw
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import POSE, Posture, place_many, place_many_joints
-from assembly.robot import Robot
-from assembly.robot_file import read_robot
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
+from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN
-from stiffness.reading import BadInput, Table, nearest, quoted, read_toml
+from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from validation.campaign.campaign import LOAD, READING, Campaign, number_rows
 from validation.campaign.checks import check_commands, check_readings, extent_of
 from validation.campaign.dialect import read_dialect

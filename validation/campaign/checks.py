@@ -7,8 +7,8 @@ gives, with the mistake that usually makes it.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import POSE
-from assembly.robot import Robot
+from assembly.kinematics.posture import POSE
+from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.measurement_table import MeasurementTable
 

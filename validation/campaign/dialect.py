@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from stiffness.reading import Table
+from forcefit.inputs.table import Table
 
 DELIMITERS = {",": ",", ";": ";", "tab": "\t"}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?", re.ASCII)

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.posture import POSE
-from assembly.robot import Robot
-from stiffness.message import BadInput, describe, nearest, printable, quoted
-from stiffness.reading import read_text
+from assembly.kinematics.posture import POSE
+from assembly.model.robot import Robot
+from forcefit.inputs.errors import BadInput, describe, nearest, printable, quoted
+from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
 

@@ -1,5 +1,4 @@
-"""From measured deviations to the effect that a declared model lacks."""
+"""From measured deviations to the effect that a declared model lacks.
 
-from validation.diagnosis.diagnose import Diagnosis, Errors, diagnose
-
-__all__ = ["Diagnosis", "Errors", "diagnose"]
+Begin at ``diagnose.py``: candidates, scores, verdict, errors before and after.
+"""

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions
 from assembly.effects import apply_effects
-from assembly.predict import predict, with_finite_motions, with_second_order
-from stiffness.display import Figures, html_table, short_repr
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict, with_finite_motions, with_second_order
+from forcefit.inputs.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis
@@ -71,7 +71,8 @@ class Diagnosis:
         outliers: (R,) bool, rows left out of everything.
         conditions: the campaign's, as declared and registered.
         open: (R,) bool, rows where play leaves the pose free, in the declared model or
-            with the effects found; see :class:`assembly.predict.Prediction`.
+            with the effects found; see
+            :class:`assembly.measurement.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
         residual_after: (R, 6) [rad, m] reading minus the best set's model.
         screen: the scored hypotheses of the last round.

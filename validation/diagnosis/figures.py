@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.message import plot_label
-from validation.campaign.separability import Separability, compare_signatures
+from forcefit.inputs.errors import plot_label
 from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.separability import Separability, compare_signatures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions
 from assembly.effects import LIBRARY
 from assembly.effects.effect import Effect, Unknown, at
-from assembly.robot import Robot
+from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 
 _MOST_UNKNOWNS = 24  # of one effect; beyond it frames share them, kind by kind
 

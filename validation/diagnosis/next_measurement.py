@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions
 from assembly.effects import apply_effects
-from assembly.posture import POSE, place_many_joints, pose_components
-from assembly.predict import predict
+from assembly.kinematics.posture import POSE, place_many_joints, pose_components
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.refit import Fit
 

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.conditions import Conditions
 from assembly.effects import apply_effects
 from assembly.effects.effect import Values
-from assembly.predict import predict, settle
-from assembly.robot import Robot
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict, settle
+from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.scoring import FINITE

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.registration import BASE
-from assembly.predict import predict, with_second_order
-from stiffness.reading import BadInput
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict, with_second_order
+from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot

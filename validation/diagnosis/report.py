@@ -3,8 +3,7 @@
 import html
 from pathlib import Path
 
-from stiffness.writing import write_text
-from validation.campaign.text import open_text
+from forcefit.inputs.writing import write_text
 from validation.diagnosis.diagnose import Diagnosis
 from validation.diagnosis.figures import (
     confounding_figure,
@@ -17,6 +16,7 @@ from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import calibration_text, effects, sentence
 from validation.diagnosis.verdict import Calibration
 from validation.html import html_figure, html_page, html_table
+from validation.inspection.text import open_text
 
 
 def write_report(

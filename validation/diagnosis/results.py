@@ -5,11 +5,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from assembly.effects import LIBRARY
-from assembly.robot import Robot
-from validation.campaign.text import open_text
+from assembly.model.robot import Robot
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.verdict import Calibration
+from validation.inspection.text import open_text
 
 
 def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.closure import virtual_joints
-from assembly.conditions import Conditions
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
-from assembly.predict import settle
+from assembly.linear.closure import virtual_joints
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import settle
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.conditions import Conditions, as_declared
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
-from assembly.posture import Posture
-from assembly.predict import predict
-from assembly.resting_play import taken_up
+from assembly.kinematics.posture import Posture
+from assembly.measurement.conditions import Conditions, as_declared
+from assembly.measurement.predict import predict
+from assembly.measurement.settled_clearance import taken_up
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 

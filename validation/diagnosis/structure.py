@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f
 
-from assembly.conditions import Conditions
-from assembly.posture import POSE, pose_components
+from assembly.kinematics.posture import POSE, pose_components
+from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import LOAD, Campaign
 
 _SEEN = 1e-3  # probability by chance below which something is reported

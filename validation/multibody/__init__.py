@@ -1,1 +1,4 @@
-"""The forced assembly in Exudyn: shares nothing with the model but the robot."""
+"""The forced assembly in Exudyn: shares nothing with the model but the robot.
+
+Begin at ``simulation.py``.
+"""

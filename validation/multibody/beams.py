@@ -1,6 +1,7 @@
 """Beams of the simulation: where they run, and what their sections resist.
 
-Written apart from :mod:`assembly.links`: only a section's own constants are shared.
+Written apart from :mod:`assembly.model.links`: only a section's own constants are
+shared.
 """
 
 import math
@@ -9,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink, Frame
-from stiffness.beam import declared_section
+from assembly.model.robot import BeamLink, Frame
+from stiffness.beam.sections import declared_section
 from validation.multibody.motion import turned
 
 

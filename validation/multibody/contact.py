@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from assembly.robot import Clearance, Frame
+from assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m]

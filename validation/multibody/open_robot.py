@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BASE, BeamLink, Frame, MatrixLink, Robot
-from stiffness.beam import declared_section
-from stiffness.reading import BadInput
+from assembly.model.robot import BASE, BeamLink, Frame, MatrixLink, Robot
+from forcefit.inputs.table import BadInput
+from stiffness.beam.sections import declared_section
 from validation.multibody.beams import beam_axes, beam_span, element_stiffness
 from validation.multibody.contact import joint_play
 from validation.multibody.exudyn_model import Model

@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import Robot
-from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
 from validation.multibody.exudyn_model import HELD, Model, Stiffness
 from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
 from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed

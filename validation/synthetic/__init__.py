@@ -1,1 +1,4 @@
-"""Measured data of a simulated machine with hidden effects."""
+"""Measured data of a simulated machine with hidden effects.
+
+Begin at ``generator.py``.
+"""

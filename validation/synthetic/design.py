@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.nominal import Target, follow
-from assembly.posture import POSE, home_posture, pose_components
-from assembly.robot import Robot
-from stiffness.reading import BadInput
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import POSE, home_posture, pose_components
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput
 from validation.synthetic.effects import Row
 
 TEMPERATURES = ("swing", "around", "constant")

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from assembly.robot import BeamLink, Frame, Robot
-from stiffness.reading import BadInput
+from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.inputs.table import BadInput
 from validation.synthetic.effects import LIBRARY, SCREW, Parameters, own_compliance
 from validation.synthetic.machine import Hidden
 from validation.synthetic.outside import OUTSIDE

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BASE, BeamLink, Clearance, Frame, Robot
+from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
 from validation.multibody.beams import beam_span
 from validation.multibody.motion import placement, turned
 

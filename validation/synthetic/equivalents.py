@@ -17,7 +17,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BeamLink
+from assembly.model.robot import BeamLink
 from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden, simulate_readings

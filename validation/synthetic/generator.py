@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.robot import Robot
-from assembly.robot_file import write_robot
-from stiffness.display import html_table, short_repr
-from stiffness.reading import BadInput
-from stiffness.writing import check_writable, unwritable, write_text
+from assembly.files.robot_file import write_robot
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import check_writable, unwritable, write_text
 from validation.synthetic.design import Design, Plan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row

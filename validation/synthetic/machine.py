@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import BASE, Frame, Robot
+from assembly.model.robot import BASE, Frame, Robot
 from validation.multibody.motion import placement, shifted, turn_of
 from validation.synthetic.effects import (
     CHANGES,

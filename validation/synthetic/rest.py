@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.robot import Robot
+from assembly.model.robot import Robot
 from validation.multibody.simulation import (
     SimulationFailed,
     simulate_assembly,

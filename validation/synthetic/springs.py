@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.links import link_compliance
-from assembly.robot import BeamLink, Frame, Robot
-from stiffness.beam import declared_section
+from assembly.model.links import link_compliance
+from assembly.model.robot import BeamLink, Frame, Robot
+from stiffness.beam.sections import declared_section
 from validation.multibody.beams import beam_span
 from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.effects import Machine, Rest

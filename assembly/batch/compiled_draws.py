@@ -1,0 +1,196 @@
+"""Problem (22) for many right sides h at one posture, compiled.
+
+The reduction is shared: only h differs from draw to draw.  The certificate is that of
+:mod:`assembly.batch.compiled_energy`, from matrices made once of the columns before
+any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.compiled_energy import small_answer
+from assembly.batch.compiled_zone import farthest, turn_first
+from assembly.solvers.compiled import kernel
+from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.vectors import copy, fill, inner
+
+SOLVED, UNCERTIFIED = range(2)
+_STOP = 1e-2
+_PROJECTIONS, _INWARDS = 30, 0.8
+_MARGIN_GAP = 1e-8  # as in assembly.batch.compiled_zone
+
+
+@kernel
+def least_energies(
+    solvers: ConeSolvers, Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
+    cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
+    energy: NDArray, bound: NDArray, road: NDArray,
+) -> None:  # fmt: skip
+    """Minimise |G u + h|^2 / 2 for every row of h.
+
+    Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
+        Gt: (nu, r) columns of G as rows [sqrt(2 J)].
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        h: (k, r) [sqrt(2 J)].
+        inverse: (nu, r) pseudoinverse of G.
+        cones: (nu, r) how y pulls each clearance, before any elimination.
+        gram: (r, r) the springs' complementary energy is y.gram y / 2.
+        slip: [per size of y] how much the free motions may gain by rounding.
+        u: (k, nu) to fill: clearances in units of their cones.
+        y: (k, r) to fill: multipliers, scaled to the best proof.
+        energy: (k,) to fill [J].
+        bound: (k,) to fill [J], certified lower bound.
+        road: (k,) to fill: SOLVED or UNCERTIFIED.
+    """
+    nu, r = Gt.shape
+    norm = 0.0
+    for c in range(nu):
+        here = 0.0
+        for i in range(r):
+            here += Gt[c, i] * Gt[c, i]
+        norm = max(norm, np.sqrt(here))
+    own, right = np.empty(nu), np.empty(r)
+    G = np.empty((nu, r))
+    answer = np.empty(r)
+    for point in range(len(h)):
+        size = 0.0
+        for i in range(r):
+            size += h[point, i] * h[point, i]
+        without = 0.5 * size
+        size = max(np.sqrt(size), norm)
+        fill(own, 0.0)
+        copy(h[point], answer)
+        if nu and without > 0.0 and _within(Gt, starts, h[point], inverse, own):
+            fill(answer, 0.0)
+        elif nu and without > 0.0:
+            fill(own, 0.0)
+            for i in range(r):
+                right[i] = h[point, i] / size
+                for c in range(nu):
+                    G[c, i] = Gt[c, i] / size
+            absolute = _STOP * GAP_WITHOUT_PLAY * without / (size * size)
+            small_answer(solvers, G, right, starts, _STOP * GAP, absolute, own, answer)
+            for i in range(r):
+                answer[i] *= size
+        total = 0.0
+        for i in range(r):
+            v = h[point, i]
+            for c in range(nu):
+                v += Gt[c, i] * own[c]
+            total += v * v
+        for c in range(nu):
+            u[point, c] = own[c]
+        energy[point] = 0.5 * total
+        worth, cost, pull_size = 0.0, 0.0, 0.0
+        for i in range(r):
+            worth += h[point, i] * answer[i]
+            pull_size += answer[i] * answer[i]
+            for l in range(r):
+                cost += answer[i] * gram[i, l] * answer[l]
+        worth -= slip * np.sqrt(pull_size)
+        for c in range(len(starts) - 1):
+            reach = 0.0
+            for a in range(starts[c], starts[c + 1]):
+                pull = 0.0
+                for i in range(r):
+                    pull += cones[a, i] * answer[i]
+                reach += pull * pull
+            worth -= np.sqrt(reach)
+        # any multiple of y is as good a proof: the best one, zero inside a zone
+        factor = max(0.0, worth) / cost if cost > 0.0 else 0.0
+        bound[point] = 0.5 * factor * factor * cost
+        for i in range(r):
+            y[point, i] = factor * answer[i]
+        allowed = GAP * energy[point] + GAP_WITHOUT_PLAY * without
+        # written so that a value that is not a number fails
+        fine = energy[point] - bound[point] <= allowed
+        road[point] = SOLVED if fine else UNCERTIFIED
+
+
+@kernel
+def _within(
+    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
+) -> bool:
+    """Look for clearances within their cones with G u = -h: no energy at all."""
+    # y = h may prove that there are none; else project on the cones and that plane
+    nu, r = Gt.shape
+    worth = 0.0
+    for i in range(r):
+        worth += h[i] * h[i]
+    for c in range(len(starts) - 1):
+        reach = 0.0
+        for a in range(starts[c], starts[c + 1]):
+            pull = 0.0
+            for i in range(r):
+                pull += Gt[a, i] * h[i]
+            reach += pull * pull
+        worth -= np.sqrt(reach)
+    if worth > 0.0:
+        return False
+    left = np.empty(r)
+    for _ in range(_PROJECTIONS):
+        for i in range(r):
+            left[i] = h[i]
+            for c in range(nu):
+                left[i] += Gt[c, i] * u[c]
+        for c in range(nu):
+            for i in range(r):
+                u[c] -= inverse[c, i] * left[i]
+        outside = False
+        for c in range(len(starts) - 1):
+            size = 0.0
+            for a in range(starts[c], starts[c + 1]):
+                size += u[a] * u[a]
+            if size > 1.0:
+                outside = True
+                # a little further in, so that an end is reached
+                size = _INWARDS / np.sqrt(size)
+                for a in range(starts[c], starts[c + 1]):
+                    u[a] *= size
+        if not outside:
+            return True
+    return False
+
+
+@kernel
+def least_margins(
+    solvers: ConeSolvers, B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
+    bound: NDArray, pulls: NDArray,
+) -> None:  # fmt: skip
+    """Least t with B u = right, |u_k| <= t, for every row of right.
+
+    Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
+        B: (p, nu) orthonormal rows.
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        right: (k, p).
+        margin: (k,) to fill; not a number where the certificate falls short.
+        bound: (k,) to fill, certified lower bound.
+        pulls: (k, p) to fill: multipliers q that prove it, q.right = bound.
+    """
+    p = len(B)
+    for point in range(len(right)):
+        w = right[point].copy()
+        size = np.sqrt(inner(w, w))
+        fill(pulls[point], 0.0)
+        if not size > 0.0:
+            margin[point], bound[point] = 0.0, 0.0
+            continue
+        own = B.copy()
+        turn_first(own, w, size)
+        u, pull = farthest(solvers, own, starts)
+        reach, most = inner(own[0], u), 0.0
+        for c in range(len(starts) - 1):
+            part = 0.0
+            for i in range(starts[c], starts[c + 1]):
+                part += pull[i] * pull[i]
+            most += np.sqrt(part)
+        margin[point], bound[point] = size / reach, size / most
+        for i in range(p):
+            pulls[point, i] = inner(B[i], pull) / most
+        if not (
+            reach > 0.0 and margin[point] - bound[point] <= _MARGIN_GAP * margin[point]
+        ):
+            margin[point] = np.nan

@@ -1,0 +1,276 @@
+"""Problem (22) without loads, compiled from the frames' poses to the certified answer.
+
+What this road does not cover it hands back, with a code that says why; nothing is
+returned as an answer whose certificate, computed from the wrenches on the problem
+before any elimination, leaves more than the gap asked for.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.compiled_reduction import (
+    Structure,
+    eliminate_springs,
+    free_columns,
+    grouped_springs,
+    largest_spring,
+    least_motions,
+    misfit_of,
+    moved_by,
+    orthogonal_rows,
+    paths_of,
+    rigid_rows,
+    small_problem,
+    spring_rows,
+)
+from assembly.solvers.compiled import kernel
+from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.vectors import copy, divide, inner, into_cones
+
+NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
+_RANK = 1e-10  # as in assembly.linear.reduction, and so is the noise floor
+_NOISE = 1e-12
+_LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
+_STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
+# gap from which Newton's method finishes: of the energy, of that without play
+_NEAR, _NEAR_WITHOUT_PLAY = 1e-8, 1e-9
+_STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
+_SHARP = 1e6  # its first sigma after an interior point, see dual_newton
+
+
+class Answers(NamedTuple):
+    """Rows of arrays filled by :func:`assemble_all`, one row a point.
+
+    Attributes:
+        road: (k,) NEWTON or INTERIOR, or the code of what handed the point back.
+        energy: (k,) [J].
+        bound: (k,) [J] certified lower bound of it.
+        without_play: (k,) [J] energy if every clearance stayed at zero.
+        platform_screw: (k, 6) [rad, m].
+        clearances: (k, nu) in units of their cones.
+        motions: (k, nq) [rad, m].
+        multipliers: (k, 6 closures) of the scaled closures.
+        open: (k,) [rad, lengths] largest component left open in a closure.
+    """
+
+    road: NDArray
+    energy: NDArray
+    bound: NDArray
+    without_play: NDArray
+    platform_screw: NDArray
+    clearances: NDArray
+    motions: NDArray
+    multipliers: NDArray
+    open: NDArray
+
+
+@kernel
+def assemble_all(
+    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: Answers,
+) -> None:  # fmt: skip
+    """Solve every point; see :class:`Answers`.
+
+    Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
+        s: the robot.
+        T: (k, n, 4, 4) frames.
+        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        out: arrays to fill.
+    """
+    for point in range(len(T)):
+        own = errors[point if len(errors) > 1 else 0]
+        tolerance = _RANK + 30.0 * mismatch[point]
+        P = paths_of(T[point], s)
+        closures = s.patterns.shape[1]
+        m, nq = 6 * closures, len(s.free_frame)
+        # free motions: their columns are the rows of F
+        F = free_columns(s, P, m)
+        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+        if free < 0:
+            out.road[point] = RANK
+            continue
+        Z = orthogonal_rows(F, turns, free, m)
+        # springs
+        L = grouped_springs(s, P)
+        Y = spring_rows(s, Z, L)
+        count = len(Z)
+        y_turns, y_diagonal = np.empty(count), np.empty(count)
+        y_order = np.empty(count, np.int64)
+        noise = _NOISE * largest_spring(s, P)
+        rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
+        if rank < 0:
+            out.road[point] = RANK
+            continue
+        eliminate_springs(Z, Y, y_diagonal, y_order, rank)
+        known = misfit_of(s, P, own)
+        if rigid_rows(s, P, Z, rank, known, own, tolerance):
+            out.road[point] = RIGID
+            continue
+        # the small problem in the clearances
+        Gt, h = small_problem(s, P, Z, rank, known)
+        u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
+        road = _minimise(solvers, s, Gt, h, u, v, y)
+        # the way back
+        multipliers = out.multipliers[point]
+        for a in range(m):
+            multipliers[a] = 0.0
+            for i in range(rank):
+                multipliers[a] += Z[i, a] * y[i]
+        for c in range(len(u)):
+            out.clearances[point, c] = u[c]
+        spring = np.zeros(Y.shape[1])
+        copy(v, spring)
+        turn(Y, y_turns, rank, spring)
+        out.energy[point] = 0.5 * inner(v, v)
+        out.without_play[point] = 0.5 * inner(h, h)
+        moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
+        motions = out.motions[point]
+        least_motions(F, turns, diagonal, order, free, moved, motions)
+        out.road[point] = _certify(point, s, P, own, moved, road, out)
+
+
+@kernel
+def _certify(
+    point: int, s: Structure, P: NDArray, errors: NDArray, moved: NDArray, road: int,
+    out: Answers,
+) -> int:  # fmt: skip
+    """The certificate on the problem before elimination, and what the platform does."""
+    m = len(moved)
+    motions, screw = out.motions[point], out.platform_screw[point]
+    for c in range(len(motions)):
+        j, axis = s.free_frame[c], s.free_axis[c]
+        if abs(motions[c]) > s.free_bound[c]:
+            return BOUNDED
+        for a in range(6):
+            step = P[j, axis, a] * motions[c]
+            if s.on_path[j]:
+                screw[a] += step
+            for k in range(m // 6):
+                moved[6 * k + a] += s.patterns[s.pattern_of[j], k] * step
+    for j in range(len(P)):
+        if s.on_path[j]:
+            for axis in range(6):
+                for a in range(6):
+                    screw[a] += P[j, axis, a] * errors[j, axis]
+    for a in range(3, 6):
+        screw[a] *= s.size
+    left, work = 0.0, 0.0
+    for a in range(m):
+        left = max(left, abs(moved[a]))
+        work += abs(moved[a] * out.multipliers[point, a])
+    out.open[point] = left
+    gain, cost = _complementary(s, P, errors, out.multipliers[point], motions)
+    # any multiple of the wrenches is as good a proof: the best one, zero inside a zone
+    factor = max(0.0, gain - work) / cost if cost > 0.0 else 0.0
+    bound = 0.5 * factor * factor * cost
+    for a in range(m):
+        out.multipliers[point, a] *= factor
+    out.bound[point] = bound
+    energy = out.energy[point]
+    allowed = GAP * energy + GAP_WITHOUT_PLAY * out.without_play[point]
+    # written so that a value that is not a number fails
+    if energy - bound <= allowed and left <= _LEFT_OPEN:
+        return road
+    return UNCERTIFIED
+
+
+@kernel
+def _complementary(
+    s: Structure, P: NDArray, errors: NDArray, multipliers: NDArray, motions: NDArray
+) -> tuple[float, float]:
+    """Wrenches times f prove f gain - f^2 cost / 2: (gain, cost)."""
+    # the complementary energy of assembly.linear.energy.Assembly.bound
+    n = len(P)
+    wrenches = np.zeros((n, 6))
+    at_platform = np.zeros(6)
+    total, cost = 0.0, 0.0
+    for j in range(n):
+        for a in range(6):
+            at_platform[a] = 0.0
+        for k in range(s.patterns.shape[1]):
+            sign = s.patterns[s.pattern_of[j], k]
+            if sign != 0.0:
+                for a in range(6):
+                    at_platform[a] += sign * multipliers[6 * k + a]
+        for axis in range(6):
+            for a in range(6):
+                wrenches[j, axis] += P[j, axis, a] * at_platform[a]
+            total -= wrenches[j, axis] * errors[j, axis]
+    for c in range(len(s.springs)):
+        pull = 0.0
+        for axis in range(6):
+            pull += s.springs[c, axis] * wrenches[s.spring_frame[c], axis]
+        cost += pull * pull
+    for c in range(len(s.starts) - 1):
+        size = 0.0
+        for i in range(s.starts[c], s.starts[c + 1]):
+            pull = s.cone_size[i] * wrenches[s.cone_frame[i], s.cone_axis[i]]
+            size += pull * pull
+        total -= np.sqrt(size)
+    for c in range(len(motions)):
+        total -= abs(wrenches[s.free_frame[c], s.free_axis[c]] * motions[c])
+    return total, cost
+
+
+@kernel
+def _minimise(
+    solvers: ConeSolvers, s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray,
+    y: NDArray,
+) -> int:  # fmt: skip
+    """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
+    nu, r = Gt.shape
+    road = NEWTON
+    size = np.sqrt(inner(h, h))
+    if nu == 0 or size == 0.0:
+        copy(h, y)
+        copy(h, v)
+        return road
+    for c in range(nu):
+        size = max(size, np.sqrt(inner(Gt[c], Gt[c])))
+    G, right = np.empty((nu, r)), divide(h, size)
+    for c in range(nu):
+        for i in range(r):
+            G[c, i] = Gt[c, i] / size
+    absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * inner(right, right)
+    road = small_answer(solvers, G, right, s.starts, _STOP * GAP, absolute, u, y)
+    for i in range(r):
+        v[i] = h[i]
+        y[i] *= size
+        for c in range(nu):
+            v[i] += Gt[c, i] * u[c]
+    return road
+
+
+@kernel
+def small_answer(
+    solvers: ConeSolvers, Gt: NDArray, h: NDArray, starts: NDArray, relative: float,
+    absolute: float, u: NDArray, y: NDArray,
+) -> int:  # fmt: skip
+    """Newton alone where all play is used up, else after an interior point."""
+    r, d = len(h), np.zeros(len(u))
+    if solvers.dual_newton(
+        Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
+    ) >= 0:  # fmt: skip
+        return NEWTON
+    G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
+    H = np.zeros((0, len(u)))
+    near = _NEAR_WITHOUT_PLAY * 0.5 * inner(h, h)
+    # at a zone's edge the interior point breaks down early; Newton then takes longer
+    for stop, most, steps in (
+        (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
+    ):  # fmt: skip
+        inside, _, _ = solvers.interior_point(G, h, d, H, none, starts, most, stop)
+        copy(inside, u)
+        into_cones(starts, u)
+        if solvers.dual_newton(
+            Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
+        ) >= 0:  # fmt: skip
+            break
+    return INTERIOR

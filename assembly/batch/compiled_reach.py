@@ -1,0 +1,315 @@
+"""Which platform screws (22) leaves possible, compiled; and how far they reach.
+
+Readings ``frozen`` and ``free`` of (27): deformations stay, unloaded clearances move,
+passive joints follow.  See :mod:`assembly.linear.pose_error` for what is asked, and
+:mod:`assembly.solvers.farthest` for the search.  What hangs on rounding is handed back,
+and a point where a passive joint could pass the bound of its motion.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.compiled_reduction import (
+    Structure,
+    free_columns,
+    least_motions,
+    orthogonal_rows,
+    paths_of,
+    small_problem,
+)
+from assembly.batch.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.solvers.compiled import kernel
+from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.farthest import DONE, advance, begin
+from assembly.solvers.householder import triangulate, turn_all
+from assembly.solvers.interior import LANES
+from assembly.solvers.polytope import empty_polytope
+from assembly.solvers.support import Body
+from assembly.solvers.vectors import copy, into_cones
+
+SOLVED, HANDED_BACK = range(2)
+_RANK = 1e-10  # as in assembly.linear.reduction
+_UNBOUNDED = 1e-8  # as in assembly.linear.pose_error
+_CLEAR = 10.0  # what is within this factor of a threshold decides nothing
+_APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
+
+
+class Loads(NamedTuple):
+    """What (22) says of k points' clearances.
+
+    Attributes:
+        structure: the robot as (22) saw it.
+        multipliers: (k, 6 closures) of the scaled closures.
+        clearances: (k, nu) in units of these cones.
+        energy: (k,) [J].
+        without_play: (k,) [J] energy if every clearance stayed at zero.
+        cone_of: (cones,) the cone here of each cone of the robot that is asked about.
+    """
+
+    structure: Structure
+    multipliers: NDArray
+    clearances: NDArray
+    energy: NDArray
+    without_play: NDArray
+    cone_of: NDArray
+
+
+class Bounds(NamedTuple):
+    """Rows of arrays filled by :func:`bound_all`, one row a point.
+
+    Attributes:
+        rotation: (k, 2) [rad] lower and upper.
+        translation: (k, 2) [m] likewise.
+        rotation_screw: (k, 6) [rad, m] attains the lower bound.
+        translation_screw: (k, 6) likewise.
+        supports: (k,) support functions computed.
+        road: (k,) SOLVED or HANDED_BACK.
+    """
+
+    rotation: NDArray
+    translation: NDArray
+    rotation_screw: NDArray
+    translation_screw: NDArray
+    supports: NDArray
+    road: NDArray
+
+
+@kernel
+def bound_all(
+    solvers: ConeSolvers, s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
+    clearances: NDArray, motions: NDArray, loads: Loads, offset: NDArray,
+    tolerance: NDArray, out: Bounds,
+) -> None:  # fmt: skip
+    """Bracket the largest pose errors of all points that are not handed back yet.
+
+    Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
+        s: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        centre: (k, 6) [rad, m] platform screws of (22) at the platform's origin.
+        clearances: (k, nu) of (22), in these cones.
+        motions: (k, nq) [rad, m] of (22) where they have a bound, else anything.
+        loads: which of them are held.
+        offset: (3,) [m] from the platform's origin to the point asked about.
+        tolerance: (2,) [rad, m] asked of upper minus lower bounds.
+        out: arrays to fill; rows whose road is HANDED_BACK are left out.
+    """
+    outer = empty_polytope()
+    for i in range(len(T)):
+        if out.road[i] != SOLVED:
+            continue
+        decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
+        found, body = body_of(
+            s, T[i], mismatch[i], centre[i], clearances[i], motions[i], loaded, offset
+        )
+        if not (decided and found):
+            out.road[i] = HANDED_BACK
+            continue
+        for half in range(2):
+            search = begin(body, 3 * half, tolerance[half], outer)
+            if advance(solvers, body, search) != DONE:
+                out.road[i] = HANDED_BACK
+            out.supports[i] += search.counts[1]
+            if half == 0:
+                copy(search.bounds, out.rotation[i])
+                copy(search.best, out.rotation_screw[i])
+            else:
+                copy(search.bounds, out.translation[i])
+                copy(search.best, out.translation_screw[i])
+
+
+@kernel
+def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
+    """Which clearances press on their bound, as in :mod:`assembly.linear.pose_error`.
+
+    Load times slack is about the solver's gap, so one of the two is nearly zero.
+
+    Args:
+        loads: what (22) says.
+        P: (n, 6, 6) unit screws of every frame at the platform.
+        point: which one.
+
+    Returns:
+        Whether that is clear of all; (cones,) bool.
+    """
+    h, wrench = loads.structure, loads.multipliers[point]
+    energy = loads.energy[point]
+    scale = max(energy, 1e-9 * loads.without_play[point], 1e-300)
+    loaded, decided = np.zeros(len(loads.cone_of), np.bool_), True
+    for c in range(len(loaded)):
+        push, size = 0.0, 0.0
+        own = loads.cone_of[c]
+        for i in range(h.starts[own], h.starts[own + 1]):
+            j, pull = h.cone_frame[i], 0.0
+            for k in range(h.patterns.shape[1]):
+                sign = h.patterns[h.pattern_of[j], k]
+                if sign != 0.0:
+                    for a in range(6):
+                        pull += sign * wrench[6 * k + a] * P[j, h.cone_axis[i], a]
+            push += (pull * h.cone_size[i]) ** 2
+            size += loads.clearances[point, i] ** 2
+        load = np.sqrt(push) / scale
+        slack = max(0.0, 1.0 - np.sqrt(size))
+        loaded[c] = load > slack and load > 1e-9
+        apart = load > _APART * slack or slack > _APART * load
+        # written so that what is not a number is not clear
+        decided = decided and (apart or max(load, slack) <= 1e-9)
+    return decided, loaded
+
+
+@kernel
+def body_of(
+    s: Structure, T: NDArray, mismatch: float, centre: NDArray, clearances: NDArray,
+    motions: NDArray, loaded: NDArray, offset: NDArray,
+) -> tuple[bool, Body]:  # fmt: skip
+    """The set of platform screws of one point, and whether it was found.
+
+    Args:
+        s: as in :func:`bound_all`, like all others, for one point.
+        T: see there.
+        mismatch: see there.
+        centre: see there.
+        clearances: see there.
+        motions: see there.
+        loaded: see there.
+        offset: see there.
+
+    Returns:
+        Whether no rank hangs on rounding, the platform moves within bounds, and no
+        passive joint comes to the bound of its own motion; the set.
+    """
+    tolerance = _RANK + 30.0 * mismatch
+    P = paths_of(T, s)
+    m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
+    F = free_columns(s, P, m)
+    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+    rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+    centre = centre.copy()
+    _shift(centre.reshape(6, 1), offset)
+    nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
+    if rank < 0:
+        return False, Body(centre, *nothing)
+    bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
+    if not bounded or not _within_bounds(
+        s, P, F, turns, diagonal, order, rank, clearances, motions, loaded
+    ):
+        return False, Body(centre, *nothing)
+    Z = orthogonal_rows(F, turns, rank, m)
+    columns, _ = small_problem(s, P, Z, len(Z), np.zeros(m))
+    kept = 0
+    for c in range(len(s.starts) - 1):
+        if not loaded[c]:
+            kept += s.starts[c + 1] - s.starts[c]
+    X, rows, start = np.zeros((6, kept)), np.zeros((len(Z), kept)), np.zeros(kept)
+    starts = np.zeros(len(s.starts), np.int64)
+    at, cones = 0, 0
+    for c in range(len(s.starts) - 1):
+        if loaded[c]:
+            continue
+        for i in range(s.starts[c], s.starts[c + 1]):
+            for l in range(len(Z)):
+                rows[l, at] = columns[i, l]
+            start[at] = clearances[i]
+            _move_platform(s, P, follow, i, X[:, at])
+            at += 1
+        cones += 1
+        starts[cones] = at
+    starts = starts[: cones + 1].copy()
+    into_cones(starts, start)
+    _shift(X, offset)
+    decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
+    return decided, Body(centre, X, B, start, starts)
+
+
+@kernel
+def _follow(
+    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
+    order: NDArray, rank: int, m: int,
+) -> tuple[bool, NDArray]:  # fmt: skip
+    """What the platform does, scaled (6, m), as free motions follow the closures.
+
+    Returns:
+        False where free motions move the platform and no closure; what it does.
+    """
+    nq = len(s.free_frame)
+    follow, largest = np.zeros((m, LANES)), 0.0
+    for a in range(6):
+        drive = np.zeros(nq)
+        for i in range(nq):
+            j = s.free_frame[order[i]]
+            drive[i] = s.on_path[j] * P[j, s.free_axis[order[i]], a]
+            for l in range(min(i, rank)):
+                drive[i] -= F[i, l] * follow[l, a]
+            if i < rank:
+                follow[i, a] = drive[i] / diagonal[i]
+            else:
+                largest = max(largest, abs(drive[i]))
+    turn_all(F, turns, rank, follow)
+    return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
+
+
+@kernel
+def _within_bounds(
+    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
+    order: NDArray, rank: int, clearances: NDArray, motions: NDArray, loaded: NDArray,
+) -> bool:  # fmt: skip
+    """Whether no play takes a passive joint past its bound; see ``linear/reach.py``."""
+    nq, m = F.shape
+    bounded = False
+    for q in range(nq):
+        bounded = bounded or s.free_bound[q] < np.inf
+    if not bounded:
+        return True
+    middle, most = motions.copy(), np.zeros(nq)
+    moved, step = np.zeros(m), np.zeros(nq)
+    for c in range(len(s.starts) - 1):
+        if loaded[c]:
+            continue
+        squares = np.zeros(nq)
+        for i in range(s.starts[c], s.starts[c + 1]):
+            j = s.cone_frame[i]
+            for k in range(m // 6):
+                sign = s.patterns[s.pattern_of[j], k] * s.cone_size[i]
+                for a in range(6):
+                    moved[6 * k + a] = sign * P[j, s.cone_axis[i], a]
+            least_motions(F, turns, diagonal, order, rank, moved, step)
+            for q in range(nq):
+                middle[q] -= step[q] * clearances[i]
+                squares[q] += step[q] * step[q]
+        for q in range(nq):
+            most[q] += np.sqrt(squares[q])
+    for q in range(nq):
+        # written so that what is not a number is not within
+        if s.free_bound[q] < np.inf:
+            if not abs(middle[q]) + most[q] <= s.free_bound[q]:
+                return False
+    return True
+
+
+@kernel
+def _move_platform(
+    s: Structure, P: NDArray, follow: NDArray, i: int, screw: NDArray
+) -> None:
+    """(6,) [rad, m] what clearance i does to the platform, free motions following."""
+    j = s.cone_frame[i]
+    column, pattern = P[j, s.cone_axis[i]], s.patterns[s.pattern_of[j]]
+    for a in range(6):
+        screw[a] = s.on_path[j] * column[a]
+        for k in range(len(pattern)):
+            if pattern[k] != 0.0:
+                for b in range(6):
+                    screw[a] -= follow[a, 6 * k + b] * pattern[k] * column[b]
+        screw[a] *= s.cone_size[i] if a < 3 else s.cone_size[i] * s.size
+
+
+@kernel
+def _shift(screws: NDArray, offset: NDArray) -> None:
+    """Read screws, the columns, at another point of the platform."""
+    for j in range(screws.shape[1]):
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            moved = screws[b, j] * offset[c] - screws[c, j] * offset[b]
+            screws[3 + a, j] += moved

@@ -1,0 +1,363 @@
+"""Free motions and springs eliminated: :mod:`assembly.linear.reduction`, compiled.
+
+Arranged for speed: vectors lie as rows, one Householder triangulation with pivoting
+serves the free motions, the springs and the least motions, and springs that always act
+together (the same closures) are first turned into six.  Springs enter by the square
+roots of their compliances throughout.
+
+======  ============  ==============================================================
+symbol  shape         meaning
+======  ============  ==============================================================
+``P``   (n, 6, 6)     row ``axis``: unit screw of frame j along it, read at the
+                      platform in base axes, translations by the reference length
+``F``   (nq, m)       columns of the free motions as rows; m = 6 closures
+``Z``   (m - rank, m) orthonormal, orthogonal to all free motions; later the rows
+                      that give a spring's answer, L^-1 Z, and those that give none
+``L``   (ng, 6, 6)    each group's springs as six, lower triangular but for pivoting
+``Y``   (.., 6 ng)    Z times the springs' columns
+======  ============  ==============================================================
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.solvers.compiled import kernel
+from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
+from assembly.solvers.interior import LANES
+from assembly.solvers.vectors import copy, divide, fill
+
+_NOISE = 1e-12  # as in assembly.linear.reduction
+_CLEAR = 10.0  # what is within this factor of a threshold decides nothing
+
+
+class Structure(NamedTuple):
+    """What a robot's postures share; n frames, closures, np patterns of closures.
+
+    Attributes:
+        size: [m] reference length.
+        platform: row of its frame.
+        on_path: (n,) 1 on the way to the platform.
+        patterns: (np, closures) signs with which frames enter the closures.
+        pattern_of: (n,) row of ``patterns``.
+        springs: (ny, 6) spring columns in their frame's axes, sorted by group.
+        spring_frame: (ny,) whose they are.
+        spring_order: (ny,) their places among the virtual joints' columns.
+        groups: (ng + 1,) first spring of each group, and ny.
+        group_pattern: (ng,) row of ``patterns``.
+        group_on_path: (ng,) 1 on the way to the platform.
+        cone_frame: (nu,) whose a clearance is.
+        cone_axis: (nu,) component of its screw.
+        cone_size: (nu,) [rad or m].
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        free_frame: (nq,) whose a free motion is.
+        free_axis: (nq,) component of its screw.
+        free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
+    """
+
+    size: float
+    platform: int
+    on_path: NDArray
+    patterns: NDArray
+    pattern_of: NDArray
+    springs: NDArray
+    spring_frame: NDArray
+    spring_order: NDArray
+    groups: NDArray
+    group_pattern: NDArray
+    group_on_path: NDArray
+    cone_frame: NDArray
+    cone_axis: NDArray
+    cone_size: NDArray
+    starts: NDArray
+    free_frame: NDArray
+    free_axis: NDArray
+    free_bound: NDArray
+
+
+@kernel
+def paths_of(T: NDArray, s: Structure) -> NDArray:
+    """Unit screws of every frame at the platform, see ``P``."""
+    n = len(T)
+    P = np.zeros((n, 6, 6))
+    for j in range(n):
+        x = (T[j, 0, 3] - T[s.platform, 0, 3]) / s.size
+        y = (T[j, 1, 3] - T[s.platform, 1, 3]) / s.size
+        z = (T[j, 2, 3] - T[s.platform, 2, 3]) / s.size
+        for axis in range(3):
+            a, b, c = T[j, 0, axis], T[j, 1, axis], T[j, 2, axis]
+            turned, slid = P[j, axis], P[j, 3 + axis]
+            turned[0], turned[1], turned[2] = a, b, c
+            turned[3], turned[4] = y * c - z * b, z * a - x * c
+            turned[5] = x * b - y * a
+            slid[3], slid[4], slid[5] = a / s.size, b / s.size, c / s.size
+    return P
+
+
+@kernel
+def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
+    """Closure columns of the free motions, as rows."""
+    F = np.zeros((len(s.free_frame), m))
+    for c in range(len(F)):
+        j = s.free_frame[c]
+        for k in range(m // 6):
+            sign = s.patterns[s.pattern_of[j], k]
+            if sign != 0.0:
+                for a in range(6):
+                    F[c, 6 * k + a] = sign * P[j, s.free_axis[c], a]
+    return F
+
+
+@kernel(fastmath={"contract", "reassoc"})
+def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
+    """Orthonormal rows orthogonal to all triangulated ones."""
+    count = m - rank
+    Zt = np.zeros((m, count + -count % LANES))
+    for i in range(count):
+        Zt[rank + i, i] = 1.0
+    turn_all(F, turns, rank, Zt)
+    return np.ascontiguousarray(Zt[:, :count].T)
+
+
+@kernel
+def grouped_springs(s: Structure, P: NDArray) -> NDArray:
+    """Springs that act together, turned into six: the same sum of squares, no sum."""
+    count = len(s.groups) - 1
+    L = np.zeros((count, 6, 6))
+    turns, diagonal = np.empty(6), np.empty(6)
+    order = np.empty(6, np.int64)
+    for g in range(count):
+        a, b = s.groups[g], s.groups[g + 1]
+        rows = np.zeros((6, max(b - a, 6)))
+        for c in range(a, b):
+            j = s.spring_frame[c]
+            for axis in range(6):
+                weight = s.springs[c, axis]
+                if weight != 0.0:
+                    for i in range(6):
+                        rows[i, c - a] += weight * P[j, axis, i]
+        rank = triangulate(rows, turns, diagonal, order, 0.0, 0.0, -1.0)
+        for i in range(6):
+            for l in range(min(i, rank)):
+                L[g, order[i], l] = rows[i, l]
+            if i < rank:
+                L[g, order[i], i] = diagonal[i]
+    return L
+
+
+@kernel
+def largest_spring(s: Structure, P: NDArray) -> float:
+    """Largest entry of the springs' closure columns, for the noise floor."""
+    largest = 0.0
+    column = np.empty(6)
+    for c in range(len(s.springs)):
+        fill(column, 0.0)
+        for axis in range(6):
+            weight = s.springs[c, axis]
+            if weight != 0.0:
+                for i in range(6):
+                    column[i] += weight * P[s.spring_frame[c], axis, i]
+        for i in range(6):
+            largest = max(largest, abs(column[i]))
+    return largest
+
+
+@kernel(fastmath={"contract", "reassoc"})
+def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
+    """What row i of Z reads of a screw that enters the closures with these signs."""
+    for a in range(6):
+        part[a] = 0.0
+    for k in range(len(pattern)):
+        if pattern[k] != 0.0:
+            for a in range(6):
+                part[a] += pattern[k] * Z[i, 6 * k + a]
+
+
+@kernel
+def spring_rows(s: Structure, Z: NDArray, L: NDArray) -> NDArray:
+    """Rows of Z times the closure columns of the grouped springs."""
+    Y = np.zeros((len(Z), 6 * len(L)))
+    part = np.empty(6)
+    for i in range(len(Z)):
+        for g in range(len(L)):
+            pattern_part(Z, i, s.patterns[s.group_pattern[g]], part)
+            for a in range(6):
+                for b in range(6):
+                    Y[i, 6 * g + b] += part[a] * L[g, a, b]
+    return Y
+
+
+@kernel
+def eliminate_springs(
+    Z: NDArray, Y: NDArray, diagonal: NDArray, order: NDArray, rank: int
+) -> None:
+    """Order Z like Y's triangle, and divide by it: the springs' answer first."""
+    rows = Z.copy()
+    for i in range(len(Z)):
+        copy(rows[order[i]], Z[i])
+        for l in range(min(i, rank)):
+            for a in range(Z.shape[1]):
+                Z[i, a] -= Y[i, l] * Z[l, a]
+        if i < rank:
+            for a in range(Z.shape[1]):
+                Z[i, a] /= diagonal[i]
+
+
+@kernel
+def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
+    """(m,) what the errors leave open in the closures."""
+    closures = s.patterns.shape[1]
+    known = np.zeros(6 * closures)
+    moved = np.empty(6)
+    for j in range(len(P)):
+        fill(moved, 0.0)
+        for axis in range(6):
+            if errors[j, axis] != 0.0:
+                for a in range(6):
+                    moved[a] += P[j, axis, a] * errors[j, axis]
+        for k in range(closures):
+            sign = s.patterns[s.pattern_of[j], k]
+            for a in range(6):
+                known[6 * k + a] += sign * moved[a]
+    return known
+
+
+@kernel
+def rigid_rows(
+    s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray, errors: NDArray,
+    tolerance: float,
+) -> bool:  # fmt: skip
+    """Whether clearances or errors enter where no spring answers."""
+    count, cones = len(Z) - rank, len(s.cone_frame)
+    parts, most = np.empty((len(s.patterns), count, 6)), np.zeros(len(s.patterns))
+    entering = np.zeros(len(s.patterns))
+    for g in range(len(s.patterns)):
+        for k in range(s.patterns.shape[1]):
+            entering[g] = max(entering[g], abs(s.patterns[g, k]))
+        for i in range(count):
+            pattern_part(Z, rank + i, s.patterns[g], parts[g, i])
+            for a in range(6):
+                most[g] = max(most[g], abs(parts[g, i, a]))
+    sizes, largest, worst = np.zeros(cones), 0.0, 0.0
+    for c in range(cones):
+        j = s.cone_frame[c]
+        for a in range(6):
+            sizes[c] = max(sizes[c], abs(P[j, s.cone_axis[c], a]) * s.cone_size[c])
+        largest = max(largest, sizes[c] * entering[s.pattern_of[j]])
+    for c in range(cones):
+        j = s.cone_frame[c]
+        g = s.pattern_of[j]
+        if 6.0 * sizes[c] * most[g] <= _NOISE * largest / _CLEAR:
+            continue  # as nearly all are
+        for i in range(count):
+            total = 0.0
+            for a in range(6):
+                total += parts[g, i, a] * P[j, s.cone_axis[c], a]
+            worst = max(worst, abs(total * s.cone_size[c]))
+    if worst > _NOISE * largest / _CLEAR:
+        return True
+    size = 0.0
+    for j in range(len(P)):
+        for axis in range(6):
+            if errors[j, axis] != 0.0:
+                for a in range(6):
+                    size = max(size, abs(P[j, axis, a] * errors[j, axis]))
+    for i in range(rank, len(Z)):
+        total = 0.0
+        for a in range(len(known)):
+            total += Z[i, a] * known[a]
+        if not abs(total) <= 1e-12 / _CLEAR + tolerance * size:
+            return True
+    return False
+
+
+@kernel(fastmath={"contract", "reassoc"})
+def small_problem(
+    s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray
+) -> tuple[NDArray, NDArray]:
+    """G, its columns as rows, and h: springs' answer to clearances and to errors."""
+    nu = len(s.cone_frame)
+    Gt, h = np.zeros((nu, rank)), np.zeros(rank)
+    parts = np.zeros((len(s.patterns), 6, rank))
+    part = np.empty(6)
+    for i in range(rank):
+        for a in range(len(known)):
+            h[i] -= Z[i, a] * known[a]
+        for g in range(len(s.patterns)):
+            pattern_part(Z, i, s.patterns[g], part)
+            for a in range(6):
+                parts[g, a, i] = part[a]
+    for c in range(nu):
+        j = s.cone_frame[c]
+        column, own = P[j, s.cone_axis[c]], parts[s.pattern_of[j]]
+        for a in range(6):
+            weight = -s.cone_size[c] * column[a]
+            if weight != 0.0:
+                for i in range(rank):
+                    Gt[c, i] += weight * own[a, i]
+    return Gt, h
+
+
+@kernel
+def moved_by(
+    s: Structure, P: NDArray, L: NDArray, u: NDArray, spring: NDArray, known: NDArray,
+    screw: NDArray,
+) -> NDArray:  # fmt: skip
+    """(m,) what errors, clearances and springs leave open; their platform screw."""
+    closures = s.patterns.shape[1]
+    moved = known.copy()
+    for a in range(6):
+        screw[a] = 0.0
+    for c in range(len(u)):
+        j = s.cone_frame[c]
+        for a in range(6):
+            step = P[j, s.cone_axis[c], a] * s.cone_size[c] * u[c]
+            screw[a] += s.on_path[j] * step
+            for k in range(closures):
+                moved[6 * k + a] += s.patterns[s.pattern_of[j], k] * step
+    for g in range(len(L)):
+        for a in range(6):
+            step = 0.0
+            for b in range(6):
+                step += L[g, a, b] * spring[6 * g + b]
+            screw[a] += s.group_on_path[g] * step
+            for k in range(closures):
+                moved[6 * k + a] += s.patterns[s.group_pattern[g], k] * step
+    return moved
+
+
+@kernel
+def least_motions(
+    F: NDArray, turns: NDArray, diagonal: NDArray, order: NDArray, rank: int,
+    moved: NDArray, motions: NDArray,
+) -> None:  # fmt: skip
+    """Free motions of least size that close what the rest leaves open."""
+    nq = len(F)
+    right = divide(moved, -1.0)
+    turn_back(F, turns, rank, right)
+    answer = np.zeros(nq)
+    if rank == nq:
+        for i in range(nq - 1, -1, -1):
+            total = right[i]
+            for l in range(i + 1, nq):
+                total -= F[l, i] * answer[l]
+            answer[i] = total / diagonal[i]
+    else:
+        # the triangle's columns, as rows, triangulated once more
+        R = np.zeros((rank, nq))
+        for i in range(rank):
+            R[i, i] = diagonal[i]
+            for l in range(i + 1, nq):
+                R[i, l] = F[l, i]
+        own_turns, own_diagonal = np.empty(rank), np.empty(rank)
+        own_order = np.empty(rank, np.int64)
+        found = triangulate(R, own_turns, own_diagonal, own_order, 0.0, 0.0, -1.0)
+        for i in range(found):
+            total = right[own_order[i]]
+            for l in range(i):
+                total -= R[i, l] * answer[l]
+            answer[i] = total / own_diagonal[i]
+        turn(R, own_turns, found, answer)
+    for i in range(nq):
+        motions[order[i]] = answer[i]

@@ -1,0 +1,191 @@
+"""Problem (21), the zone's margin, compiled from the frames' poses to the certificate.
+
+With every link and joint rigid, B u = w must hold, B's rows orthonormal, |u_k| <= t.
+The least t is |w| over the most that g.u can be with |u_k| <= 1 and the rest of B u
+zero, g = B^T w / |w|: a problem that u = 0 satisfies, so the interior point starts
+where nothing is violated.  Its multipliers n bound the margin from below,
+
+    t >= |w| / sum_k |(g - B_rest^T n)_k|.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.compiled_reduction import (
+    Structure,
+    free_columns,
+    least_motions,
+    misfit_of,
+    moved_by,
+    orthogonal_rows,
+    paths_of,
+    small_problem,
+)
+from assembly.solvers.compiled import kernel
+from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.vectors import divide, inner
+
+SOLVED, HANDED_BACK = range(2)
+_RANK, _ROWS_RANK, _NOISE = 1e-10, 1e-9, 1e-12  # as in assembly.linear.reduction
+_LEFT = 1e-13  # part of what may stay open, as in assembly.linear.reduction
+_STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
+
+
+@kernel
+def all_margins(
+    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    margin: NDArray, bound: NDArray, road: NDArray,
+) -> None:  # fmt: skip
+    """Margins of all points, with their lower bounds.
+
+    Args:
+        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
+        s: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        errors: (n, 6) [rad, m].
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        margin: (k,) to fill.
+        bound: (k,) to fill.
+        road: (k,) to fill: SOLVED, or HANDED_BACK to the slower road.
+    """
+    for i in range(len(T)):
+        margin[i], bound[i], road[i] = np.nan, np.nan, HANDED_BACK
+        tolerance = _RANK + 30.0 * mismatch[i]
+        P = paths_of(T[i], s)
+        m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
+        F = free_columns(s, P, m)
+        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+        if free < 0:
+            continue
+        Z = orthogonal_rows(F, turns, free, m)
+        known = misfit_of(s, P, errors)
+        columns, right = small_problem(s, P, Z, len(Z), known)
+        rows = np.ascontiguousarray(columns.T)
+        misfit = divide(right, -1.0)
+        decided, B, w = orthonormal_rows(rows, misfit, largest_clearance(s, P))
+        size = np.sqrt(inner(w, w))
+        if not (decided and size > 0.0):
+            continue
+        turn_first(B, w, size)
+        u, pull = farthest(solvers, B, s.starts)
+        reach, most = inner(B[0], u), 0.0
+        for c in range(len(s.starts) - 1):
+            part = 0.0
+            for k in range(s.starts[c], s.starts[c + 1]):
+                part += pull[k] * pull[k]
+            most += np.sqrt(part)
+        if not reach > 0.0:
+            continue
+        # what passive joints turn or slide must stay within their ranges
+        none, screw = np.zeros((0, 6, 6)), np.empty(6)
+        for c in range(len(u)):
+            u[c] *= size / reach
+        moved = moved_by(s, P, none, u, np.zeros(0), known, screw)
+        motions = np.empty(nq)
+        least_motions(F, turns, diagonal, order, free, moved, motions)
+        within = True
+        for c in range(nq):
+            within = within and abs(motions[c]) <= s.free_bound[c]
+        if within:
+            margin[i], bound[i] = size / reach, size / most
+            # a bound that is not a number fails
+            if margin[i] - bound[i] <= _GAP * margin[i]:
+                road[i] = SOLVED
+
+
+@kernel
+def largest_clearance(s: Structure, P: NDArray) -> float:
+    """Largest entry of the clearances' closure columns, for the noise floor."""
+    largest = 0.0
+    for c in range(len(s.cone_frame)):
+        j = s.cone_frame[c]
+        enters = False
+        for k in range(s.patterns.shape[1]):
+            enters = enters or s.patterns[s.pattern_of[j], k] != 0.0
+        if enters:
+            for a in range(6):
+                entry = P[j, s.cone_axis[c], a] * s.cone_size[c]
+                largest = max(largest, abs(entry))
+    return largest
+
+
+@kernel
+def orthonormal_rows(
+    rows: NDArray, right: NDArray, largest: float
+) -> tuple[bool, NDArray, NDArray]:
+    """Write rows u = right as B u = w with orthonormal rows.
+
+    Args:
+        rows: (p, nu); they are overwritten.
+        right: (p,).
+        largest: entry of the columns that the rows were projected from.
+
+    Returns:
+        Whether no rank hangs on rounding and nothing contradicts; B and w.
+    """
+    p, nu = rows.shape
+    turns, diagonal = np.empty(p), np.empty(p)
+    order = np.empty(p, np.int64)
+    rank = triangulate(rows, turns, diagonal, order, _ROWS_RANK, _NOISE * largest, -1.0)
+    if rank < 0:
+        return False, np.zeros((0, nu)), np.zeros(0)
+    B, w = np.zeros((rank, nu)), np.zeros(rank)
+    for i in range(p):
+        total = right[order[i]]
+        for l in range(min(i, rank)):
+            total -= rows[i, l] * w[l]
+        if i < rank:
+            w[i] = total / diagonal[i]
+        elif not abs(total) <= _LEFT:
+            return False, B, w
+    for i in range(rank):
+        B[i, i] = 1.0
+        turn(rows, turns, rank, B[i])
+    return True, B, w
+
+
+@kernel
+def turn_first(B: NDArray, w: NDArray, size: float) -> None:
+    """Combine the rows of B so that the first is along w and the others across it."""
+    v = divide(w, size)
+    sign = 1.0 if v[0] <= 0.0 else -1.0
+    v[0] -= sign
+    factor = 2.0 / inner(v, v)
+    for c in range(B.shape[1]):
+        dot = 0.0
+        for i in range(len(v)):
+            dot += v[i] * B[i, c]
+        for i in range(len(v)):
+            B[i, c] -= factor * dot * v[i]
+        B[0, c] *= sign
+
+
+@kernel
+def farthest(
+    solvers: ConeSolvers, B: NDArray, starts: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Find u within the cones with the most B[0].u and no B[1:] u; the pull on each."""
+    nu = B.shape[1]
+    rest = np.ascontiguousarray(B[1:])
+    u, n, _ = solvers.interior_point(
+        np.zeros((0, nu)), np.zeros(0), B[0].copy(), rest, np.zeros(len(rest)), starts,
+        _STOP, 0.0,
+    )  # fmt: skip
+    pull = B[0].copy()
+    for i in range(len(rest)):
+        for c in range(nu):
+            pull[c] -= rest[i, c] * n[i]
+    # rounding may leave the rest: taken out, then back within the cones
+    for i in range(len(rest)):
+        left = inner(rest[i], u)
+        for c in range(nu):
+            u[c] -= left * rest[i, c]
+    worst = 1.0
+    for c in range(len(starts) - 1):
+        size = 0.0
+        for i in range(starts[c], starts[c + 1]):
+            size += u[i] * u[i]
+        worst = max(worst, np.sqrt(size))
+    return divide(u, worst), pull

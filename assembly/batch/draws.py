@@ -1,0 +1,27 @@
+"""Least energies of many draws of the errors at one posture."""
+
+from dataclasses import dataclass
+
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Least energies of k draws at one posture, each with its certificate.
+
+    Attributes:
+        energy: (k,) [J]; NaN where there is no answer.
+        bound: (k,) [J] certified lower bound.
+        clearances: (k, nu) in units of the cones.
+        multipliers: (k, 6 closures) of the scaled closure rows.
+        platform_screw: (k, 6) [rad, m] at the platform's origin, base axes.
+        slower: (k,) bool, solved by
+            :func:`assembly.batch.many_postures.minimise_energies`.
+    """
+
+    energy: NDArray
+    bound: NDArray
+    clearances: NDArray
+    multipliers: NDArray
+    platform_screw: NDArray
+    slower: NDArray

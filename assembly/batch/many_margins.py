@@ -1,0 +1,150 @@
+"""Problem (21) at one posture for many draws of the errors, with slopes.
+
+The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``: convex in
+the errors e, proportional to them, and its slope is ``K^T q`` of the best q.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import svd
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from assembly.linear.reduction import complement, reduce_problem
+from assembly.linear.zone import zone_margin
+from assembly.model.clearance import clearance_bounds
+from assembly.solvers.conic import SolverFailed
+
+_RIGID, _CLEARLY_RIGID = 1e-13, 1e-10  # [rad, lengths] what of the errors nothing fits
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Zone margins of k draws at one posture.
+
+    Attributes:
+        margin: (k,) factor on all clearances at which it just assembles; inf where
+            none does, NaN where the solver failed.
+        bound: (k,) certified lower bound.
+        slopes: (k, n, 6) [1/rad, 1/m] how the margin grows with each error; NaN where
+            the slower road answered.
+        slower: (k,) bool, solved by :func:`assembly.linear.zone.zone_margin`.
+    """
+
+    margin: NDArray
+    bound: NDArray
+    slopes: NDArray
+    slower: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class PostureMargins:
+    """A posture made ready for the margins of any errors, by :func:`prepare_margins`.
+
+    Attributes:
+        posture: where the robot stands; its own errors do not matter.
+        joints: what may move.
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        B: (p, nu) orthonormal rows that the clearances must satisfy.
+        K: (p, 6n) and what the errors ask of them: B u = K e.
+        unanswered: (.., 6n) what of the errors no clearance takes up.
+        motions: (nq, nu + 6n) free motions of clearances and errors.
+        ranges: (nq,) [rad or m] their bounds, which were left out.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+    """
+
+    posture: Posture
+    joints: VirtualJoints
+    starts: NDArray
+    B: NDArray
+    K: NDArray
+    unanswered: NDArray
+    motions: NDArray
+    ranges: NDArray
+    compliant: str
+
+    def solve(self, errors: ArrayLike) -> Margins:
+        """Margins of k draws.
+
+        Args:
+            errors: (k, n, 6) [rad, m] delta l.
+
+        Returns:
+            Margins with their certificates and slopes.
+
+        Raises:
+            ValueError: the shape does not fit the robot, or a value is not finite.
+        """
+        from assembly.batch.compiled_draws import least_margins
+        from assembly.solvers.cone_solvers import cone_solvers
+
+        errors = np.asarray(errors, dtype=float)
+        count, n = len(errors), len(self.posture.robot.frames)
+        if errors.shape != (count, n, 6) or not np.isfinite(errors).all():
+            raise ValueError(
+                f"errors have shape {errors.shape}, expected (k, {n}, 6), all finite"
+            )
+        e = errors.reshape(count, 6 * n)
+        margin, bound = np.zeros(count), np.zeros(count)
+        q, reach = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
+        if len(self.B):
+            least_margins(
+                cone_solvers(), self.B, self.starts, e @ self.K.T, margin, bound, q
+            )
+        missed = np.abs(e @ self.unanswered.T).max(axis=1, initial=0.0)
+        margin[missed > _CLEARLY_RIGID] = bound[missed > _CLEARLY_RIGID] = np.inf
+        most = np.concatenate(
+            [reach * np.nanmax(margin, initial=0.0, where=np.isfinite(margin)),
+             np.abs(e).max(axis=0, initial=0.0)]
+        )  # fmt: skip
+        slower = np.isnan(margin)
+        slower |= (missed > _RIGID) & (missed <= _CLEARLY_RIGID)
+        if (np.abs(self.motions) @ most > self.ranges).any():
+            slower[:] = True
+        slopes = (q @ self.K).reshape(count, n, 6)
+        for i in np.flatnonzero(slower).tolist():
+            robot = self.posture.robot.with_errors(errors[i])
+            slopes[i] = margin[i] = bound[i] = np.nan
+            try:
+                zone = zone_margin(replace(self.posture, robot=robot), self.compliant)
+            except SolverFailed:
+                continue
+            margin[i] = np.inf if zone.margin is None else zone.margin
+            bound[i] = np.inf if zone.bound is None else zone.bound
+        return Margins(margin, bound, slopes, slower)
+
+
+def prepare_margins(posture: Posture, compliant: str = "free") -> PostureMargins:
+    """Eliminate free motions at a posture, for the margins of any errors.
+
+    Args:
+        posture: where the robot stands.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+
+    Returns:
+        What :meth:`PostureMargins.solve` needs.
+
+    Raises:
+        ValueError: ``compliant`` is something else.
+    """
+    if compliant not in {"rigid", "free"}:
+        raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
+    robot = posture.robot
+    lin, joints = linearise(posture), virtual_joints(robot, compliant)
+    small = reduce_problem(lin, joints)
+    # orthonormal rows, whatever the units of the closures
+    U, S, B = svd(small.H, full_matrices=False)
+    held = np.linalg.qr(small.rigid)[0] if small.rigid.shape[1] else small.rigid
+    over = small.basis @ complement(held, 1e-10)
+    A = lin.rows
+    back = np.linalg.pinv(A @ joints.free, rcond=1e-10)
+    screws = np.hstack([joints.cones, np.eye(A.shape[1])])
+    bounds = clearance_bounds(robot, compliant)[:, [0, 0, 1, 2, 2, 3]].ravel()
+    starts = np.searchsorted(joints.group, np.arange(joints.group.max(initial=-1) + 2))
+    return PostureMargins(
+        posture, joints, starts.astype(np.int64), np.ascontiguousarray(B),
+        -(U.T / S[:, None]) @ small.rigid.T @ small.basis.T @ A, over.T @ A,
+        -back @ A @ screws, bounds[np.flatnonzero(joints.free.any(axis=1))], compliant,
+    )  # fmt: skip

@@ -1,0 +1,291 @@
+r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
+
+A dead load's work is linear in where its body stands, <G, T - T_nominal>, T the first
+three rows of the body's transform.  Then a force f at the point a of the body, in its
+axes, is f [a, 1]^T; a couple m is two opposite forces, [m]x R_nominal / 2, whose work
+is m . (axis sin angle); a beam's weight W acts at the middle of the cubic that its two
+ends clamp, (p1 + p2) / 2 + (t1 - t2) / 12 with t the end tangents times the length.
+
+======  =============  ==========  ==================================================
+symbol  code           shape       meaning
+======  =============  ==========  ==================================================
+G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
+                                   its joint, and on what its joint carries
+w       ``load``       (6,)        on the platform, see :mod:`assembly.exact.exact`
+M       --             (3, 3)      sum of the points times their forces
+======  =============  ==========  ==================================================
+
+Linearised, these are the loads of :mod:`assembly.linear.load`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.placement import LINK, Placement, carried_nominally
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import BeamLink, beam_axis
+from stiffness.beam.sections import declared_section
+from stiffness.screws import rotation_matrix, skew, transform
+
+
+@dataclass(frozen=True, eq=False)
+class DeadLoads:
+    """All loads on a robot with finite motions.
+
+    Attributes:
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        bodies: (n, 3, 4) [N m, N] on the body of each frame.
+        carried: (n, 3, 4) [N m, N] on what each frame's joint carries.
+    """
+
+    load: NDArray
+    bodies: NDArray
+    carried: NDArray
+
+    @cached_property
+    def beyond_platform(self) -> bool:
+        """Whether anything but the platform is loaded."""
+        return bool(np.any(self.bodies) or np.any(self.carried))
+
+
+def dead_loads(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+) -> DeadLoads:
+    """Loads as dead loads.
+
+    Args:
+        posture: where the robot stands, of n frames.
+        load: (6,) [N m, N] on the platform at a point, base axes.
+        bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        point: (3,) [m] where the load acts, platform axes: the force goes with it.
+
+    Returns:
+        The loads; all zero where nothing is given.
+    """
+    count = len(posture.robot.frames)
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    own, carried = np.zeros((2, count, 3, 4))
+    if np.any(point):
+        platform = posture.robot.index(posture.robot.platform)
+        own[platform] = np.outer(wrench[3:], [*np.asarray(point), 1.0])
+        wrench[3:] = 0.0
+    if bodies is not None:
+        given = np.asarray(bodies, dtype=float)
+        own[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
+        own[:, :, 3] = given[:, 3:]
+    if gravity is not None:
+        g = np.asarray(gravity, dtype=float)
+        _add_weights(posture, posture.robot.errors, g, own, carried)
+    return DeadLoads(wrench, own, carried)
+
+
+def row_loads(
+    postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
+) -> DeadLoads:
+    """The same in many situations at once.
+
+    Args:
+        postures: R of them, in one.
+        errors: (R, n, 6) [rad, m] screws of the bodies that come without stress.
+        load: (R, 6) [N m, N] on the platform at a point, base axes.
+        gravity: (R, 3) [m/s^2] base axes.
+        point: (3,) [m] where the load acts, platform axes.
+
+    Returns:
+        Loads whose arrays have R rows.
+    """
+    robot = postures.robot
+    own, carried = np.zeros((2, *errors.shape[:2], 3, 4))
+    wrench = load.copy()
+    if point.any():
+        here = np.array([*point, 1.0])
+        own[:, robot.index(robot.platform)] = wrench[:, 3:, None] * here
+        wrench[:, 3:] = 0.0
+    if gravity.any():
+        _add_weights(postures, errors, gravity, own, carried)
+    return DeadLoads(wrench, own, carried)
+
+
+def _add_weights(
+    posture: Posture, errors: NDArray, g: NDArray, own: NDArray, carried: NDArray
+) -> None:
+    """Weight of links with a density and of bodies with a mass; rows in front."""
+    robot, nominal = posture.robot, carried_nominally(posture)
+    for i, frame in enumerate(robot.frames):
+        place = np.array([*frame.centre_of_mass, 1.0])
+        own[..., i, :, :] += frame.mass * g[..., None] * place
+        link = frame.link
+        if not isinstance(link, BeamLink) or link.density is None:
+            continue
+        length, axis = beam_axis(frame)
+        section = declared_section(link.section, link.poisson)
+        W = link.density * section.area * length * g[..., None]
+        own[..., i, :, :] += W * np.array([*(-length * axis / 12), 0.5])
+        parent = robot.parents[i]
+        if parent >= 0:  # else the base carries it
+            # the beam's start and tangent, seen from what the parent carries: a
+            # straight beam up to the erring tip, whose stiffness is K_E there
+            error = errors[..., i, :]
+            off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
+            T = np.linalg.inv(nominal[..., parent, :, :])
+            T = T @ posture.transforms[..., i, :, :] @ off
+            along = T[..., :3, :3] @ (length * axis)
+            middle = (T[..., :3, 3] - along) / 2 + along / 12
+            half = np.full((*middle.shape[:-1], 1), 0.5)
+            row = np.concatenate([middle, half], axis=-1)[..., None, :]
+            carried[..., parent, :, :] += W * row
+
+
+def work_of(place: Placement, loads: DeadLoads) -> float:
+    """[J] all loads' work from the nominal posture."""
+    work = 0.0
+    if loads.load.any():
+        work += float(loads.load @ place.platform_screw)
+    if loads.beyond_platform:
+        posture = place.model.posture
+        for G, T, nominal in (
+            (loads.bodies, place.bodies, posture.transforms),
+            (loads.carried, place.carried, carried_nominally(posture)),
+        ):
+            work += float(np.sum(G * (T - nominal)[:, :3]))
+    return work
+
+
+def slopes_of(place: Placement, loads: DeadLoads) -> NDArray:
+    """(N,) [J] derivative of the work by each unknown."""
+    slopes = place.platform_rows.T @ loads.load
+    if loads.beyond_platform:
+        wrenches, _ = _on_what_follows(place, loads)
+        slopes = slopes + np.sum(place.moves.T * wrenches, axis=1)
+    return slopes
+
+
+def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> NDArray:
+    """Second derivative of multipliers . residual + work.
+
+    Args:
+        place: where everything is.
+        multipliers: (6 K,) of the scaled residual.
+        loads: on the robot.
+
+    Returns:
+        (N, N) symmetric, as exact as
+        :meth:`assembly.exact.placement.Placement.curvature`.
+    """
+    H = place.curvature(multipliers, loads.load)
+    if not loads.beyond_platform:
+        return H
+    wrenches, M = _on_what_follows(place, loads)
+    turn, shift = place.moves[:3].T, place.moves[3:].T
+    # exp(A) exp(B) moves a point x, to second order in both, by a x (b x x + v_b)
+    spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    later = np.einsum("nij,nj->ni", M - spread, turn)
+    later -= np.cross(wrenches[:, 3:], shift)
+    pairs = (turn @ later.T) * place.model.comes_before
+    return H + pairs + pairs.T + place.bent(wrenches)
+
+
+def size_of_pull(place: Placement, loads: DeadLoads) -> NDArray:
+    """(N,) [J] how strongly the loads act on each unknown, cancellation left out."""
+    pull = np.abs(place.platform_rows).T @ np.abs(loads.load)
+    if loads.beyond_platform:
+        wrenches, _ = _on_what_follows(place, loads)
+        pull = pull + np.sum(np.abs(place.moves.T * wrenches), axis=1)
+    return pull
+
+
+def largest_wrench(place: Placement, loads: DeadLoads) -> float:
+    """[N m] largest scaled wrench of the loads at the platform's origin."""
+    scale = place.model.scale
+    largest = float(np.abs(loads.load / scale).max())
+    if loads.beyond_platform:
+        wrenches, _ = _on_what_follows(place, loads)
+        largest = max(largest, float(np.abs(wrenches / scale).max(initial=0.0)))
+    return largest
+
+
+def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
+    """Wrenches of all loads, at the platform's nominal origin, base axes.
+
+    Args:
+        place: where everything is.
+        loads: on the robot.
+
+    Returns:
+        (n, 6) [N m, N] on all that each frame's body holds, itself among it, and (n, 6)
+        on all that its joint holds.
+    """
+    robot = place.model.posture.robot
+    body, joint, *_ = _on_frames(place, loads)
+    if loads.load.any():
+        # the platform's load acts on its body
+        last = robot.index(robot.platform)
+        held = robot.on_path[last][:, None] * place.load_wrench(loads.load)
+        body, joint = body + held, joint + held
+        joint[last] -= held[last]
+    return body, joint
+
+
+def _on_what_follows(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
+    """(N, 6) wrench of the dead loads on all that each unknown moves, and its M."""
+    model = place.model
+    body, joint, M_body, M_joint = _on_frames(place, loads)
+    link = (model.motion == LINK)[:, None]
+    wrenches = np.where(link, body[model.frame], joint[model.frame])
+    M = np.where(link[:, None], M_body[model.frame], M_joint[model.frame])
+    return wrenches, M
+
+
+def _on_frames(
+    place: Placement, loads: DeadLoads
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Wrenches of dead loads on all that bodies and joints hold, and their M's."""
+    posture = place.model.posture
+    return resultants(posture, loads, place.bodies, place.carried)
+
+
+def resultants(
+    posture: Posture, loads: DeadLoads, bodies: NDArray, carried: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Dead loads summed over what each frame holds, at the platform's nominal origin.
+
+    Args:
+        posture: nominal; all arrays may have rows in front, as its own.
+        loads: on the robot.
+        bodies: (..., n, 4, 4) ends of the bodies, seen from the base.
+        carried: (..., n, 4, 4) what the joints carry.
+
+    Returns:
+        (..., n, 6) [N m, N] wrenches on what bodies hold and on what joints hold, base
+        axes, and (..., n, 3, 3) [N m] their M's.
+    """
+    robot, origin = posture.robot, posture.platform[..., None, :3, 3]
+    below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
+    own, after = (
+        np.concatenate(_read(G, T, origin), axis=-1)
+        for G, T in ((loads.bodies, bodies), (loads.carried, carried))
+    )
+    joint = below @ (own + after) + after
+    body = joint + own
+    square = (*joint.shape[:-1], 3, 3)
+    return (
+        body[..., :6], joint[..., :6],
+        body[..., 6:].reshape(square), joint[..., 6:].reshape(square),
+    )  # fmt: skip
+
+
+def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Moments (..., n, 3) at the origin, forces (..., n, 3), and M's (..., n, 9)."""
+    points = T[..., :3, :].copy()
+    points[..., 3] -= origin
+    moments = np.cross(points, G, axis=-2).sum(axis=-1)
+    M = points @ np.swapaxes(G, -1, -2)
+    return moments, G[..., 3], M.reshape(*M.shape[:-2], 9)

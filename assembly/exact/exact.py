@@ -1,0 +1,350 @@
+r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
+
+Springs, clearance cones and geometric errors are those of the linear virtual-joint
+model (:mod:`assembly.linear.energy`); only the closures differ: motions follow one
+another as in :mod:`assembly.exact.placement`.  Minimised is the springs' energy minus
+the work of a load,
+
+    minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
+    subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
+
+by the steps of :mod:`assembly.exact.descent`, from the linear answer.
+
+======  ====================  ========  ==============================================
+symbol  code                  shape     meaning
+======  ====================  ========  ==============================================
+x_p     ``platform_screw``    (6,)      rotation vector of R R_nominal^T and shift of
+                                        the platform's origin, base axes
+w       ``load``              (6,)      force: dead; moment: what has the work m . theta
+W       ``loads``             J         work of weights and of loads on bodies
+r       ``closure_residual``  (6 K,)    logarithms of what closures leave open
+======  ====================  ========  ==============================================
+
+The problem is not convex: the answer is a local minimum, and ``docs/exact.md`` says
+what that means.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.dead_load import (
+    DeadLoads,
+    dead_loads,
+    work_of,
+    wrenches_on_frames,
+)
+from assembly.exact.descent import (
+    CLOSED,
+    LONGEST,
+    Expansion,
+    NotConverged,
+    advance,
+    energy_of,
+    expand,
+    imbalance,
+    least_curvature,
+    potential,
+    whose,
+)
+from assembly.exact.placement import LINK, PLAY, SPRING, FiniteRobot, Placement
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
+from assembly.linear.energy import Assembly, solve_assembly
+from assembly.model.clearance import (
+    clearance_bounds,
+    clearance_excess,
+    has_bounded_motion,
+)
+from assembly.solvers.conic import into_cones
+from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
+from stiffness.screws import screw_map
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+_STEPS = 80  # at most; 3 to 5 are usual
+_NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
+_DECREMENT = 1e-14  # relative energy left to gain before the last step
+_STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
+_STATIONARY = 1e-7  # relative imbalance of an answer; 1e-12 is usual
+_ROUNDING = 1e-30  # [J] energies of parts without errors are some 1e-48 J of rounding
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisationError:
+    """What the linear model gets wrong: linear minus exact.
+
+    Attributes:
+        rotation: (3,) [rad] of the platform.
+        translation: (3,) [m] of its origin.
+        energy: [J] absolute.
+        relative_energy: [-] relative to the exact energy.
+    """
+
+    rotation: NDArray
+    translation: NDArray
+    energy: float
+    relative_energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class ExactAssembly:
+    """A manipulator forced together with finite motions; exists only if converged.
+
+    An equilibrium: stationary, closed and within the cones as reported.  Whether it
+    is a local minimum ``least_curvature`` says; that none is lower is not proved.
+
+    Attributes:
+        linear: the linear model's answer from which this one was reached.
+        expansion: where everything is, with the multipliers of the scaled closures.
+        stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
+        iterations: steps taken.
+    """
+
+    linear: Assembly
+    expansion: Expansion
+    stationarity: float
+    iterations: int
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly exact`` prints of it."""
+        return {
+            "pose": f"{numbers(self.posture.pose().values())} m, rad",
+            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
+            "energy": f"{self.energy:.6g} J with finite motions",
+            "platform error": screw_text(self.platform_screw),
+            "certificate": f"closures hold to {self.closure_residual():.1e}, balance "
+            f"to {self.stationarity:.1e}; {self.iterations} steps",
+        }
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Frames, closures and platform; see :mod:`assembly.report.tables`."""
+        from assembly.report.tables import assembly_dataset
+
+        return assembly_dataset(self)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each frame, columns (variable, component)."""
+        from assembly.report.tables import frame_table
+
+        return frame_table(self.to_xarray(), "frame")
+
+    @property
+    def placement(self) -> Placement:
+        """Where everything is."""
+        return self.expansion.here
+
+    @property
+    def load(self) -> NDArray:
+        """(6,) [N m, N] on the platform at its origin, base axes."""
+        return self.linear.load
+
+    @property
+    def loads(self) -> DeadLoads:
+        """All that acts on the robot."""
+        return self.expansion.loads
+
+    @property
+    def multipliers(self) -> NDArray:
+        """(6 closures,) of the scaled closures."""
+        return self.expansion.multipliers
+
+    @cached_property
+    def least_curvature(self) -> float:
+        """[J/rad^2] least second derivative of the potential; positive if stable."""
+        return least_curvature(self.expansion)
+
+    @property
+    def posture(self) -> Posture:
+        """Where the robot stands nominally."""
+        return self.placement.model.posture
+
+    @property
+    def energy(self) -> float:
+        """[J] elastic energy stored."""
+        return energy_of(self.placement)
+
+    @property
+    def potential(self) -> float:
+        """[J] energy minus the work of the loads."""
+        return potential(self.placement, self.loads)
+
+    @property
+    def platform_screw(self) -> NDArray:
+        """(6,) rotation vector of R R_nominal^T and shift of the origin, base axes."""
+        return self.placement.platform_screw
+
+    @property
+    def transforms(self) -> NDArray:
+        """(n, 4, 4) frames seen from the base, before their joint's coordinate."""
+        return self.placement.transforms
+
+    @property
+    def link_screws(self) -> NDArray:
+        """(n, 6) [rad, m] deformations of the bodies, logarithms."""
+        return self.placement.screws[LINK]
+
+    @property
+    def joint_screws(self) -> NDArray:
+        """(n, 6) [rad, m] deformations of the joints, logarithms."""
+        return self.placement.screws[SPRING]
+
+    @cached_property
+    def clearance_screws(self) -> NDArray:
+        """(n, 6) [rad, m] play, and what passive joints move, own row."""
+        play = self.placement.screws[PLAY].copy()
+        axes = [frame.own_axis for frame in self.posture.robot.frames]
+        play[np.arange(len(axes)), axes] += self.placement.own
+        return play
+
+    @cached_property
+    def closure_wrenches(self) -> NDArray:
+        """(closures, 6) [N m, N] what each closure's second chain exerts on its first.
+
+        At the platform's nominal origin, base axes.
+        """
+        return self.multipliers.reshape(-1, 6) * self.placement.model.scale
+
+    @property
+    def wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] what the outer part exerts on the inner through each body.
+
+        At the frame where it is, after its small motions, in its axes there.
+        """
+        return self._through[0]
+
+    @property
+    def joint_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] the same through each joint.
+
+        They differ from :attr:`wrenches` by loads on the body, its weight for one.
+        """
+        return self._through[1]
+
+    @cached_property
+    def _through(self) -> NDArray:
+        """(2, n, 6) [N m, N] through bodies and joints."""
+        robot, T = self.posture.robot, self.transforms
+        closing = closure_signs(robot).T @ self.closure_wrenches
+        held = wrenches_on_frames(self.placement, self.loads)
+        readings = screw_map(T[:, :3, 3] - self.posture.platform[:3, 3], T[:, :3, :3])
+        return np.einsum("nji,knj->kni", readings, closing + np.stack(held))
+
+    @cached_property
+    def linearisation_error(self) -> LinearisationError:
+        """Linear minus exact platform screw and energy."""
+        screw = self.linear.platform_screw - self.platform_screw
+        energy = self.linear.energy - self.energy
+        # inside an assembly zone both are zero up to rounding
+        scale = max(self.energy, 1e-6 * self.linear.energy_without_play, _ROUNDING)
+        return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
+
+    def closure_residual(self) -> float:
+        """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
+        return float(np.abs(self.placement.residual).max(initial=0.0))
+
+    def clearance_excess(self) -> float:
+        """[-] by how much the worst clearance leaves its cone, relative to its size."""
+        bounds = clearance_bounds(self.posture.robot)
+        return clearance_excess(self.clearance_screws, bounds)
+
+
+def solve_exact(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    start: Assembly | None = None,
+    bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+) -> ExactAssembly:
+    """Close a manipulator at least energy with finite motions, from the linear answer.
+
+    Args:
+        posture: where the robot stands; its errors, clearances, links and joint
+            springs are the robot's.
+        load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is
+            dead; the moment's work is its product with the rotation vector.
+        start: the linear answer for this posture and these loads, if it is there.
+        bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
+            frame's origin, base axes; moments are couples of dead forces.
+        gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
+        point: (3,) [m] of the platform, in its axes; the force goes with it.
+
+    Returns:
+        The assembled manipulator: closed, stationary, within its cones.
+
+    Raises:
+        CannotAssemble: the linear model has no answer to start from.
+        FreeMotion: a load drives a motion that nothing resists.
+        NotConverged: no equilibrium was found; a :class:`SolverFailed`.
+        ValueError: ``start`` belongs to another posture or other loads.
+    """
+    loads = dead_loads(posture, load, bodies, gravity, point)
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
+    if start is None:
+        start = solve_assembly(posture, wrench, bodies, gravity)
+    elif start.posture is not posture or not start.has_loads(wrench, bodies, gravity):
+        raise ValueError(
+            "solve_exact: start is the linear answer of another posture or load, "
+            "expected that of these; leave it out to have it computed"
+        )
+    answer = _search(start.joints, start, loads)
+    if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
+        # the bound of a passive joint's own motion was left out, but it matters
+        joints = virtual_joints(posture.robot, bounded_motion=True)
+        answer = _search(joints, start, loads)
+    return answer
+
+
+def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactAssembly:
+    """Step after step from the linear answer."""
+    model = FiniteRobot(linear.posture, joints)
+    here = model.place(_begin(model, linear))
+    rigid = np.zeros(len(here.residual))
+    penalty, damping, near = 0.0, 0.0, False
+    for count in range(1, _STEPS + 1):
+        local = expand(here, loads, rigid)
+        penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
+        step = advance(local, penalty, damping, near)
+        here, rigid, damping = step.there, step.rigid, step.damping
+        scale = max(_energy_scale(here, linear, loads), local.small_energy)
+        near = step.decrement <= _NEAR * scale
+        still = damping == 0.0 and step.length <= _STILL
+        still = still or abs(step.decrement) <= _DECREMENT * scale
+        if still and here.largest_gap <= CLOSED + linear.posture.mismatch:
+            last = expand(here, loads, rigid)
+            if imbalance(last) <= _STATIONARY:
+                return ExactAssembly(linear, last, imbalance(last), count)
+    left = imbalance(expand(here, loads, rigid))
+    raise NotConverged(
+        whose(here),
+        f"after {_STEPS} steps closures are open by {here.largest_gap:.2g} and forces "
+        f"out of balance by {left:.2g}, relative",
+    )
+
+
+def _begin(model: FiniteRobot, linear: Assembly) -> NDArray:
+    """(N,) the linear answer as a first guess, play drawn into the cones."""
+    motions = np.hstack([model.joints.cones, model.joints.free])
+    play = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
+    x = np.concatenate([linear.elastic, play])
+    turned = np.linalg.norm(model.place(x).screws[..., :3], axis=-1)
+    x *= min(1.0, LONGEST / max(float(turned.max(initial=0.0)), 1e-300))
+    x[model.bounded] = into_cones(x[model.bounded], model.joints.group)
+    return x
+
+
+def _energy_scale(here: Placement, linear: Assembly, loads: DeadLoads) -> float:
+    """[J] size of the energies at play."""
+    return max(
+        energy_of(here), abs(work_of(here, loads)), 1e-3 * linear.energy_without_play
+    )

@@ -1,0 +1,143 @@
+"""What a robot file says of a joint's imperfections: its play, its stiffness."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import LOCKED, Clearance
+from forcefit.inputs.table import Table, find_fault, number_array
+
+LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
+LARGEST = 1e40  # in SI: beyond any stiffness, section or density; its inverse below
+_CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
+
+
+def read_clearance(table: Table) -> Clearance | None:
+    """The ``clearance`` table, None if absent.
+
+    Args:
+        table: of a ``[[frame]]``.
+
+    Returns:
+        The bounds that are given.
+
+    Raises:
+        BadInput: an unknown key, or not a finite number >= 0.
+    """
+    if not table.has("clearance"):
+        return None
+    inner = table.table("clearance")
+    bounds = {
+        key: inner.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
+        for key, unit in _CLEARANCE.items()
+        if inner.has(key)
+    }
+    inner.finish()
+    return Clearance(**bounds)
+
+
+def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
+    """K_B as a full matrix; infinities only on its diagonal.
+
+    Args:
+        table: of a ``[[frame]]``.
+        free: row along which a passive joint moves; 0 there, in its whole row and
+            column, leaves it free.  None if the joint does not move by itself.
+
+    Returns:
+        (6, 6) [N m/rad .. N/m] symmetric positive definite but for a row and column of
+        zeros along a free motion; None if absent.
+
+    Raises:
+        BadInput: another shape, not a stiffness, or ``inf`` along the free motion.
+    """
+    key = "joint_stiffness"
+    if not table.has(key):
+        return None
+    value = table.content[key]
+    zero = "" if free is None else f" (number {free + 1} may be 0: free)"
+    expected = f"6 diagonal terms > 0 or inf{zero}, or 6 rows of 6 [N m/rad .. N/m]"
+    K = number_array(value)
+    if K is None or K.shape not in {(6,), (6, 6)} or np.isnan(K).any():
+        shape = (6, 6) if isinstance(value, list) and _has_rows(value) else (6,)
+        found = find_fault(value, shape, infinite=True)
+        raise table.bad(key, f"found {found}, expected {expected}")
+    if K.ndim == 1:
+        low = K.copy()
+        if free is not None and low[free] == 0.0:
+            low[free] = 1.0
+        if low.min() <= 0:
+            raise table.bad(key, f"found {low.min():g} in it, expected {expected}")
+        K = np.diag(K)
+    rigid = np.isposinf(np.diag(K))
+    if free is not None and rigid[free]:
+        raise table.bad(key, LOCKED)
+    bare = rigid.copy()
+    if free is not None:
+        bare[free] = not (K[free].any() or K[:, free].any())
+    soft = np.ix_(~bare, ~bare)
+    wrong = (rigid[:, None] | rigid) & (K != 0.0) | ~np.isfinite(K)
+    wrong &= ~np.diag(rigid)
+    if wrong.any():
+        i, j = np.argwhere(wrong)[0]
+        raise table.bad(
+            key,
+            f"found {K[i, j]:g} at [{i + 1}, {j + 1}]; expected inf only on the "
+            "diagonal, the rest of its row and column zero",
+        )
+    K[soft] = definite(table, key, K[soft])
+    return K
+
+
+def _has_rows(value: list) -> bool:
+    """Whether a list holds lists."""
+    return any(isinstance(row, list) for row in value)
+
+
+def definite(table: Table, key: str, K: NDArray) -> NDArray:
+    """A stiffness matrix, refused unless it is symmetric positive definite.
+
+    Args:
+        table: where it was read.
+        key: of it there.
+        K: (n, n) [N m/rad .. N/m] finite; any part of a stiffness.
+
+    Returns:
+        (n, n) the same, exactly symmetric.
+
+    Raises:
+        BadInput: it is not; a term that shows it is given, counted from 1.
+    """
+    if not K.size:
+        return K
+    diagonal = np.diag(K)
+    i = int(np.argmin(diagonal))
+    if diagonal[i] <= 0:
+        where = f"term [{i + 1}, {i + 1}] of the diagonal"
+        raise table.bad(
+            key,
+            f"not positive definite: found {diagonal[i]:g} as {where}, expected > 0",
+        )
+    if diagonal.max() > LARGEST or diagonal.min() < 1 / LARGEST:
+        i = int(np.argmax(np.abs(np.log(diagonal))))
+        expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
+        found = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
+        raise table.bad(key, f"{found}, {expected}")
+    # scaled to a unit diagonal, so that rad and m weigh alike
+    size = np.sqrt(diagonal)
+    unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)
+    asymmetry = np.abs(unit - unit.T)
+    if asymmetry.max() > 1e-6:
+        a, b = np.unravel_index(int(np.argmax(asymmetry)), K.shape)
+        raise table.bad(
+            key,
+            f"not symmetric: found [{a + 1}, {b + 1}] = {K[a, b]:.6e} but "
+            f"[{b + 1}, {a + 1}] = {K[b, a]:.6e}, expected them equal",
+        )
+    least = np.linalg.eigvalsh((unit + unit.T) / 2).min()
+    if least <= 1e-13:
+        raise table.bad(
+            key,
+            f"not positive definite: found {least:.1e} as smallest eigenvalue once "
+            "scaled to a unit diagonal, expected > 0",
+        )
+    return np.where(K == K.T, K, K / 2 + K.T / 2)

@@ -1,0 +1,249 @@
+"""The ``link`` table of a robot file, in and out: what makes a body elastic."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assembly.files.joint_file import LARGEST, LARGEST_LENGTH, definite
+from assembly.model.robot import (
+    BeamLink,
+    LibraryLink,
+    Link,
+    MatrixLink,
+    MeshLink,
+)
+from forcefit.inputs.table import Table, describe, quoted
+from stiffness.surface.surface import UNITS
+
+_SMALLEST_LENGTH = 1e-12  # [m] below any machine
+_ONE_SECTION = (
+    '"radius" [, "inner_radius"] or "width", "height" or '
+    '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
+)
+_KINDS = ("beam", "stiffness", "mesh", "library")
+_MATERIAL = ("young", "poisson", "density")
+_SECTIONS: dict[str, dict[str, str]] = {  # what each kind is given by, and its unit
+    "round": {"radius": "m", "inner_radius": "m"},
+    "rectangular": {"width": "m", "height": "m"},
+    "general": {
+        "area": "m^2", "I_y": "m^4", "I_z": "m^4", "J": "m^4",
+        "shear_y": "-", "shear_z": "-",
+    },
+}  # fmt: skip
+
+
+def read_link(frame: Table) -> Link | None:
+    """The link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
+
+    Args:
+        frame: the frame's table; its keys ``link`` and ``up`` are read.
+
+    Returns:
+        The link, None if the body is rigid.
+
+    Raises:
+        BadInput: a rule of the format is broken.
+    """
+    if not frame.has("link"):
+        return None
+    link = frame.table("link")
+    kinds = [kind for kind in _KINDS if link.has(kind)]
+    if not kinds and not set(link.content) <= {*_MATERIAL, "up"}:
+        link.finish()  # a misspelt kind gets its suggestion
+    if len(kinds) != 1:
+        found = " and ".join(map(quoted, kinds)) or "none of them"
+        names = " | ".join(map(quoted, _KINDS))
+        raise link.bad("", f"found {found}, expected exactly one of {names}")
+    answer: Link
+    if kinds == ["beam"]:
+        answer = _beam_link(link)
+    elif kinds == ["stiffness"]:
+        K = link.array("stiffness", (6, 6), "N m/rad .. N/m")
+        answer = MatrixLink(definite(link, "stiffness", K))
+    elif kinds == ["mesh"]:
+        answer = _mesh_link(link, frame)
+    else:
+        answer = _library_link(link)
+    link.finish()
+    return answer
+
+
+def _beam_link(link: Table) -> BeamLink:
+    """``beam = { ... }`` and its material."""
+    beam = link.table("beam")
+    theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
+    length = _size(beam, "length", "m") if beam.has("length") else None
+    axis = _direction(beam, "axis")
+    if (length is None) != (axis is None):
+        missing = "length" if length is None else "axis"
+        raise beam.bad(missing, 'missing; expected "length" and "axis", or neither')
+    up = _direction(beam, "up")
+    section = _section(beam)
+    beam.finish()
+    return BeamLink(
+        section, **_material(link), theory=theory, length=length, axis=axis, up=up
+    )
+
+
+def _section(beam: Table) -> dict[str, float]:
+    """Numbers of the section, one of the three kinds."""
+    found = {
+        kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
+    }
+    kinds = [kind for kind, keys in found.items() if keys]
+    if len(kinds) != 1:
+        if not kinds:
+            beam.finish()  # a misspelt key gets its suggestion
+        names = " and ".join(quoted(found[kind][0]) for kind in kinds) or "no section"
+        raise beam.bad("", f"found {names}, expected one section: {_ONE_SECTION}")
+    units = dict(_SECTIONS[kinds[0]])
+    inner = units.pop("inner_radius", None)
+    section = {key: _size(beam, key, unit) for key, unit in units.items()}
+    if inner is not None and beam.has("inner_radius"):
+        section["inner_radius"] = beam.number(
+            "inner_radius", inner, least=0.0, below=section["radius"]
+        )
+    return section
+
+
+def _mesh_link(link: Table, frame: Table) -> MeshLink:
+    """``mesh = { surface, base, tip, ... }`` and its material."""
+    mesh = link.table("mesh")
+    ends = {key: _interface(mesh, key) for key in ("base", "tip")}
+    up = _direction(mesh, "up")
+    spelt = [table for table in (frame, link) if table.has("up")]
+    frame_up = _direction(spelt[0], "up") if spelt else None
+    if len(spelt) == 2:
+        raise link.bad("up", "found it in the frame too; expected one of the two")
+    if (up is None) != (frame_up is None):
+        message = 'missing; expected the "up" of the mesh and of the frame, or neither'
+        raise (mesh if up is None else frame).bad("up", message)
+    answer = MeshLink(
+        surface=_path(mesh, "surface", mesh.text("surface")),
+        **ends,
+        **_material(link),
+        unit=mesh.choice("unit", UNITS, "m"),
+        up=up,
+        frame_up=frame_up,
+        axis=_direction(mesh, "axis"),
+        interface=mesh.choice("interface", ("rigid", "distributing"), "rigid"),
+    )
+    mesh.finish()
+    return answer
+
+
+def _interface(mesh: Table, key: str) -> Any:
+    """Where a mesh meets a joint, as written; its syntax is checked."""
+    from stiffness.surface.interface import parse_interface
+
+    value = mesh.require(key, 'an interface such as "z=0.452"')
+    if isinstance(value, dict):
+        _check_interface_table(mesh.table(key))
+    parse_interface(value, f"{mesh.file}: {mesh.place}.{key}")
+    return value
+
+
+def _check_interface_table(table: Table) -> None:
+    """``{ plane = { point, normal }, radius }`` or ``{ bore = { ... } }``."""
+    kind, direction = ("bore", "axis") if table.has("bore") else ("plane", "normal")
+    inner = table.table(kind)
+    inner.array("point", (3,), "m", largest=LARGEST_LENGTH)
+    inner.require(direction, "3 finite numbers [direction]")
+    _direction(inner, direction)
+    outer = inner if kind == "bore" else table
+    if kind == "bore" or table.has("radius"):
+        _size(outer, "radius", "m")
+    inner.finish()
+    table.finish()
+
+
+def _library_link(link: Table) -> LibraryLink:
+    """``library = "path/to/library#key"``."""
+    value = link.text("library")
+    path, _, key = value.rpartition("#")
+    if not (path and key):
+        found = describe(value)
+        raise link.bad("library", f'found {found}, expected "path/to/library#key"')
+    return LibraryLink(_path(link, "library", path), key)
+
+
+def _material(link: Table) -> dict[str, Any]:
+    """Young's modulus, Poisson's ratio and, if given, density."""
+    return {
+        "young": _size(link, "young", "Pa"),
+        "poisson": link.number("poisson", "-", above=-1.0, below=0.5),
+        "density": _size(link, "density", "kg/m^3") if link.has("density") else None,
+    }
+
+
+def _size(table: Table, key: str, unit: str) -> float:
+    """A positive number whose powers do not leave the range of floats."""
+    length = unit == "m"
+    largest = LARGEST_LENGTH if length else LARGEST
+    smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
+    value = table.number(key, unit, above=0.0, largest=largest)
+    if value < smallest:
+        expected = f"expected at least {smallest:g} [{unit}]"
+        raise table.bad(key, f"found {value:g}, {expected}")
+    return value
+
+
+def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
+    """A direction, None if absent."""
+    if not table.has(key):
+        return None
+    vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
+    if np.linalg.norm(vector) < _SMALLEST_LENGTH:
+        raise table.bad(key, f"found {describe(vector.tolist())}, expected a direction")
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _path(table: Table, key: str, path: str) -> Path:
+    """A path relative to the file that names it."""
+    if path.strip() in {"", ".", ".."}:
+        raise table.bad(key, f"found {describe(path)}, expected a file")
+    return Path(table.file).parent / path
+
+
+def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
+    """What a frame says of its link.
+
+    Args:
+        link: of a robot.
+        folder: of the file to be written, from which paths then lead; paths are
+            written as they are without one.
+
+    Returns:
+        The ``link`` table, and beside it the frame's ``up`` for a mesh that has one.
+    """
+    if isinstance(link, MatrixLink):
+        return {"link": {"stiffness": link.stiffness.tolist()}}
+    if isinstance(link, LibraryLink):
+        return {"link": {"library": f"{_from(folder, link.library)}#{link.key}"}}
+    names: tuple[str, ...] = ("theory", "length", "axis", "up")
+    if isinstance(link, BeamLink):
+        kind, inner = "beam", dict[str, Any](link.section)
+    else:
+        names = ("base", "tip", "unit", "axis", "up", "interface")
+        kind, inner = "mesh", {"surface": _from(folder, link.surface)}
+    given = {name: getattr(link, name) for name in names}
+    for name, value in given.items():
+        if value is not None:
+            inner[name] = list(value) if isinstance(value, tuple) else value
+    table = {kind: inner} | {name: getattr(link, name) for name in _MATERIAL}
+    table = {key: value for key, value in table.items() if value is not None}
+    up = link.frame_up if isinstance(link, MeshLink) else None
+    return {"link": table} if up is None else {"link": table, "up": list(up)}
+
+
+def _from(folder: Path | None, path: Path) -> str:
+    """A path as the new file names it."""
+    if folder is None or path.is_absolute():
+        return str(path)
+    try:
+        return os.path.relpath(path.resolve(), folder.resolve())
+    except ValueError:  # another drive
+        return str(path.resolve())

@@ -1,0 +1,339 @@
+"""Robot files in and out (``docs/robot_files.md``), every rule checked at the door."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.files.effect_file import read_effects
+from assembly.files.joint_file import (
+    LARGEST_LENGTH,
+    read_clearance,
+    read_joint_stiffness,
+)
+from assembly.files.link_file import link_table, read_link
+from assembly.kinematics.posture import home_posture
+from assembly.model.link_span import with_spans
+from assembly.model.robot import (
+    BASE,
+    JOINTS,
+    Frame,
+    MeshLink,
+    Robot,
+)
+from forcefit.inputs.table import (
+    BadInput,
+    Table,
+    describe,
+    nearest,
+    quoted,
+    read_toml,
+)
+from forcefit.inputs.writing import ROBOT_MARK, write_text
+from stiffness.screws import rotation_matrix, rotation_vector
+
+_LONGEST_NAME = 200  # characters
+_MOST_FRAMES = 2000
+
+
+def read_robot(path: Path | str) -> Robot:
+    """Robot of a robot file.
+
+    Args:
+        path: a ``.toml`` file in the public format.
+
+    Returns:
+        The robot; its nominal closures hold in its home pose.
+
+    Raises:
+        BadInput: the file breaks a rule of the format, or a closure does not hold.
+    """
+    return robot_of(read_toml(Path(path)), Path(path).stem)
+
+
+def robot_of(root: Table, name: str) -> Robot:
+    """Robot of a robot file's root table.
+
+    Args:
+        root: the table; paths in it lead from the folder of ``root.file``.
+        name: of the robot if the table has none.
+
+    Returns:
+        The robot; its nominal closures hold in its home pose.
+
+    Raises:
+        BadInput: the table breaks a rule of the format, or a closure does not hold.
+    """
+    robot = declared_robot(root, name)
+    try:
+        return with_spans(robot, home_posture(robot).coordinates)
+    except BadInput as error:
+        raise BadInput(f"{root.file}: {error}") from None
+
+
+def declared_robot(root: Table, name: str) -> Robot:
+    """Robot of a root table as it is written: whether it closes is not looked at.
+
+    Args:
+        root: of a robot file.
+        name: of the robot if the table has none.
+
+    Returns:
+        The robot; lengths of its beams may still be unknown.
+
+    Raises:
+        BadInput: the table breaks a rule of the format.
+    """
+    name = root.text("name", name, longest=_LONGEST_NAME)
+    description = root.get("description", "")
+    if not isinstance(description, str):
+        found = describe(description)
+        raise root.bad("description", f"found {found}, expected a string")
+    platform = root.text("platform", expected="the name of a frame")
+    tables = root.tables("frame"), root.tables("closure")
+    effects = root.tables("effect")
+    root.finish()
+    if not 0 < len(tables[0]) <= _MOST_FRAMES:
+        found = f"found {len(tables[0])}" if tables[0] else "missing"
+        raise root.bad("frame", f"{found}; expected 1 to {_MOST_FRAMES} [[frame]]")
+    frames = tuple(_frame(table) for table in tables[0])
+    names = [frame.name for frame in frames]
+    closures = tuple(_closure(table, names) for table in tables[1])
+    _check_known(root, "platform", platform, names)
+    try:
+        remarks = _remarks(tables[0])
+        robot = Robot(name, platform, frames, closures, description, remarks=remarks)
+        robot = replace(robot, effects=read_effects(effects, robot))
+        _check_meeting_frames(robot)
+    except BadInput as error:
+        raise BadInput(f"{root.file}: {error}") from None
+    return robot
+
+
+def _remarks(tables: list[Table]) -> tuple[str, ...]:
+    """That the frames named have ``dh`` without ``alpha``, which turns their axis."""
+    # the other three are zero as often as not; a forgotten alpha is another machine
+    dh = {table.content["name"]: table.content.get("dh") for table in tables}
+    flat = [
+        quoted(name) for name, given in dh.items() if given and "alpha" not in given
+    ]
+    if not flat:
+        return ()
+    return (f"dh without alpha, taken as 0: {', '.join(flat)}",)
+
+
+def _frame(table: Table) -> Frame:
+    """One ``[[frame]]``."""
+    name = table.text("name", longest=_LONGEST_NAME)
+    table.place = f"frame {quoted(name)}"
+    joint = table.choice("joint", JOINTS, "fixed")
+    actuated = table.boolean("actuated", False)
+    if joint == "fixed" and (actuated or table.has("position")):
+        key = "actuated" if actuated else "position"
+        message = 'found one on a fixed joint; expected joint = "revolute" | '
+        raise table.bad(key, message + '"prismatic", or no such key')
+    translation, rotation = _placement(table)
+    passive = joint != "fixed" and not actuated
+    own = (5 if joint == "prismatic" else 2) if passive else None
+    frame = Frame(
+        name=name,
+        parent=table.text("parent", expected='the name of a frame, or "base"'),
+        translation=translation,
+        rotation=rotation,
+        joint=joint,
+        actuated=actuated,
+        position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
+        geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
+        clearance=read_clearance(table),
+        joint_stiffness=read_joint_stiffness(table, own),
+        link=read_link(table),
+        mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
+        centre_of_mass=_numbers(table, "centre_of_mass", 3, "m"),
+    )
+    if not isinstance(frame.link, MeshLink) and "up" in table.content:
+        raise table.bad("up", "found one without a mesh; it fixes the roll of a mesh")
+    table.finish()
+    return frame
+
+
+def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
+    """Lengths or angles, zero where absent."""
+    zero = np.zeros(count)
+    return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _placement(table: Table) -> tuple[NDArray, NDArray]:
+    """Translation and rotation vector, given as such or by ``dh``."""
+    given = [key for key in ("translation", "rotation") if table.has(key)]
+    if not table.has("dh"):
+        return (
+            _numbers(table, "translation", 3, "m"),
+            _numbers(table, "rotation", 3, "rad"),
+        )
+    if given:
+        message = 'found it beside "dh", which places the frame; expected one of them'
+        raise table.bad(given[0], message)
+    dh = table.table("dh")
+    units = {"theta": "rad", "d": "m", "a": "m", "alpha": "rad"}
+    theta, d, a, alpha = (
+        dh.number(key, unit, 0.0, largest=LARGEST_LENGTH) for key, unit in units.items()
+    )
+    dh.finish()
+    # Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha)
+    translation = np.array([a * math.cos(theta), a * math.sin(theta), d])
+    turn = rotation_matrix([0, 0, theta]) @ rotation_matrix([alpha, 0, 0])
+    return translation, rotation_vector(turn)
+
+
+def _closure(table: Table, names: list[str]) -> tuple[str, str]:
+    """One ``[[closure]]``."""
+    value = table.require("frames", "two frame names")
+    table.finish()
+    proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
+    if not proper or len(value) != 2 or value[0] == value[1]:
+        message = f"found {describe(value)}, expected two different frame names"
+        raise table.bad("frames", message)
+    for name in value:
+        _check_known(table, "frames", name, names)
+    return value[0], value[1]
+
+
+def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
+    """Refuse a name that no frame has."""
+    if name == BASE:
+        message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
+        raise table.bad(key, message)
+    if name not in names:
+        hint = nearest(name, names)
+        message = f"found {quoted(name)}, expected the name of a frame{hint}"
+        raise table.bad(key, message)
+
+
+def _check_meeting_frames(robot: Robot) -> None:
+    """A frame where chains meet must have no joint of its own."""
+    meeting = {"platform": [robot.platform]}
+    for number, pair in enumerate(robot.closures, 1):
+        meeting[f"closure[{number}].frames"] = list(pair)
+    for place, names in meeting.items():
+        for name in names:
+            frame = robot.frame(name)
+            keys = ("clearance", "joint_stiffness")
+            has = [key for key in keys if getattr(frame, key) is not None]
+            if frame.joint != "fixed" or has:
+                found = has[0] if has else f"a {frame.joint} joint"
+                raise BadInput(
+                    f"{place}: found {found} at frame {quoted(name)}; expected a fixed "
+                    "joint without clearance or joint_stiffness (add a frame after it)"
+                )
+
+
+def write_robot(robot: Robot, path: Path | str) -> None:
+    """Write a robot file that :func:`read_robot` reads back to the same robot.
+
+    Args:
+        robot: to be written.
+        path: of the new file; relative paths of meshes and libraries are written as
+            they lead from there.
+
+    Raises:
+        BadInput: the file cannot be written.
+    """
+    table = robot_table(robot, Path(path).parent)
+    frames, closures = table.pop("frame"), table.pop("closure", [])
+    effects = table.pop("effect", [])
+    lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
+    kinds = {"frame": frames, "closure": closures, "effect": effects}
+    for kind, tables in kinds.items():
+        for inner in tables:
+            said = (f"{k} = {_toml(v)}" for k, v in inner.items())
+            lines += ["", f"[[{kind}]]", *said]
+    write_text("\n".join(lines) + "\n", path)
+
+
+def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
+    """What a robot file says of a robot.
+
+    Args:
+        robot: any.
+        folder: of the file to be written, from which paths then lead.
+
+    Returns:
+        Plain values; :func:`robot_of` reads them back to the same robot.
+    """
+    table: dict[str, Any] = {"name": robot.name}
+    if robot.description:
+        table["description"] = robot.description
+    table["platform"] = robot.platform
+    table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
+    if robot.closures:
+        table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
+    if robot.effects:
+        table["effect"] = [
+            {"name": name, "parameters": dict(values)}
+            for name, values in robot.effects.items()
+        ]
+    return table
+
+
+def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
+    """What ``[[frame]]`` says of a frame, defaults left out.
+
+    Args:
+        frame: of a robot.
+        folder: of the file to be written, from which paths then lead.
+
+    Returns:
+        Keys and plain values of the file format.
+    """
+    table: dict[str, Any] = {"name": frame.name, "parent": frame.parent}
+    table["translation"] = frame.translation.tolist()
+    table["rotation"] = frame.rotation.tolist()
+    if frame.joint != "fixed":
+        table |= {"joint": frame.joint, "position": frame.position}
+        if frame.actuated:
+            table["actuated"] = True
+    if np.any(frame.geometric_error):
+        table["geometric_error"] = frame.geometric_error.tolist()
+    if frame.clearance is not None:
+        given = vars(frame.clearance).items()
+        table["clearance"] = {k: v for k, v in given if v is not None}
+    if frame.joint_stiffness is not None:
+        K = frame.joint_stiffness
+        diagonal = np.array_equal(K, np.diag(np.diag(K)))
+        table["joint_stiffness"] = (np.diag(K) if diagonal else K).tolist()
+    if frame.link is not None:
+        table |= link_table(frame.link, folder)
+    if frame.mass:
+        table["mass"] = frame.mass
+    if np.any(frame.centre_of_mass):
+        table["centre_of_mass"] = frame.centre_of_mass.tolist()
+    return table
+
+
+def _toml(value: Any) -> str:
+    """A value in TOML; floats keep all their digits."""
+    if isinstance(value, bool | np.bool_):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{"".join(map(_escaped, value))}"'
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
+        return "{ " + inner + " }"
+    if isinstance(value, Iterable):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return repr(value) if isinstance(value, int) else repr(float(value))
+
+
+def _key(name: str) -> str:
+    """A key, between quotes where a dot or more would be read as something else."""
+    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
+    return name if bare else _toml(name)
+
+
+def _escaped(c: str) -> str:
+    """A character as it stands between double quotes."""
+    return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

@@ -1,0 +1,137 @@
+"""The nominal closures, solved: joint coordinates at which the perfect robot closes.
+
+Many targets are followed at once, each along its straight line from the home pose.
+Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
+undetermined stays where it was, and overconstrained robots are no special case.  The
+loops are compiled, in :mod:`assembly.kinematics.compiled_continuation`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import JOINTS, Robot
+from stiffness.screws import rotation_vector
+
+NOT_CLOSED = "expected a configuration in which every closure holds"
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where to go: one of the two, NaN where free.
+
+    Attributes:
+        pose: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad] of the platform, or None.
+        coordinates: (k, n) [rad or m] of the joints held, or None.
+    """
+
+    pose: NDArray | None = None
+    coordinates: NDArray | None = None
+
+    def __len__(self) -> int:
+        given = self.pose if self.pose is not None else self.coordinates
+        return 0 if given is None else len(given)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """How far each target was followed.
+
+    Attributes:
+        coordinates: (k, n) joint coordinates where the track ends.
+        transforms: (k, n, 4, 4) frames there.
+        progress: (k,) 1 where the target was reached, less where the track broke off.
+        closure_mismatch: (k, closures) [rad, m] largest component left open.
+    """
+
+    coordinates: NDArray
+    transforms: NDArray
+    progress: NDArray
+    closure_mismatch: NDArray
+
+    @property
+    def reached(self) -> NDArray:
+        """(k,) bool."""
+        return self.progress == 1.0
+
+    @property
+    def mismatch(self) -> NDArray:
+        """(k,) [rad, m] largest component left open in any closure."""
+        return self.closure_mismatch.max(axis=1, initial=0.0)
+
+
+def size_of(robot: Robot) -> float:
+    """[m] reference length: the longest body of the robot, 1 if all are points."""
+    lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1)
+    return float(lengths.max()) or 1.0
+
+
+def mobile(robot: Robot) -> NDArray:
+    """(n,) bool: joints that are not fixed."""
+    return np.array([f.joint != "fixed" for f in robot.frames])
+
+
+def motion_screws(robot: Robot, T: NDArray) -> NDArray:
+    """Screws by which unit joint motions move what is attached, at the base origin.
+
+    Args:
+        robot: of n frames.
+        T: (..., n, 4, 4) frames.
+
+    Returns:
+        (..., n, 6) zero for fixed joints; base axes.
+    """
+    z, p = T[..., :3, 2], T[..., :3, 3]
+    prismatic = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
+    turning = np.concatenate([z, np.cross(p, z)], axis=-1)
+    sliding = np.concatenate([np.zeros_like(z), z], axis=-1)
+    return np.where(prismatic, sliding, turning) * mobile(robot)[:, None]
+
+
+def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Track:
+    """Follow the nominal closures from one configuration to many targets.
+
+    Args:
+        robot: of n frames.
+        start: (n,) coordinates that close (or are the first guess, with ``steps=1``).
+        target: k poses or sets of held coordinates.
+        steps: first number of steps; they shrink and grow by themselves.
+
+    Returns:
+        The tracks, with how far each one came.
+    """
+    from assembly.kinematics.compiled_continuation import follow_all, forward
+
+    count, n = len(target), len(robot.frames)
+    carries = robot.on_path - np.eye(n)  # a joint's motion comes after its own frame
+    kinds = np.array([JOINTS.index(f.joint) for f in robot.frames])
+    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    held = np.full((count, n), np.nan)
+    if target.coordinates is not None:
+        held = np.where(kinds > 0, target.coordinates, np.nan)
+    poses = np.zeros((0, 6)) if target.pose is None else target.pose
+    q, progress = follow_all(
+        robot.parents, kinds, robot.fixed_transforms, carries,
+        np.array(pairs, dtype=int).reshape(-1, 2), robot.index(robot.platform),
+        np.array(start, dtype=float), np.array(poses, dtype=float), held,
+        size_of(robot), steps,
+    )  # fmt: skip
+    T = np.zeros((count, n, 4, 4))
+    T[..., 3, 3] = 1.0
+    for i in range(count):
+        T[i, :, :3, :3], T[i, :, :3, 3] = forward(
+            robot.parents, kinds, robot.fixed_transforms, q[i]
+        )
+    return Track(q, T, progress, _closure_mismatch(robot, T))
+
+
+def _closure_mismatch(robot: Robot, T: NDArray) -> NDArray:
+    """(k, closures) [rad, m] largest open component of each closure."""
+    worst = np.zeros((len(T), len(robot.closures)))
+    for k, (a, b) in enumerate(robot.closures):
+        A, B = T[:, robot.index(a)], T[:, robot.index(b)]
+        turn = rotation_vector(A[:, :3, :3] @ np.swapaxes(B[:, :3, :3], 1, 2))
+        shift = A[:, :3, 3] - B[:, :3, 3]
+        worst[:, k] = np.abs(np.concatenate([turn, shift], axis=1)).max(axis=1)
+    return worst

@@ -1,0 +1,275 @@
+"""A robot placed somewhere: where every frame is, and how a small screw travels.
+
+======  ==================  ============  =========================================
+symbol  code                shape         meaning
+======  ==================  ============  =========================================
+q       ``coordinates``     (..., n)      joint coordinates [rad or m]
+T       ``transforms``      (..., n,4,4)  frames seen from the base, before own joint
+M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): screw at frame j, in its
+                                          axes -> at the platform, in base axes
+======  ==================  ============  =========================================
+
+Eq. (14) is off by one as printed: its product down to h = j maps a screw written in
+frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x R, R]``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.files.joint_file import LARGEST_LENGTH
+from assembly.kinematics.nominal import NOT_CLOSED, Target, Track, follow
+from assembly.model.robot import Robot
+from forcefit.inputs.display import Figures, brief, html_table, numbers, short_repr
+from forcefit.inputs.table import BadInput, nearest
+from stiffness.screws import rotation_matrix, rotation_vector, screw_map
+
+POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
+_HOME_TOLERANCE = 1e-6  # [rad, m] what rounded robot files may leave open at home
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """A robot whose nominal geometry closes; it exists only if it does.
+
+    Attributes:
+        robot: the manipulator.
+        coordinates: (n,) [rad or m] of every joint, 0 for fixed ones.
+        transforms: (n, 4, 4) frames seen from the base, without imperfections.
+        mismatch: [rad, m] largest nominal closure error left (rounded files); dropped.
+    """
+
+    robot: Robot
+    coordinates: NDArray
+    transforms: NDArray
+    mismatch: float
+
+    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    def _figures(self) -> Figures:
+        """Where the platform stands, and what drives it there."""
+        if self.transforms.ndim > 3:
+            return {"postures": str(self.transforms.shape[:-3])}
+        frames = self.robot.frames
+        drives = [
+            f"{f.name} {x:.6g}" for f, x in zip(frames, self.coordinates, strict=True)
+            if f.actuated
+        ]  # fmt: skip
+        return {
+            "pose": f"{numbers(self.pose().values())} m, rad",
+            "drives": f"{brief(', '.join(drives)) or 'none'} [rad, m]",
+            "frames": str(len(frames)),
+            "nominal mismatch": f"{self.mismatch:.2g} rad, m",
+        }
+
+    @cached_property
+    def platform(self) -> NDArray:
+        """(..., 4, 4) nominal platform pose seen from the base."""
+        return self.transforms[..., self.robot.index(self.robot.platform), :, :]
+
+    @cached_property
+    def paths(self) -> NDArray:
+        """(..., n, 6, 6) maps from screws at each frame to the platform, base axes."""
+        offsets = self.transforms[..., :3, 3] - self.platform[..., None, :3, 3]
+        return screw_map(offsets, self.transforms[..., :3, :3])
+
+    def pose(self) -> dict[str, float]:
+        """Nominal platform pose by component, rotation vector in base axes."""
+        return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
+
+
+def pose_components(T: NDArray) -> NDArray:
+    """(..., 6) ``[tx ty tz rx ry rz]`` of transforms, see :data:`POSE`."""
+    return np.concatenate([T[..., :3, 3], rotation_vector(T[..., :3, :3])], axis=-1)
+
+
+def home_posture(robot: Robot) -> Posture:
+    """The home pose: actuated joints at ``position``, passive ones solved from it.
+
+    Args:
+        robot: any.
+
+    Returns:
+        The posture.
+
+    Raises:
+        BadInput: a closure does not hold to 1e-6 rad and m; it is named.
+    """
+    actuated = np.array([f.actuated for f in robot.frames])
+    here = np.where(actuated, robot.positions, np.nan)
+    track = follow(robot, robot.positions, Target(coordinates=here[None]), steps=1)
+    if not track.mismatch[0] < _HOME_TOLERANCE:
+        k = int(np.argmax(track.closure_mismatch[0]))
+        a, b = robot.closures[k]
+        raise BadInput(
+            f'{robot.name}: closure[{k + 1}] ("{a}", "{b}") does not hold in the home '
+            f"pose: off by {track.closure_mismatch[0, k]:.3g} rad or m with the "
+            f"actuated joints held, expected < {_HOME_TOLERANCE:g}"
+        )
+    return _posture(robot, track, 0)
+
+
+def place_robot(
+    robot: Robot,
+    pose: Mapping[str, float] | None = None,
+    joints: Mapping[str, float] | None = None,
+) -> Posture:
+    """The posture of a nominal platform pose, or of actuated coordinates.
+
+    The closures are followed from the home pose along a straight line, so the assembly
+    mode is the home pose's.  What the input leaves undetermined stays near home.
+
+    Args:
+        robot: any.
+        pose: some of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
+            and rotation vector in base axes; components not given are free.
+        joints: coordinates [rad or m] of actuated joints by frame; the others keep
+            their ``position``.
+
+    Returns:
+        The posture.
+
+    Raises:
+        BadInput: both or an unknown name given, a value not finite, or out of reach;
+            the distance by which it misses is given.
+    """
+    home = home_posture(robot)
+    if pose and joints:
+        raise BadInput("found both a pose and joints, expected one of them")
+    if joints:
+        target = joint_target(robot, joints)
+    elif pose:
+        target = pose_target(pose)
+    else:
+        return home
+    track = follow(robot, home.coordinates, target)
+    if not track.reached[0]:
+        raise BadInput(f"{robot.name}: {miss(robot, track, target, 0)}")
+    return _posture(robot, track, 0)
+
+
+def pose_target(pose: Mapping[str, float]) -> Target:
+    """A single platform pose as a target; see :func:`place_robot`."""
+    goal = np.full((1, 6), np.nan)
+    for name, value in pose.items():
+        if name not in POSE:
+            hint = nearest(name, POSE)
+            raise BadInput(f'pose: unknown component "{name[:60]}"{hint}')
+        goal[0, POSE.index(name)] = _finite(f"pose.{name}", value, LARGEST_LENGTH)
+    return Target(pose=goal)
+
+
+def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
+    """Actuated coordinates as a target; see :func:`place_robot`."""
+    actuated = [f.name for f in robot.frames if f.actuated]
+    goal = np.where([f.actuated for f in robot.frames], robot.positions, np.nan)
+    for name, value in joints.items():
+        if name not in actuated:
+            hint = nearest(name, actuated)
+            raise BadInput(f'joints: no actuated joint "{name[:60]}"{hint}')
+        goal[robot.index(name)] = _finite(f"joint {name}", value, LARGEST_LENGTH)
+    return Target(coordinates=goal[None])
+
+
+def _finite(whose: str, value: float, largest: float) -> float:
+    """The value, refused if it is not a finite number, or beyond any machine."""
+    if not np.isfinite(value):
+        raise BadInput(f"{whose}: found {value}, expected a finite number")
+    if abs(value) > largest:
+        expected = f"expected a number of size at most {largest:g}"
+        raise BadInput(f"{whose}: found {value:g}, {expected}")
+    return float(value)
+
+
+def place_many(
+    robot: Robot, poses: ArrayLike
+) -> tuple[list[Posture | None], list[str]]:
+    """Postures of many nominal platform poses at once.
+
+    Args:
+        robot: any.
+        poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN where a component is free.
+
+    Returns:
+        For each pose its posture, None where it is out of reach, and for each pose an
+        empty string, or why there is no posture.
+
+    Raises:
+        BadInput: the robot's closures do not hold in its home pose.
+    """
+    return _follow_many(robot, Target(pose=np.asarray(poses, dtype=float)))
+
+
+def place_many_joints(
+    robot: Robot, coordinates: ArrayLike
+) -> tuple[list[Posture | None], list[str]]:
+    """Postures of many sets of actuated coordinates at once.
+
+    Args:
+        robot: of n frames.
+        coordinates: (k, n) [rad or m] of the joints held, NaN for those left free.
+
+    Returns:
+        As :func:`place_many`.
+
+    Raises:
+        BadInput: the robot's closures do not hold in its home pose.
+    """
+    return _follow_many(robot, Target(coordinates=np.asarray(coordinates, dtype=float)))
+
+
+def _follow_many(
+    robot: Robot, target: Target
+) -> tuple[list[Posture | None], list[str]]:
+    """For each target its posture, or None and why there is none."""
+    track = follow(robot, home_posture(robot).coordinates, target)
+    postures = [
+        _posture(robot, track, i) if reached else None
+        for i, reached in enumerate(track.reached)
+    ]
+    reasons = [
+        "" if reached else miss(robot, track, target, i)
+        for i, reached in enumerate(track.reached)
+    ]
+    return postures, reasons
+
+
+def miss(robot: Robot, track: Track, target: Target, i: int) -> str:
+    """Why target i was not reached, with the distance by which it misses."""
+    if target.pose is None:
+        left = (1.0 - track.progress[i]) * 100
+        return (
+            f"these joint coordinates cannot be reached: the closures stop holding "
+            f"{left:.3g} % of the way before them; {NOT_CLOSED}"
+        )
+    goal = target.pose[i]
+    here = pose_components(track.transforms[i, robot.index(robot.platform)])
+    given = [k for k in range(6) if np.isfinite(goal[k])]
+    asked = ", ".join(f"{POSE[k]}={goal[k]:.6g}" for k in given)
+    gap = np.array([
+        goal[k] - here[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
+    ])
+    parts = []
+    if any(k < 3 for k in given):
+        parts.append(f"{np.linalg.norm(gap[:3]):.6g} m")
+    if any(k >= 3 for k in given):
+        between = rotation_matrix(goal[3:]) @ rotation_matrix(here[3:]).T
+        full = np.isfinite(goal[3:]).all()
+        angle = np.linalg.norm(rotation_vector(between) if full else gap[3:])
+        parts.append(f"{angle:.6g} rad")
+    stop = ", ".join(f"{POSE[k]}={here[k]:.6g}" for k in given)
+    return (
+        f"pose {asked} cannot be reached: on the straight line from home the platform "
+        f"stops at {stop}, {' and '.join(parts)} short; {NOT_CLOSED}"
+    )
+
+
+def _posture(robot: Robot, track: Track, i: int) -> Posture:
+    """Row i of a track, its arrays locked."""
+    q, T = track.coordinates[i].copy(), track.transforms[i].copy()
+    q.setflags(write=False)
+    T.setflags(write=False)
+    return Posture(robot, q, T, float(track.mismatch[i]))

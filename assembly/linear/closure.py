@@ -1,0 +1,242 @@
+"""Legs and loops must meet: the assembly constraints, linear in the small screws.
+
+Eqs (8) and (16)-(20) for any tree with closures: the screws along the two chains that
+meet at a closure must add up to the same platform-side motion,
+
+    sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0,
+
+sign +1 on the first chain, -1 on the second, 0 off both and on frames they share.
+All screws are read at the platform's origin in base axes, so the multiplier of closure
+k is the wrench its second chain exerts on its first, read there.
+
+======  =============  ==========  ================================================
+symbol  code           shape       meaning
+======  =============  ==========  ================================================
+y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
+u       ``cones``      (6n, nu)    clearances, scaled: discs and intervals of size 1
+q       ``free``       (6n, nq)    motions without bound, in units of their screws
+======  =============  ==========  ================================================
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.files.joint_file import LARGEST_LENGTH
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.links import compliance_factor, joint_compliances, link_compliances
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, quoted
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualJoints:
+    """What may move in a robot, beside its drives: columns of small screws.
+
+    Attributes:
+        robot: of n frames.
+        elastic: (6n, ny) columns of links and joint springs.
+        links: (ny,) bool, columns that belong to links; the others are joints'.
+        cones: (6n, nu) columns of bounded clearances, each the size of its bound.
+        group: (nu,) which cone a column belongs to: two columns for a disc.
+        scaled: (nu,) bool, whether the margin's factor scales the cone.
+        free: (6n, nq) unit columns of unbounded motions.
+        bounded_motion: frames whose bound of the passive joint's own motion is kept.
+    """
+
+    robot: Robot
+    elastic: NDArray
+    links: NDArray
+    cones: NDArray
+    group: NDArray
+    scaled: NDArray
+    free: NDArray
+    bounded_motion: frozenset[int]
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def virtual_joints(
+    robot: Robot, compliant: str = "elastic",
+    bounded_motion: bool | frozenset[int] = False,
+) -> VirtualJoints:  # fmt: skip
+    """Columns of everything that may move.
+
+    Args:
+        robot: of n frames.
+        compliant: what passive joints with stiffness do: ``"elastic"``, all springs
+            act; ``"hinged"``, they do but for the one about (or along) the joint's own
+            z, which is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and
+            the own z is locked or free: the two readings of problem (21).
+        bounded_motion: keep the bounds of passive joints' own motion, of all or of
+            these frames.  They are large and almost never reached, so they are left
+            out first and checked after.
+
+    Returns:
+        The columns.
+    """
+    if isinstance(bounded_motion, bool):
+        bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
+    return _virtual_joints(_Parts(_parts(robot), robot), compliant, bounded_motion)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Robots that differ in errors and masses alone have the same virtual joints."""
+
+    parts: tuple
+    robot: Robot = field(compare=False)
+
+
+def _parts(robot: Robot) -> tuple:
+    """All that virtual joints depend on; links by identity, the robot keeps them."""
+    return tuple(
+        (
+            f.parent, f.joint, f.actuated, f.clearance, id(f.link),
+            f.translation.tobytes(), f.rotation.tobytes(),
+            None if f.joint_stiffness is None else f.joint_stiffness.tobytes(),
+        )
+        for f in robot.frames
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _virtual_joints(
+    case: _Parts, compliant: str, bounded_motion: frozenset[int]
+) -> VirtualJoints:
+    """The columns, once for all robots of the same parts."""
+    robot = case.robot
+    turns = compliant in {"free", "hinged"}
+    bounds = clearance_bounds(robot, "free" if turns else "elastic")
+    play = scales_with_margin(robot)
+    left_out = [i not in bounded_motion for i in range(len(bounds))]
+    bounds = np.where(
+        np.array(left_out)[:, None] & ~play & (bounds > 0), np.inf, bounds
+    )
+    links = hinges = np.zeros((0, 6, 6))
+    if compliant in {"elastic", "hinged"}:
+        links, hinges = link_compliances(robot), joint_compliances(robot)
+    if compliant == "hinged":
+        for C, frame in zip(hinges, robot.frames, strict=True):
+            if frame.compliant:
+                C[frame.own_axis] = C[:, frame.own_axis] = 0.0
+    elastic = _elastic(links, hinges, len(robot.frames))
+    return VirtualJoints(
+        robot, *elastic, *_cones(bounds, play),
+        _free(bounds), bounded_motion,
+    )  # fmt: skip
+
+
+def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
+    """Columns of links and springs, and which of them are links'."""
+    columns, is_link = [np.zeros((6 * count, 0))], []
+    for compliances, link in ((links, True), (joints, False)):
+        for i, C in enumerate(compliances):
+            L = compliance_factor(C)
+            block = np.zeros((6 * count, L.shape[1]))
+            block[6 * i : 6 * i + 6] = L
+            columns.append(block)
+            is_link += [link] * L.shape[1]
+    return np.hstack(columns), np.array(is_link, dtype=bool)
+
+
+def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Columns of the bounded clearances, their group and whether they scale."""
+    rows, sizes, group, scaled = [], [], [], []
+    count = 0
+    for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
+        for row in CONES[cone]:
+            rows.append(6 * i + row)
+            sizes.append(bounds[i, cone])
+            group.append(count)
+            scaled.append(play[i, cone])
+        count += 1
+    columns = np.zeros((6 * len(bounds), len(rows)))
+    columns[rows, np.arange(len(rows))] = sizes
+    return (
+        columns,
+        np.array(group, dtype=int),
+        np.array(scaled, dtype=bool),
+    )
+
+
+def _free(bounds: NDArray) -> NDArray:
+    """Unit columns of the motions without bound."""
+    rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
+    columns = np.zeros((6 * len(bounds), len(rows)))
+    columns[rows, np.arange(len(rows))] = 1.0
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """The assembly constraints at a posture.
+
+    Attributes:
+        posture: where the robot stands.
+        rows: (6 closures, 6 n) with rows @ screws = 0 for the total screws: the blocks
+            sign_kj M_j; translations divided by ``size``.
+        platform: (6, 6 n) screws to the platform screw, eq. (8), not scaled.
+        size: [m] reference length.
+    """
+
+    posture: Posture
+    rows: NDArray
+    platform: NDArray
+    size: float
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @cached_property
+    def misfit(self) -> NDArray:
+        """(6 closures,) what the geometric errors leave open, scaled."""
+        return self.rows @ self.posture.robot.errors.ravel()
+
+
+def linearise(posture: Posture) -> Linearisation:
+    """The assembly constraints (19)-(20) at a posture.
+
+    Args:
+        posture: where the robot stands.
+
+    Returns:
+        The constraint matrix and the map to the platform screw.
+
+    Raises:
+        BadInput: a geometric error is beyond 1e6 rad or m.
+    """
+    robot = posture.robot
+    wrong = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
+    if wrong.any():
+        frame = robot.frames[int(np.argmax(wrong))]
+        raise BadInput(
+            f"{robot.name}: frame {quoted(frame.name)}.geometric_error: found "
+            f"{np.abs(frame.geometric_error).max():g}, expected numbers of size at "
+            f"most {LARGEST_LENGTH:g} [rad, m]"
+        )
+    size = size_of(robot)
+    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+    blocks = closure_signs(robot)[:, :, None, None] * posture.paths
+    rows = np.swapaxes(blocks * scale[:, None], 1, 2)
+    on_path = robot.on_path[robot.index(robot.platform)]
+    platform = np.swapaxes(posture.paths * on_path[:, None, None], 0, 1)
+    count = len(robot.frames)
+    return Linearisation(
+        posture,
+        rows.reshape(6 * len(robot.closures), 6 * count),
+        platform.reshape(6, 6 * count),
+        size,
+    )
+
+
+def closure_signs(robot: Robot) -> NDArray:
+    """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+    paths = robot.on_path.astype(int)
+    pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
+    count = len(robot.frames)
+    return np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)

@@ -1,0 +1,97 @@
+"""All the pose errors the platform can have, as a solid to draw and to ask.
+
+The set is convex; it is found from inside, by the points that support it in many
+directions, and from outside, by the heights there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from assembly.linear.reach import Reach
+from forcefit.inputs.display import html_table, short_repr
+
+PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorBody:
+    """Rotation or translation errors the platform can have.
+
+    Attributes:
+        part: ``"rotation"`` or ``"translation"``.
+        points: (k, 3) [rad or m] of the set, base axes; the corners of an inner body.
+        faces: (m, 3) rows of ``points``; none where the body is flat.
+        directions: (k, 3) unit vectors looked in.
+        heights: (k,) [rad or m] certified largest component along each.
+    """
+
+    part: str
+    points: NDArray
+    faces: NDArray
+    directions: NDArray
+    heights: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def slack(self) -> float:
+        """[rad or m] by how much the outer body exceeds the inner in any direction."""
+        inner = (self.points @ self.directions.T).max(axis=0)
+        return float(np.max(self.heights - inner))
+
+    def contains(self, error: ArrayLike) -> bool:
+        """Whether an error (3,) is within all the heights: False proves it is not."""
+        return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
+
+
+def error_body(reach: Reach, part: str, count: int = 200) -> ErrorBody:
+    """The set of errors, from its support functions.
+
+    Args:
+        reach: of :func:`assembly.linear.reach.reachable_screws`.
+        part: ``"rotation"`` or ``"translation"``.
+        count: directions to look in, evenly spread.
+
+    Returns:
+        The body between its inner and outer approximation.
+
+    Raises:
+        ValueError: the part is neither, or has no bound.
+        SolverFailed: the cone solver gave up.
+    """
+    if part not in PARTS:
+        raise ValueError(f"part is {part!r}, expected 'rotation' or 'translation'")
+    if reach.unbounded(PARTS[part].start):
+        raise ValueError(f"the platform moves freely: its {part} has no bound")
+    directions = even_directions(count)
+    weights = np.eye(6)[PARTS[part]]
+    found = [reach.support(d @ weights) for d in directions]
+    points = np.array([one.screw[PARTS[part]] for one in found])
+    heights = np.array([one.height for one in found])
+    return ErrorBody(part, points, _faces(points), directions, heights)
+
+
+def _faces(points: NDArray) -> NDArray:
+    """Triangles of the convex hull; none where the points lie in a plane."""
+    try:
+        return ConvexHull(points).simplices
+    except QhullError:
+        return np.zeros((0, 3), dtype=int)
+
+
+def even_directions(count: int) -> NDArray:
+    """Unit vectors spread evenly over the sphere, along a golden spiral.
+
+    Args:
+        count: how many.
+
+    Returns:
+        (count, 3) unit vectors.
+    """
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    flat = np.sqrt(1.0 - z**2)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)

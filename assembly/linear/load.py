@@ -1,0 +1,164 @@
+"""What pushes on a robot: the load on its platform, loads on its bodies, gravity.
+
+A dead load does work on every small screw between it and the base.  A load on the body
+of frame j acts before j's joint: the body's own error and deformation count, the
+joint's play and spring do not.  A load on what j's joint carries acts after it.
+
+The weight of a beam is spread over its length.  Its equivalent at the two ends is half
+the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
+then sags and turns as under the spread load (an exact statement for its ends; between
+them the beam sags a little more).
+
+Sources:
+    Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
+    load: end moments q L^2 / 12).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.files.joint_file import LARGEST_LENGTH
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import BeamLink, beam_axis
+from forcefit.inputs.table import BadInput
+from stiffness.beam.sections import declared_section
+from stiffness.screws import screw_map
+
+LARGEST = 1e60  # [N m, N] weights of the largest masses at the largest gravity included
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Loads as they act on the small screws of every frame, in its axes.
+
+    Attributes:
+        body: (..., 6n) [N m, N] on errors and deformations of bodies.
+        joint: (..., 6n) [N m, N] on play, springs and motion of joints.
+    """
+
+    body: NDArray
+    joint: NDArray
+
+    def __bool__(self) -> bool:
+        return bool(np.any(self.body) or np.any(self.joint))
+
+
+def forces_on(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None,
+    carried: ArrayLike | None = None,
+) -> Forces:
+    """Forces on all small screws of a robot.
+
+    Args:
+        posture: where it stands, of n frames; or many postures, its transforms (..., n,
+            4, 4), and then all shapes here have the same leading dimensions.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
+        carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
+
+    Returns:
+        The forces; all zero where nothing is given.
+
+    Raises:
+        BadInput: a number is not finite, or so large that its square overflows.
+    """
+    for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
+        _check(whose, given, LARGEST, "N m, N")
+    robot, T = posture.robot, posture.transforms
+    on_body, after = np.zeros((2, *T.shape[:-2], 6))
+    if bodies is not None:
+        on_body += np.asarray(bodies, dtype=float)
+    if carried is not None:
+        after += np.asarray(carried, dtype=float)
+    if load is not None:
+        on_body[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
+    # all read at the platform's origin, then summed over what each frame carries
+    read = screw_map(posture.platform[..., None, :3, 3] - T[..., :3, 3])
+    own = np.einsum("...ij,...i->...j", read, on_body)
+    after = np.einsum("...ij,...i->...j", read, after)
+    below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
+    joint = below @ (own + after) + after
+    paths = posture.paths
+    flat = (*T.shape[:-3], 6 * len(robot.frames))
+    return Forces(
+        np.einsum("...ji,...j->...i", paths, joint + own).reshape(flat),
+        np.einsum("...ji,...j->...i", paths, joint).reshape(flat),
+    )
+
+
+def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Weight of all links with a density and of all bodies with a mass.
+
+    Args:
+        posture: where the robot stands, of n frames; or many postures, as above.
+        gravity: (..., 3) [m/s^2] base axes, such as (0, 0, -9.81).
+
+    Returns:
+        ``bodies`` and ``carried`` (..., n, 6) of :func:`forces_on` [N m, N].  Links
+        given by a matrix, a mesh or a library have no weight of their own here.
+
+    Raises:
+        BadInput: gravity is not finite, or beyond 1e6 m/s^2.
+    """
+    _check("gravity", gravity, LARGEST_LENGTH, "m/s^2")
+    robot, T = posture.robot, posture.transforms
+    g = np.broadcast_to(np.asarray(gravity, dtype=float), (*T.shape[:-3], 3))
+    bodies, carried = np.zeros((2, *T.shape[:-2], 6))
+    for i, frame in enumerate(robot.frames):
+        R = T[..., i, :3, :3]
+        if frame.mass:
+            bodies[..., i, :] += _at(R @ frame.centre_of_mass, frame.mass * g)
+        link = frame.link
+        if isinstance(link, BeamLink) and link.density is not None:
+            length, axis = beam_axis(frame)
+            section = declared_section(link.section, link.poisson)
+            W = link.density * section.area * length * g
+            clamp = np.zeros((*W.shape[:-1], 6))
+            clamp[..., :3] = np.cross(R @ (length * axis), W) / 12
+            bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
+            parent = robot.parents[i]
+            if parent >= 0:  # else the base carries it
+                # the beam starts where it starts, be that the parent's origin or not
+                start = T[..., i, :3, 3] - R @ (length * axis)
+                arm = start - T[..., parent, :3, 3]
+                carried[..., parent, :] += _at(arm, W / 2) + clamp
+    return bodies, carried
+
+
+def row_forces(postures: Posture, load: NDArray, gravity: NDArray) -> Forces:
+    """Forces of load and weight in many situations.
+
+    Args:
+        postures: R of them, in one.
+        load: (R, 6) [N m, N] on the platform at its origin, base axes.
+        gravity: (R, 3) [m/s^2] base axes.
+
+    Returns:
+        Forces (R, 6n) on all small screws.
+    """
+    bodies = carried = None
+    if gravity.any():
+        bodies, carried = weights(postures, gravity)
+    return forces_on(postures, load, bodies, carried)
+
+
+def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
+    """Refuse numbers that no machine has and no double carries on."""
+    if given is None:
+        return
+    values = np.asarray(given, dtype=float)
+    wrong = ~(np.abs(values) <= largest)  # so that what is not a number is wrong
+    if wrong.any():
+        raise BadInput(
+            f"{whose}: found {values[wrong].flat[0]:g}, expected finite numbers of "
+            f"size at most {largest:g} [{unit}]"
+        )
+
+
+def _at(arm: NDArray, force: NDArray) -> NDArray:
+    """(..., 6) ``[arm x f, f]`` of a force (..., 3) that acts at (..., 3)."""
+    return np.concatenate([np.cross(arm, force), force], axis=-1)

@@ -1,0 +1,61 @@
+"""How freely the perfect robot moves: ranks of its closures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from assembly.kinematics.nominal import mobile, motion_screws, size_of
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import closure_signs
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Counts at one posture; every joint rigid but for its own motion.
+
+    Attributes:
+        freedoms: joint motions that keep all closures.
+        locked_freedoms: the same with the actuated joints locked.
+        overconstraint: closure equations that the others already imply.
+        smallest_singular_value: [-] least one above zero of the constraint matrix,
+            lengths divided by the robot's size: near zero is near a singularity.
+    """
+
+    freedoms: int
+    locked_freedoms: int
+    overconstraint: int
+    smallest_singular_value: float
+
+
+def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
+    """Mobility and overconstraint at a posture.
+
+    Args:
+        posture: where the robot stands.
+        tolerance: relative size below which a singular value counts as zero.
+
+    Returns:
+        The counts.
+    """
+    robot = posture.robot
+    size = size_of(robot)
+    screws = motion_screws(robot, posture.transforms) / ([1.0] * 3 + [size] * 3)
+    blocks = closure_signs(robot)[:, :, None] * screws
+    A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))
+    moves = mobile(robot)
+    passive = moves & ~np.array([f.actuated for f in robot.frames])
+    values = _values(A[:, moves])
+    rank = int(np.sum(values > tolerance * values.max(initial=0.0)))
+    locked = _values(A[:, passive])
+    locked_rank = int(np.sum(locked > tolerance * values.max(initial=0.0)))
+    return Mobility(
+        freedoms=int(moves.sum()) - rank,
+        locked_freedoms=int(passive.sum()) - locked_rank,
+        overconstraint=len(A) - rank,
+        smallest_singular_value=float(values[rank - 1]) if rank else 0.0,
+    )
+
+
+def _values(A: np.ndarray) -> np.ndarray:
+    """Singular values, largest first; none for an empty matrix."""
+    return np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)

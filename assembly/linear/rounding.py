@@ -1,0 +1,76 @@
+"""What rounding leaves of an answer: energies that are none, springs that drown others.
+
+Closures are sums of screws that cancel; in floating point they stay open by some units
+in the last place of their terms, and the wrenches' work on that is worth nothing.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.linear.closure import VirtualJoints
+
+ROUNDING = 8 * float(np.finfo(float).eps)  # of sums of some tens of terms
+SPREAD = 1e13  # of stiffnesses: rounding of the stiffest is 1e-3 of the softest
+
+
+def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
+    """(...,) [rad, lengths] what rounding may leave open in a closure.
+
+    Args:
+        errors: (..., n, 6) [rad, m] geometric errors.
+        joints: what may move.
+        size: [m] reference length.
+
+    Returns:
+        8 units in the last place of the sum of errors and clearances.
+    """
+    weights = np.repeat([1.0, 1.0 / size], 3)
+    play = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
+    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((play @ weights).sum())
+    return ROUNDING * sums
+
+
+def told_from_zero(
+    energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, left: ArrayLike
+) -> NDArray:
+    """Whether least energies differ from zero by more than their certificate can tell.
+
+    Springs are known to sqrt(2 gap), so an energy up to the gap may be none; and the
+    wrenches' work on what rounding leaves open in the closures is worth nothing.
+
+    Args:
+        energy: (...,) [J].
+        gap: (...,) [J] energy minus its certified bound.
+        multipliers: (..., 6 closures) of the scaled closures.
+        left: (...,) [rad, lengths] open in the closures, rounding included.
+
+    Returns:
+        (...,) bool; also where the energy is not a number.
+    """
+    worth = np.asarray(gap) + left * np.abs(multipliers).sum(axis=-1)
+    return ~(np.asarray(energy) <= worth)
+
+
+def drop_zeros(
+    energy: NDArray, bound: NDArray, multipliers: NDArray, left: NDArray
+) -> None:
+    """Make zero, in place, the energies of unloaded robots that cannot be told from it.
+
+    Args:
+        energy: (k,) [J].
+        bound: (k,) [J] certified lower bound.
+        multipliers: (k, 6 closures) of the scaled closures; zero where they are no more
+            than rounding.
+        left: (k,) [rad, lengths] open in the closures, rounding included.
+    """
+    rounding = ~told_from_zero(energy, 0.0, multipliers, left)
+    zero = ~told_from_zero(energy, energy - bound, multipliers, left)
+    energy[zero], multipliers[rounding] = 0.0, 0.0
+    bound[zero] = np.minimum(bound[zero], 0.0)
+
+
+def stiffness_spread(joints: VirtualJoints, size: float) -> float:
+    """[-] stiffest over softest spring, turns counted at the reference length."""
+    weights = np.tile(np.repeat([1.0, 1.0 / size], 3), len(joints.elastic) // 6)
+    compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
+    return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

@@ -1,0 +1,225 @@
+r"""How near a posture is to a singularity, of which kind, and which joints show it.
+
+The closures of the rigid robot let its drives and its platform move together in a
+space of directions.  With an orthonormal basis of it, rates (q_a, t) of drives and
+platform side by side, Q_a^T Q_a + Q_t^T Q_t = 1: the two halves have singular values
+cos(a_i) and sin(a_i), and the map from the drives to the platform has tan(a_i).
+
+======== ==================== ==================================================
+code     zero means           kind of Gosselin and Angeles
+======== ==================== ==================================================
+serial   a drive moves, the   1st (type 1): the platform loses a freedom
+         platform does not
+parallel the platform moves,  2nd (type 2): the locked robot gives way
+         no drive does
+closure  a closure can carry  constraint: the robot gains a freedom, or changes
+         no wrench any more   its assembly mode
+======== ==================== ==================================================
+
+Lengths count in units of the robot's longest body, angles in radians.
+
+Sources:
+    Gosselin, Angeles (1990), Singularity analysis of closed-loop kinematic chains.
+    Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel mechanisms.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import Target, follow, mobile, motion_screws, size_of
+from assembly.kinematics.posture import home_posture
+from assembly.linear.closure import closure_signs
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from stiffness.screws import SCREW
+
+KINDS = ("serial", "parallel", "closure")
+_RANK = 1e-9  # relative size below which a singular value counts as zero
+_NUDGES = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, to find the ranks
+
+
+@dataclass(frozen=True, eq=False)
+class Singularities:
+    """Distances of k postures to the three kinds of singularity.
+
+    Attributes:
+        serial: (k,) sine of the least angle a_i, 0 at a serial singularity; at most 1.
+        parallel: (k,) cosine of the largest angle a_i, 0 at a parallel singularity.
+        closure: (k,) least singular value of the closures that is not always zero.
+        serial_joints: (k, n) rates at which the serial singularity would move.
+        parallel_joints: (k, n) rates at which the parallel one would.
+        parallel_screws: (k, 6) the platform's motion then.
+        closure_joints: (k, n) rates that the closures resist least.
+    """
+
+    serial: NDArray
+    parallel: NDArray
+    closure: NDArray
+    serial_joints: NDArray
+    parallel_joints: NDArray
+    parallel_screws: NDArray
+    closure_joints: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def condition(self) -> NDArray:
+        """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
+
+        For robots with as many drives as freedoms; NaN without drives.
+        """
+        least, most = self.serial, self.parallel
+        rest = np.sqrt((1 - least**2).clip(0.0) * (1 - most**2).clip(0.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return rest / (least * most)
+
+    def names(self, robot: Robot, near: float) -> list[str]:
+        """For each posture the singularities nearer than ``near``, with their joints.
+
+        Args:
+            robot: the one they are of.
+            near: size below which a distance is named.
+
+        Returns:
+            Such as ``"parallel: left.elbow, platform TY"``; empty where none is near.
+        """
+        passive = np.array([f.passive for f in robot.frames])
+        moving = {
+            "serial": self.serial_joints * ~passive,
+            "parallel": self.parallel_joints * passive,
+            "closure": self.closure_joints,
+        }
+        texts = []
+        for i in range(len(self.serial)):
+            said = []
+            for kind in KINDS:
+                if getattr(self, kind)[i] < near:
+                    joint = np.abs(moving[kind][i]).argmax()
+                    text = f"{kind}: {robot.frames[joint].name}"
+                    if kind == "parallel":
+                        way = SCREW[np.abs(self.parallel_screws[i]).argmax()]
+                        text += f", platform {way}"
+                    said.append(text)
+            texts.append("; ".join(said))
+        return texts
+
+
+def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
+    """Distances to singularities at many postures.
+
+    Args:
+        robot: of n frames; only its geometry matters.
+        transforms: (k, n, 4, 4) frames seen from the base.
+
+    Returns:
+        The distances, in the order given; 1 where a kind does not exist, as closure
+        singularities of a robot without closures.
+    """
+    return _measure(robot, transforms, _generic_ranks(robot))
+
+
+@dataclass(frozen=True)
+class _Ranks:
+    """Ranks away from singularities: of closures, of Q, of its platform half."""
+
+    closures: int
+    motions: int
+    platform: int
+
+
+@lru_cache(maxsize=16)
+def _generic_ranks(robot: Robot) -> _Ranks:
+    """The largest ranks met at home and a little beside it."""
+    home = home_posture(robot)
+    driven = np.array([f.actuated for f in robot.frames])
+    unit = np.array([
+        size_of(robot) if f.joint == "prismatic" else 1.0 for f in robot.frames
+    ])
+    # the drives move unequally: symmetric steps may stay in a singular set
+    spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
+    goals = np.where(
+        driven, home.coordinates + np.outer(_NUDGES, unit * spread), np.nan
+    )
+    track = follow(robot, home.coordinates, Target(coordinates=goals))
+    A, B, P = _matrices(robot, track.transforms[track.reached])
+    rank = max(map(_rank, A)) if A.shape[1] else 0
+    N = _null_space(A, rank)[0]
+    motions = max(map(_rank, N @ B))
+    return _Ranks(rank, motions, max(map(_rank, N @ P)))
+
+
+def _rank(A: NDArray) -> int:
+    """How many singular values are above rounding."""
+    values = np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)
+    return int(np.sum(values > _RANK * max(1.0, values.max(initial=0.0))))
+
+
+def _matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Closures (k, 6 c, m), drives and platform (k, m, a + 6), platform (k, m, 6)."""
+    # of the m mobile joints, scaled, read at the platform's origin
+    size = size_of(robot)
+    i = robot.index(robot.platform)
+    screws = motion_screws(robot, T)
+    screws[..., 3:] += np.cross(screws[..., :3], T[:, None, i, :3, 3])
+    moves = mobile(robot)
+    slides = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
+    screws *= np.where(slides, size, 1.0) / np.array([1, 1, 1, size, size, size])
+    signs = closure_signs(robot)[:, moves]
+    A = np.einsum("cm,kms->kcsm", signs, screws[:, moves])
+    A = A.reshape(len(T), 6 * len(signs), int(moves.sum()))
+    P = screws[:, moves] * robot.on_path[i, moves, None]
+    driven = np.array([f.actuated for f in robot.frames])
+    drives = np.eye(len(robot.frames))[moves][:, driven]
+    drives = np.broadcast_to(drives, (len(T), *drives.shape))
+    return A, np.concatenate([drives, P], axis=2), P
+
+
+def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Rows (k, m - rank, m) that A maps to nothing, least value kept and its row."""
+    if not rank:
+        return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
+            np.ones(len(A)), np.zeros((len(A), A.shape[2]))
+        )  # fmt: skip
+    _, values, Vt = np.linalg.svd(A)
+    return Vt[:, rank:], values[:, rank - 1], Vt[:, rank - 1]
+
+
+def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
+    """The distances, with the ranks that they would have away from singularities."""
+    A, B, _ = _matrices(robot, T)
+    N, closure, resisting = _null_space(A, ranks.closures)
+    drives = B.shape[2] - 6
+    W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
+    Q = Q[:, : ranks.motions]
+    # joint rates that go with the rows of Q
+    rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
+    rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
+    serial, still_platform = _least(Q[..., drives:], ranks.platform)
+    parallel, still_drives = _least(Q[..., :drives], ranks.motions)
+    moves = mobile(robot)
+
+    def all_joints(part: NDArray) -> NDArray:
+        full = np.zeros((len(T), len(robot.frames)))
+        full[:, moves] = part
+        return full
+
+    return Singularities(
+        serial, parallel, closure,
+        all_joints((still_platform[:, None] @ rates)[:, 0]),
+        all_joints((still_drives[:, None] @ rates)[:, 0]),
+        (still_drives[:, None] @ Q[..., drives:])[:, 0],
+        all_joints(resisting),
+    )  # fmt: skip
+
+
+def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
+    """Singular value number ``rank`` of (k, r, c) halves, and its combination."""
+    if not rank:
+        return np.ones(len(half)), np.zeros(half.shape[:2])
+    U, values, _ = np.linalg.svd(half, full_matrices=True)
+    full = np.zeros((len(half), half.shape[1]))
+    full[:, : values.shape[1]] = values
+    return full[:, rank - 1], U[:, :, rank - 1]

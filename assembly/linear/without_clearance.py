@@ -1,0 +1,302 @@
+"""Least energy (22) of a robot without play, for many postures and loads at once.
+
+Without clearances nothing in (22) has a bound: it is a linear system in the closures'
+multipliers and the free motions,
+
+    [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
+    [ F' J'     0  ] [  q   ]  = - [    F' f      ]
+
+with C the compliances of bodies and joints, f the forces on them, J the closures.
+One factorisation serves every row at a posture.
+
+======  ====================  ===========  ===========================================
+symbol  code                  shape        meaning
+======  ====================  ===========  ===========================================
+J       ``rows``              (c,6K,6n)    closures at c postures, scaled
+P       ``platform``          (c,6,6n)     screws to the platform screw, eq. (8)
+lambda  ``multipliers``       (R,6K)       of the scaled closures
+w       ``joint_wrenches``    (R,6n)       through every joint
+======  ====================  ===========  ===========================================
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import closure_signs, virtual_joints
+from assembly.linear.load import Forces
+from assembly.model.clearance import clearance_bounds
+from assembly.model.links import joint_compliances, link_compliances
+
+# eigenvalues of the scaled system between these are neither rounding nor rank
+_ROUNDING, _RANK = 1e-13, 1e-10
+_PADDED = 4  # times the rows: where postures differ more in theirs, each by itself
+_CLOSED = 1e-9  # relative residual of a system that was solved
+_SHUT = 1e-12  # [rad, reference lengths] that is rounding, whatever it is relative to
+
+
+@dataclass(frozen=True, eq=False)
+class Flexibility:
+    """A robot without play at c postures, ready for any errors and forces.
+
+    Attributes:
+        rows: (c, 6K, 6n) scaled closures.
+        platform: (c, 6, 6n) screws to the platform screw.
+        bodies: (n, 6, 6) compliances of bodies, in the frames' axes.
+        joints: (n, 6, 6) compliances of joints.
+        free: (6n, q) unit columns of the free motions.
+        limit: (q,) [rad, m] bounds of the free motions, inf where there are none.
+        inverse: (c, m, m) of the scaled system, m = 6K + q.
+        system: (c, m, m) the scaled system.
+        softness: by which compliances were divided to make the system of order one.
+        doubt: (c,) bool, where its rank cannot be told from rounding.
+    """
+
+    rows: NDArray
+    platform: NDArray
+    bodies: NDArray
+    joints: NDArray
+    free: NDArray
+    limit: NDArray
+    inverse: NDArray
+    system: NDArray
+    softness: float
+    doubt: NDArray
+
+    @cached_property
+    def compliance(self) -> NDArray:
+        """(n, 6, 6) of body and joint together."""
+        return self.bodies + self.joints
+
+    def solve(
+        self, posture: NDArray, errors: NDArray, forces: Forces
+    ) -> "FlexibleAssembly":
+        """Close the robot in R situations.
+
+        Args:
+            posture: (R,) which of the c postures each row has.
+            errors: (R, 6n) [rad, m] screws that come without stress.
+            forces: on every small screw, (R, 6n).
+
+        Returns:
+            The assemblies; rows where :attr:`FlexibleAssembly.solved` is false are not.
+        """
+        loose = errors + _each(self.bodies, forces.body)
+        loose += _each(self.joints, forces.joint)
+        J, size, times = self.rows, self.softness, at_postures(posture)
+        b = -np.concatenate([times(J, loose), forces.joint @ self.free * size], axis=1)
+        x = times(self.inverse, b)
+        x -= times(self.inverse, times(self.system, x) - b)  # what rounding left
+        count = J.shape[1]
+        multipliers, motions = x[:, :count] / size, x[:, count:]
+        left = times(self.system, x) - b
+        scale = np.abs(b).max(axis=1, initial=0.0)
+        gap = np.abs(left).max(axis=1, initial=0.0)
+        closed = gap <= np.maximum(_CLOSED * scale, _SHUT)
+        within = np.all(np.abs(motions) <= self.limit, axis=1)
+        closing = times(np.swapaxes(J, 1, 2), multipliers)
+        screws = loose + _each(self.compliance, closing) + motions @ self.free.T
+        return FlexibleAssembly(
+            times(self.platform, screws),
+            closing + forces.joint,
+            multipliers,
+            closed & within & ~self.doubt[posture],
+        )
+
+    def self_stress(self, columns: NDArray) -> NDArray:
+        """Forces that stress-free screws meet from the structure they are built into.
+
+        Args:
+            columns: (6n, s) screws at the frames.
+
+        Returns:
+            (c, s, s) generalised force on each per unit of each; negative semidefinite.
+        """
+        through = np.einsum("cki,is->cks", self.rows, columns)
+        count = self.rows.shape[1]
+        inner = self.inverse[:, :count, :count] / self.softness
+        return -np.einsum("cks,ckl,clt->cst", through, inner, through)
+
+    def platform_of(self, columns: NDArray) -> NDArray:
+        """Where stress-free screws at the frames take the platform.
+
+        Args:
+            columns: (6n, s) screws at the frames.
+
+        Returns:
+            (c, 6, s) [rad, m] platform screw per unit of each.
+        """
+        through = np.einsum("cki,is->cks", self.rows, columns)
+        count = self.rows.shape[1]
+        x = -np.einsum("ckl,cls->cks", self.inverse[:, :, :count], through)
+        closing = np.einsum("cki,cks->cis", self.rows, x[:, :count] / self.softness)
+        n = len(self.compliance)
+        bent = np.einsum(
+            "nij,cnjs->cnis", self.compliance, closing.reshape(len(x), n, 6, -1)
+        ).reshape(closing.shape)
+        screws = columns + bent + np.einsum("iq,cqs->cis", self.free, x[:, count:])
+        return np.einsum("cki,cis->cks", self.platform, screws)
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleAssembly:
+    """R assemblies of a robot without play.
+
+    Attributes:
+        platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
+        joint_wrenches: (R, 6n) [N m, N] through every joint, in the frames' axes.
+        multipliers: (R, 6K) of the scaled closures.
+        solved: (R,) bool; elsewhere nothing is claimed.
+    """
+
+    platform_screw: NDArray
+    joint_wrenches: NDArray
+    multipliers: NDArray
+    solved: NDArray
+
+
+def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
+    """How matrices of postures multiply vectors of the rows that stand there.
+
+    Rows at one posture are multiplied together: nothing is copied for every row.
+
+    Args:
+        posture: (R,) which of c postures each row has.
+
+    Returns:
+        A function of matrices (c, a, b) and vectors (R, b) that gives (R, a).
+    """
+    names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
+    order = np.argsort(own, kind="stable")
+    place = np.empty_like(order)  # of a row among those of its posture
+    place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    most = int(count.max(initial=0))
+
+    def times(matrices: NDArray, vectors: NDArray) -> NDArray:
+        if len(names) * most > _PADDED * len(own):
+            return np.einsum("rij,rj->ri", matrices[posture], vectors)
+        used = matrices if len(names) == len(matrices) else matrices[names]
+        together = np.zeros((len(names), most, vectors.shape[1]))
+        together[own, place] = vectors
+        return (together @ np.swapaxes(used, 1, 2))[own, place]
+
+    return times
+
+
+def in_groups(postures: Posture) -> tuple[Posture, NDArray]:
+    """Distinct postures among many.
+
+    Args:
+        postures: R of them, in one.
+
+    Returns:
+        c distinct ones, and (R,) which of them each row has.
+    """
+    _, first, which = np.unique(
+        postures.coordinates, axis=0, return_index=True, return_inverse=True
+    )
+    distinct = replace(
+        postures,
+        coordinates=postures.coordinates[first],
+        transforms=postures.transforms[first],
+    )
+    return distinct, which.reshape(-1)
+
+
+def flexibility(postures: Posture) -> Flexibility:
+    """Factorise the closures of a robot without play.
+
+    Args:
+        postures: c of them, transforms (c, n, 4, 4).
+
+    Returns:
+        What solves any situation at these postures.
+
+    Raises:
+        ValueError: the robot has play.
+    """
+    robot = postures.robot
+    bodies, joints = link_compliances(robot), joint_compliances(robot)
+    digest = blake2b(repr((robot.closures, robot.platform)).encode())
+    for numbers in (
+        robot.parents,
+        bodies,
+        joints,
+        clearance_bounds(robot),
+        postures.transforms,
+    ):
+        digest.update(np.ascontiguousarray(numbers).tobytes())
+    return _factorise(_Case(digest.digest(), postures, bodies, joints))
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Robots that differ in errors and loads alone share one factorisation."""
+
+    digest: bytes
+    postures: Posture = field(compare=False)
+    bodies: NDArray = field(compare=False)
+    joints: NDArray = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _factorise(case: _Case) -> Flexibility:
+    """The system of every posture, and its inverse."""
+    postures, C_body, C_joint = case.postures, case.bodies, case.joints
+    robot = postures.robot
+    joints = virtual_joints(robot)
+    if joints.cones.shape[1]:
+        raise ValueError(f"{robot.name} has play, which is not linear")
+    n, count = len(robot.frames), len(postures.transforms)
+    size = size_of(robot)
+    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+    paths = postures.paths
+    J = np.einsum("kn,cnij,i->ckinj", closure_signs(robot), paths, scale)
+    J = J.reshape(count, 6 * len(robot.closures), 6 * n)
+    on_path = robot.on_path[robot.index(robot.platform)]
+    P = np.einsum("n,cnij->cinj", on_path, paths).reshape(count, 6, 6 * n)
+    through = np.einsum("cknj,nij->ckni", J.reshape(count, -1, n, 6), C_body + C_joint)
+    S = np.einsum("cki,cli->ckl", through.reshape(J.shape), J)
+    softness = float(np.abs(S).max(initial=0.0)) or 1.0
+    JF = J @ joints.free
+    q = JF.shape[2]
+    M = np.zeros((count, S.shape[1] + q, S.shape[1] + q))
+    M[:, : S.shape[1], : S.shape[1]] = S / softness
+    M[:, : S.shape[1], S.shape[1] :] = JF
+    M[:, S.shape[1] :, : S.shape[1]] = np.swapaxes(JF, 1, 2)
+    inverse, doubt = pseudo_inverse(M)
+    return Flexibility(
+        J, P, C_body, C_joint, joints.free, _limits(postures, joints.free),
+        inverse, M, softness, doubt,
+    )  # fmt: skip
+
+
+def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
+    """(c, m, m) inverses on the range, and (c,) where the range is in doubt."""
+    if not M.shape[1]:
+        return M, np.zeros(len(M), dtype=bool)
+    values, vectors = np.linalg.eigh(M)
+    size = np.abs(values)
+    relative = size / size.max(axis=1, keepdims=True)
+    kept = relative > _RANK
+    doubt = np.any((relative > _ROUNDING) & ~kept, axis=1)
+    inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
+    return np.einsum("cij,cj,ckj->cik", vectors, inverted, vectors), doubt
+
+
+def _limits(postures: Posture, free: NDArray) -> NDArray:
+    """(q,) bounds of the free motions."""
+    bounds = clearance_bounds(postures.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()
+    return bounds[np.abs(free).argmax(axis=0)] if free.size else np.zeros(0)
+
+
+def _each(matrices: NDArray, screws: NDArray) -> NDArray:
+    """(R, 6n) every frame's own (6, 6) times its screw or wrench."""
+    blocks = screws.reshape(len(screws), -1, 6)
+    return np.einsum("nij,rnj->rni", matrices, blocks).reshape(screws.shape)

@@ -1,0 +1,187 @@
+"""A robot in the situations in which it was, or will be, measured.
+
+What the model of a robot lacks is an *effect* (:mod:`assembly.effects`).  An effect
+changes one or more of the fields below and nothing else, so that effects add up in any
+number, and :func:`assembly.measurement.predict.predict` needs to know none of them.
+
+======  ====================  =========  =============================================
+symbol  code                  shape      meaning
+======  ====================  =========  =============================================
+T       ``transforms``        (R,n,4,4)  nominal frames seen from the base
+dl      ``errors``            (R, n, 6)  screws that come without stress, frame axes
+w       ``load``              (R, 6)     on the platform at ``point``, base axes
+g       ``gravity``           (R, 3)     base axes
+======  ====================  =========  =============================================
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """A spring in series with a joint, of the law load = coefficient |deflection|^n.
+
+    Along (about) the joint's own z, as stiff in both directions.
+
+    Attributes:
+        frame: the joint's.
+        coefficient: [N/m^n or N m/rad^n] > 0.
+        exponent: [-] n > 1; 1.5 is Hertz's for two spheres.
+    """
+
+    frame: str
+    coefficient: float
+    exponent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """R situations of one robot; without effects, what its file declares.
+
+    Attributes:
+        robot: of n frames; its links, springs and clearances are those of all rows.
+        coordinates: (R, n) [rad or m] commanded, of every joint.
+        transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
+        mismatch: (R,) [rad, m] nominal closure error left.
+        errors: (R, n, 6) [rad, m] screws that come without stress.
+        point: (3,) [m] reference point: loaded and measured, platform axes.
+        load: (R, 6) [N m, N] on the platform at the reference point, base axes.
+        gravity: (R, 3) [m/s^2] base axes.
+        temperature: (R,) [K] above that of calibration; NaN where not known.
+        time: (R,) [s] since the first measurement; NaN where not known.
+        approach: (R,) -1 or 1; NaN where not known.
+        laws: contact springs in series with joints.
+        exact: finite motions instead of the linear model.
+        second_order: (R, 6) [rad, m] what finite motions add to the linear platform
+            screw without load; see
+            :func:`assembly.measurement.predict.with_second_order`.
+        rest: (R, n, 6) where play rests, in units of its bounds; None where the least
+            energy is to say.
+        base: (6,) [rad, m] turn and shift of the measuring frame, acting on the left.
+        tool: (3,) [m] from the reference point to the one really measured, platform
+            axes.
+        reading: (R, 6) [rad, m] added to what is read.
+    """
+
+    robot: Robot
+    coordinates: NDArray
+    transforms: NDArray
+    mismatch: NDArray
+    errors: NDArray
+    point: NDArray
+    load: NDArray
+    gravity: NDArray
+    temperature: NDArray
+    time: NDArray
+    approach: NDArray
+    laws: tuple[ContactLaw, ...] = ()
+    exact: bool = False
+    second_order: NDArray | float = 0.0
+    rest: NDArray | None = None
+    base: NDArray = field(default_factory=lambda: np.zeros(6))
+    tool: NDArray = field(default_factory=lambda: np.zeros(3))
+    reading: NDArray | float = 0.0
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def __len__(self) -> int:
+        return len(self.transforms)
+
+    @property
+    def reads_otherwise(self) -> bool:
+        """Whether the device reads something else than the platform's pose."""
+        return bool(self.base.any() or self.tool.any() or np.any(self.reading))
+
+    @property
+    def postures(self) -> Posture:
+        """All nominal postures in one, its arrays with R rows."""
+        worst = float(np.max(self.mismatch, initial=0.0))
+        return Posture(self.robot, self.coordinates, self.transforms, worst)
+
+    def posture(self, row: int) -> Posture:
+        """One row's posture, the robot with that row's errors."""
+        return Posture(
+            self.robot.with_errors(self.errors[row]), self.coordinates[row],
+            self.transforms[row], float(self.mismatch[row]),
+        )  # fmt: skip
+
+    def load_at_origin(self) -> NDArray:
+        """(R, 6) [N m, N] the load read at the platform's origin, base axes."""
+        arm = self.postures.platform[:, :3, :3] @ self.point
+        moved = self.load.copy()
+        moved[:, :3] += np.cross(arm, self.load[:, 3:])
+        return moved
+
+    def take(self, rows: ArrayLike) -> "Conditions":
+        """Some of the rows.
+
+        Args:
+            rows: indices or a mask.
+
+        Returns:
+            The same robot in those situations only.
+        """
+        index = np.asarray(rows)
+        kept = {name: getattr(self, name)[index] for name in _BY_ROW}
+        for name in ("reading", "second_order"):
+            values = getattr(self, name)
+            if isinstance(values, np.ndarray):
+                kept[name] = values[index]
+        if self.rest is not None:
+            kept["rest"] = self.rest[index]
+        return replace(self, **kept)
+
+
+_BY_ROW = (
+    "coordinates", "transforms", "mismatch", "errors", "load", "gravity",
+    "temperature", "time", "approach",
+)  # fmt: skip
+
+
+def as_declared(
+    postures: Posture,
+    load: ArrayLike | None = None,
+    *,
+    mismatch: ArrayLike = 0.0,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    temperature: ArrayLike = np.nan,
+    time: ArrayLike = np.nan,
+    approach: ArrayLike = np.nan,
+) -> Conditions:
+    """Conditions of a robot as its file declares it.
+
+    Args:
+        postures: one, or many with arrays of R rows.
+        load: (6,) or (R, 6) [N m, N] at the reference point, base axes; none if absent.
+        mismatch: (R,) [rad, m] nominal closure error left.
+        point: (3,) [m] the reference point, platform axes.
+        gravity: (3,) or (R, 3) [m/s^2] base axes.
+        temperature: (R,) [K], or one number for all; likewise the next two.
+        time: [s].
+        approach: -1 or 1.
+
+    Returns:
+        The conditions, R of them.
+    """
+    robot = postures.robot
+    n = len(robot.frames)
+    T = postures.transforms.reshape(-1, n, 4, 4)
+    count = len(T)
+
+    def rows(values: ArrayLike, *shape: int) -> NDArray:
+        return np.array(np.broadcast_to(values, (count, *shape)), dtype=float)
+
+    return Conditions(
+        robot, postures.coordinates.reshape(-1, n), T, rows(mismatch),
+        rows(robot.errors, n, 6), np.array(point, dtype=float),
+        rows(np.zeros(6) if load is None else load, 6), rows(gravity, 3),
+        rows(temperature), rows(time), rows(approach),
+    )  # fmt: skip

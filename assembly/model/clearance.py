@@ -1,0 +1,88 @@
+"""How much each joint may play: the clearance cones, eqs (1)-(5).
+
+======  ====================  =======  ==========================================
+symbol  code                  shape    meaning
+======  ====================  =======  ==========================================
+c-bar   ``clearance_bounds``  (n, 4)   [RXY RZ TXY TZ], 0 rigid, inf free
+======  ====================  =======  ==========================================
+
+The free motion of a passive joint is one of these directions without a bound (or with
+the bound the file gives for it), so a joint's own motion needs no special place.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Clearance, Frame, Robot
+
+CONES = ((0, 1), (2,), (3, 4), (5,))  # rows of the screw that each bound limits
+_KEYS = ("tilt", "spin", "radial", "axial")
+
+
+def clearance_bounds(robot: Robot, compliant: str = "elastic") -> NDArray:
+    """Bounds of every joint's play.
+
+    Args:
+        robot: of n frames.
+        compliant: what a passive joint with stiffness does about or along its own z:
+            ``"elastic"``, only its spring moves (and ``spin``, if given, is play in
+            series); ``"free"``, it moves freely: the second reading of problem (21).
+
+    Returns:
+        (n, 4) [rad, rad, m, m] for [RXY RZ TXY TZ]: 0 is rigid, inf is free.
+    """
+    bounds = np.zeros((len(robot.frames), 4))
+    for i, frame in enumerate(robot.frames):
+        play = frame.clearance or Clearance()
+        bounds[i] = [getattr(play, key) or 0.0 for key in _KEYS]
+        own = own_cone(frame)
+        if own is not None:
+            given = getattr(play, _KEYS[own])
+            bounds[i, own] = np.inf if given is None else given
+        elif frame.compliant and compliant == "free":
+            bounds[i, 3 if frame.joint == "prismatic" else 1] = np.inf
+    return bounds
+
+
+def own_cone(frame: Frame) -> int | None:
+    """Which bound limits a passive joint's own motion; None where a spring does."""
+    if not frame.passive or frame.compliant:
+        return None
+    return 3 if frame.joint == "prismatic" else 1
+
+
+def scales_with_margin(robot: Robot) -> NDArray:
+    """(n, 4) bool: bounds that are play, not the range of a passive joint's motion."""
+    scaled = np.ones((len(robot.frames), 4), dtype=bool)
+    for i, frame in enumerate(robot.frames):
+        own = own_cone(frame)
+        if own is not None:
+            scaled[i, own] = False
+    return scaled
+
+
+def has_bounded_motion(robot: Robot) -> bool:
+    """Whether some passive joint's own motion has a bound."""
+    own = ~scales_with_margin(robot)
+    return bool(np.isfinite(clearance_bounds(robot)[own]).any())
+
+
+def clearance_excess(screws: NDArray, bounds: NDArray) -> float:
+    """By how much the worst clearance screw leaves its cone, eqs (2)-(5).
+
+    Args:
+        screws: (n, 6) [rad, m].
+        bounds: (n, 4) [rad, rad, m, m].
+
+    Returns:
+        [-] largest of size / bound - 1 over the bounds that are positive and finite,
+        and of size / 1 rad or m where the bound is zero; at least 0.
+    """
+    sizes = np.stack(
+        [np.linalg.norm(screws[:, list(rows)], axis=1) for rows in CONES], axis=1
+    )
+    limited = np.isfinite(bounds)
+    where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
+    limited &= bounds > 0.0
+    excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
+    return max(0.0, float(excess.max()), float(where_rigid.max()))

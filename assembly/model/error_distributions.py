@@ -1,0 +1,275 @@
+"""How geometric errors are distributed, and draws of them that any worker can repeat.
+
+Each source is one component of one frame's delta l and reads ``centre + scale s``:
+
+=========== ======================================================================
+uniform     s between -1 and 1; sizes from ``least`` to ``most`` with random signs,
+            or all positive (``signs = "literal"``, the paper's interval as printed)
+normal      s ~ N(0, 1), scale the standard deviation
+truncated   the same, cut where abs(s) exceeds ``limit`` standard deviations
+=========== ======================================================================
+
+Draw number i takes its numbers from one place of a counter-based generator, whatever
+was drawn before and by whom: a run may be cut, resumed or spread in any way.
+
+Sources:
+    Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
+    (Philox).
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from assembly.model.random_errors import SIGNS, frames_named
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from stiffness.screws import SCREW
+
+KINDS = ("uniform", "normal", "truncated")
+_LARGEST = 1e3  # [rad, m] beyond any error
+_WORDS = 4  # numbers that one step of Philox gives
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSources:
+    """Independent random components of the geometric errors; m of them.
+
+    Attributes:
+        robot: whose frames these are.
+        frame: (m,) row of the frame.
+        component: (m,) component of its screw.
+        kind: (m,) index into :data:`KINDS`.
+        centre: (m,) [rad or m].
+        scale: (m,) [rad or m] >= 0.
+        least: (m,) smallest size of s, uniform sources only; below 1.
+        limit: (m,) largest size of s, truncated sources only.
+        signed: (m,) bool: s takes both signs.
+    """
+
+    robot: Robot
+    frame: NDArray
+    component: NDArray
+    kind: NDArray
+    centre: NDArray
+    scale: NDArray
+    least: NDArray
+    limit: NDArray
+    signed: NDArray
+    labels: tuple[str, ...] = field(init=False)
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def __post_init__(self) -> None:
+        names = [
+            f"{self.robot.frames[i].name}.{SCREW[c]}"
+            for i, c in zip(self.frame, self.component, strict=True)
+        ]
+        object.__setattr__(self, "labels", tuple(names))
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def standard(self, uniform: NDArray) -> NDArray:
+        """(..., m) the values s that go with numbers uniform between 0 and 1."""
+        v = 2.0 * uniform - 1.0
+        size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
+        even = np.where(self.signed, np.copysign(size, v), size)
+        if not (self.kind > 0).any():
+            return even
+        # a truncated source uses the part of the bell within its limits only
+        tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
+        bell = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
+        return np.where(self.kind == 0, even, bell)
+
+    def values(self, standard: NDArray) -> NDArray:
+        """(..., m) [rad or m] errors that go with values s."""
+        return self.centre + self.scale * standard
+
+    def uniforms(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
+        """(count, m) numbers in [0, 1) of the draws ``first`` ..
+
+        Args:
+            first: number of the first draw.
+            count: how many.
+            seed: of all draws, below 2^64.
+            stream: another one is independent of this one.
+
+        Returns:
+            The numbers; a draw's do not depend on ``first`` or ``count``.
+        """
+        steps = -(-max(1, len(self)) // _WORDS)
+        philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
+        philox.advance(first * steps)
+        numbers = np.random.Generator(philox).random((count, steps * _WORDS))
+        return numbers[:, : len(self)]
+
+    def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
+        """(count, m) [rad or m] the errors of some draws; see :meth:`uniforms`."""
+        return self.values(self.standard(self.uniforms(first, count, seed, stream)))
+
+    def errors(self, values: NDArray) -> NDArray:
+        """(..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
+        full = np.zeros((*values.shape[:-1], len(self.robot.frames), 6))
+        full[..., self.frame, self.component] = values
+        return full
+
+    @property
+    def mean(self) -> NDArray:
+        """(m,) [rad or m] expected errors."""
+        one_sided = (self.kind == 0) & ~self.signed
+        return self.centre + self.scale * np.where(one_sided, (1 + self.least) / 2, 0.0)
+
+    @property
+    def variance(self) -> NDArray:
+        """(m,) [rad^2 or m^2] of every error."""
+        a = self.least
+        even = np.where(self.signed, (1 + a + a**2) / 3, (1 - a) ** 2 / 12)
+        cut = np.where(self.kind == 2, self.limit, 8.0)
+        density = np.exp(-(cut**2) / 2) / np.sqrt(2 * np.pi)
+        inside = 1.0 - 2.0 * ndtr(-cut)
+        bell = np.where(self.kind == 2, 1.0 - 2.0 * cut * density / inside, 1.0)
+        return self.scale**2 * np.where(self.kind == 0, even, bell)
+
+    def scaled(self, scale: NDArray) -> "ErrorSources":
+        """The same sources with other scales (m,) [rad or m]."""
+        return ErrorSources(
+            self.robot, self.frame, self.component, self.kind, self.centre,
+            np.asarray(scale, dtype=float), self.least, self.limit, self.signed,
+        )  # fmt: skip
+
+
+def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
+    """Random numbers of one draw, as many as it likes.
+
+    Args:
+        seed: of all draws, below 2^64.
+        draw: its number.
+        stream: other than those of :meth:`ErrorSources.uniforms`.
+
+    Returns:
+        A generator that depends on these three only.
+    """
+    philox = np.random.Philox(
+        key=np.array([seed, stream], dtype=np.uint64),
+        counter=np.array([0, draw, 0, 0], dtype=np.uint64),
+    )
+    return np.random.Generator(philox)
+
+
+def tolerance_sources(
+    robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
+    distribution: str = "uniform", deviations: float = 3.0,
+) -> ErrorSources:  # fmt: skip
+    """Sources within symmetric tolerances.
+
+    Args:
+        robot: of n frames.
+        tolerances: (6,) [rad, m] half widths by component, 0 for none.
+        frames: which frames; all whose body the robot has errors or a link at if None.
+        distribution: ``"uniform"`` over the tolerance, or ``"truncated"``: normal with
+            the tolerance at so many standard deviations, and cut there.
+        deviations: see above.
+
+    Returns:
+        The sources, frame by frame.
+
+    Raises:
+        BadInput: a frame is not the robot's.
+    """
+    names = frames_named(robot, frames) if frames is not None else tuple(
+        f.name for f in robot.frames if f.link is not None or f.geometric_error.any()
+    )  # fmt: skip
+    some = np.flatnonzero(np.asarray(tolerances, dtype=float) > 0)
+    rows = np.array([robot.index(name) for name in names], dtype=int)
+    frame, component = np.repeat(rows, len(some)), np.tile(some, len(rows))
+    count, cut = len(frame), distribution == "truncated"
+    width = np.asarray(tolerances, dtype=float)[component]
+    return ErrorSources(
+        robot, frame, component, np.full(count, KINDS.index(distribution)),
+        np.zeros(count), width / deviations if cut else width, np.zeros(count),
+        np.full(count, deviations), np.ones(count, dtype=bool),
+    )  # fmt: skip
+
+
+def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
+    """Error sources of a file; see ``docs/statistics.md``.
+
+    Args:
+        path: TOML file with ``[[errors]]`` tables.
+        robot: whose frames they name.
+
+    Returns:
+        The sources, in the order of the file, frames in the robot's order.
+
+    Raises:
+        BadInput: the file breaks a rule.
+    """
+    root = read_toml(path)
+    tables = root.tables("errors")
+    root.finish()
+    if not tables:
+        raise BadInput(f"{path}: errors: missing; expected tables [[errors]]")
+    rows: list[tuple] = []
+    for table in tables:
+        rows += _rows(table, robot)
+    seen: dict[tuple[int, int], str] = {}
+    for (i, c, *_), table in rows:
+        if (i, c) in seen:
+            name = f"{robot.frames[i].name}.{SCREW[c]}"
+            raise table.bad("", f"found {quoted(name)} again, first in {seen[i, c]}")
+        seen[i, c] = table.place
+    columns = [np.array(column) for column in zip(*(r for r, _ in rows), strict=True)]
+    frame, component, kind, centre, scale, least, limit, signed = columns
+    return ErrorSources(
+        robot, frame, component, kind, centre, scale, least, limit, signed
+    )
+
+
+def _rows(table: Table, robot: Robot) -> list[tuple]:
+    """What one ``[[errors]]`` table says, a row for each source."""
+    names = table.require("frames", "a list of frame names")
+    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        raise table.bad("frames", "expected a list of frame names")
+    try:
+        frames = frames_named(robot, names)
+    except BadInput as error:
+        raise table.bad("frames", str(error)) from None
+    kind = table.text("distribution", "uniform")
+    if kind not in KINDS:
+        raise table.bad("distribution", f"found {quoted(kind)}{nearest(kind, KINDS)}")
+    zero = np.zeros(6)
+    centre = table.array("centre", (6,), "rad, m", zero, largest=_LARGEST)
+    least, limit, signed = zero, np.full(6, np.inf), True
+    if kind == "uniform":
+        scale = table.array("most", (6,), "rad, m", largest=_LARGEST)
+        least = table.array("least", (6,), "rad, m", zero)
+        if not ((0 <= least) & (least <= scale)).all():
+            raise table.bad("least", "expected 0 <= least <= most in every component")
+        signs = table.text("signs", "signed")
+        if signs not in SIGNS:
+            raise table.bad("signs", f"found {quoted(signs)}{nearest(signs, SIGNS)}")
+        signed = signs == "signed"
+        least = least / np.where(scale > 0, scale, 1.0)
+    else:
+        scale = table.array("deviation", (6,), "rad, m", largest=_LARGEST)
+        if kind == "truncated":
+            most = table.array("most", (6,), "rad, m")
+            if not (most[scale > 0] > 0).all():
+                raise table.bad("most", "expected more than 0 where deviation is")
+            limit = most / np.where(scale > 0, scale, 1.0)
+    if not (scale >= 0).all():
+        key = "most" if kind == "uniform" else "deviation"
+        raise table.bad(key, "expected numbers >= 0")
+    table.finish()
+    kept = np.flatnonzero((scale > 0) | (centre != 0))
+    code = KINDS.index(kind)
+    return [
+        ((robot.index(name), c, code, centre[c], scale[c], least[c], limit[c], signed),
+         table)
+        for name in frames for c in kept
+    ]  # fmt: skip

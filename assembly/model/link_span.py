@@ -1,0 +1,87 @@
+"""From a parent's origin to a frame's: the lengths of links that do not state one."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import BeamLink, Frame, Link, MeshLink, Robot
+from forcefit.inputs.table import BadInput, quoted
+from stiffness.beam.beam import section_axes
+from stiffness.screws import rotation_matrix
+
+_SAME_POINT = 1e-9  # [m] two origins nearer than this are one
+
+
+def with_spans(robot: Robot, home: NDArray) -> Robot:
+    """The robot with every link's length known and sound.
+
+    A beam runs between the two origins at home.  Below a prismatic joint that is not
+    at zero there, the frame's translation is not that span: it is written out.
+
+    Args:
+        robot: as read.
+        home: (n,) [rad or m] joint coordinates in the home pose.
+
+    Returns:
+        The robot, some of its beams with ``length`` and ``axis``.
+
+    Raises:
+        BadInput: two origins coincide, or a direction lies along its beam.
+    """
+    links: dict[str, Link] = {}
+    for i, frame in enumerate(robot.frames):
+        parent = robot.parents[i]
+        slides = parent >= 0 and robot.frames[parent].joint == "prismatic"
+        shift = float(home[parent]) if slides else 0.0
+        shift = shift if abs(shift) > _SAME_POINT else 0.0
+        if isinstance(frame.link, BeamLink):
+            links[frame.name] = _with_span(frame, frame.link, shift)
+        elif isinstance(frame.link, MeshLink):
+            _check_mesh(frame, frame.link, shift)
+    return robot.with_links(links) if links else robot
+
+
+def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
+    """A beam of known length, its ``up`` checked."""
+    if link.length is None or link.axis is None:
+        axis = _span(frame, shift)
+        length = float(np.linalg.norm(axis))
+        x, y, z = (axis / length).tolist()
+        answer = replace(link, length=length, axis=(x, y, z)) if shift else link
+    else:
+        axis, answer = np.array(link.axis), link
+    try:
+        section_axes(axis, link.up)
+    except BadInput as error:
+        place = f"frame {quoted(frame.name)}.link.beam.up"
+        raise BadInput(f"{place}: {error}; expected another direction") from None
+    return answer
+
+
+def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
+    """A mesh has a direction, and its roll is fixed by another one."""
+    if link.axis is None and shift:
+        raise BadInput(
+            f"frame {quoted(frame.name)}.link.mesh: found it below a prismatic joint "
+            f'whose home position is {shift:g} m; expected 0 or an "axis", base to tip'
+        )
+    axis = _span(frame, 0.0) if link.axis is None else np.array(link.axis)
+    try:
+        section_axes(axis, link.frame_up)
+    except BadInput as error:
+        place = f"frame {quoted(frame.name)}.up"
+        raise BadInput(f"{place}: {error}; expected another direction") from None
+
+
+def _span(frame: Frame, shift: float) -> NDArray:
+    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
+    if np.linalg.norm(span) < _SAME_POINT:
+        mesh = isinstance(frame.link, MeshLink)
+        given = 'mesh with "axis"' if mesh else 'beam with "length" and "axis"'
+        raise BadInput(
+            f"frame {quoted(frame.name)}.link: found no distance from the parent; "
+            f"expected a translation, or a {given}"
+        )
+    return span

@@ -1,0 +1,176 @@
+"""The largest stress in every link, from the wrench it transmits.
+
+A link is held at its base and loaded by its frame's wrench at the tip.  Beams follow
+the formulas of :mod:`stiffness.beam.beam_stress`; links given by a surface the
+influence of unit wrenches found by finite elements (:mod:`stiffness.fem.stress`), which
+leaves out what is nearer than an interface's radius to a clamped, singular edge.  A
+link given by its stiffness alone has no known stress.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.model.mesh_link import mesh_turn
+from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import section_axes
+from stiffness.beam.beam_stress import peak_beam_stress
+
+_CHUNK = 64  # wrenches at a time: 64 x 20000 nodes x 6 numbers are 61 MB
+
+
+@dataclass(frozen=True, eq=False)
+class LinkStress:
+    """How a link's peak stress follows from its wrench.
+
+    Attributes:
+        frame: name of the frame whose body it is.
+        row: of that frame.
+        method: ``"beam"`` or ``"finite elements"``, with what was left out.
+        peak: (k, 6) [N m, N] wrenches at the frame in its axes to (k,) [Pa].
+    """
+
+    frame: str
+    row: int
+    method: str
+    peak: Callable[[NDArray], NDArray]
+
+
+@lru_cache(maxsize=16)
+def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
+    """Links whose stress can be known, in the robot's order of frames.
+
+    Args:
+        robot: any.
+
+    Returns:
+        Beams of a declared shape and links given by a surface.
+
+    Raises:
+        BadInput: a surface is not usable.
+    """
+    return tuple(
+        _of_mesh(robot.frame(name), robot.index(name))
+        if isinstance(robot.frame(name).link, MeshLink)
+        else LinkStress(name, robot.index(name), "beam", _of_beam(robot.frame(name)))
+        for name in stressed_names(robot)
+    )
+
+
+def stressed_names(robot: Robot) -> tuple[str, ...]:
+    """Frames of :func:`stressed_links`, without solving any."""
+    return tuple(
+        frame.name for frame in robot.frames
+        if isinstance(frame.link, MeshLink)
+        or (isinstance(frame.link, BeamLink) and "area" not in frame.link.section)
+    )  # fmt: skip
+
+
+def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:
+    """Largest von Mises stress in every link of known stress.
+
+    Args:
+        robot: of n frames.
+        wrenches: (..., n, 6) [N m, N] through every frame, at it in its axes, as
+            :attr:`assembly.linear.energy.Assembly.wrenches`.
+
+    Returns:
+        (..., links) [Pa] in the order of :func:`stressed_links`.
+
+    Raises:
+        BadInput: a surface is not usable.
+        ValueError: the shape does not fit the robot.
+    """
+    w = np.asarray(wrenches, dtype=float)
+    if w.shape[-2:] != (len(robot.frames), 6):
+        raise ValueError(
+            f"wrenches have shape {w.shape}, expected (..., {len(robot.frames)}, 6)"
+        )
+    links = stressed_links(robot)
+    flat = w.reshape(-1, *w.shape[-2:])
+    peaks = np.full((len(flat), len(links)), np.nan)
+    solved = np.isfinite(flat).all(axis=(1, 2))
+    for i, link in enumerate(links):
+        peaks[solved, i] = link.peak(flat[solved, link.row])
+    return peaks.reshape(*w.shape[:-2], len(links))
+
+
+def safety_factors(
+    robot: Robot, peaks: ArrayLike, strength: Mapping[str, float] | float
+) -> NDArray:
+    """Yield strength over peak stress.
+
+    Args:
+        robot: whose links these are.
+        peaks: (..., links) [Pa] of :func:`peak_stresses`.
+        strength: [Pa] yield strength of all links, or by frame.
+
+    Returns:
+        (..., links): below 1 the link yields; inf without stress, NaN for links whose
+        strength is not given.
+
+    Raises:
+        BadInput: a name is not a frame of known stress, or a strength is not > 0.
+    """
+    links = stressed_links(robot)
+    if not isinstance(strength, Mapping):
+        strength = {link.frame: float(strength) for link in links}
+    known = {link.frame for link in links}
+    for name, value in strength.items():
+        robot.index(name)
+        if name not in known:
+            raise BadInput(f"yield strength: the stress in {name!r} is not known")
+        if not 0 < value < np.inf:
+            raise BadInput(f"yield strength: found {value}, expected a number > 0")
+    limits = np.array([strength.get(link.frame, np.nan) for link in links])
+    with np.errstate(divide="ignore"):
+        return limits / np.asarray(peaks, dtype=float)
+
+
+def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
+    """Peak stress of a beam."""
+    assert isinstance(frame.link, BeamLink)
+    length, axis = beam_axis(frame)
+    section, R = frame.link.section, section_axes(axis, frame.link.up)
+
+    def peak(wrench: NDArray) -> NDArray:
+        own = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
+        return peak_beam_stress(section, length, own)[0]
+
+    return peak
+
+
+def _of_mesh(frame: Frame, row: int) -> LinkStress:
+    """Peak stress of a link given by its surface."""
+    from stiffness.fem.fea import solve_link
+    from stiffness.fem.material import Material
+    from stiffness.fem.stress import stress_influence, von_mises
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
+
+    link = frame.link
+    assert isinstance(link, MeshLink)
+    place = f'frame "{frame.name}".link.mesh'
+    solved = solve_link(
+        read_surface(link.surface, link.unit),
+        parse_interface(link.base, f"{place}.base"),
+        parse_interface(link.tip, f"{place}.tip"),
+        (Material(link.young, link.poisson),), interface=link.interface,
+    )  # fmt: skip
+    influence = stress_influence(solved)
+    R = mesh_turn(frame, solved.link.tip - solved.link.base)
+
+    def peak(wrench: NDArray) -> NDArray:
+        own = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
+        peaks = np.zeros(len(own))
+        for first in range(0, len(own), _CHUNK):
+            some = own[first : first + _CHUNK]
+            stress = np.tensordot(some, influence.influence, axes=(1, 1))
+            peaks[first : first + _CHUNK] = von_mises(stress).max(axis=1)
+        return peaks
+
+    return LinkStress(frame.name, row, f"finite elements: {influence.region}", peak)

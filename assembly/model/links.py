@@ -1,0 +1,120 @@
+"""The elasticity of every body and joint of a robot, as compliances."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import (
+    BeamLink,
+    Frame,
+    LibraryLink,
+    MatrixLink,
+    Robot,
+    beam_axis,
+)
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.sections import declared_section
+
+
+def link_compliances(robot: Robot) -> NDArray:
+    """Compliance of every body, K_E^-1 of eq. (6).
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
+    """
+    C = np.zeros((len(robot.frames), 6, 6))
+    for i, frame in enumerate(robot.frames):
+        if frame.link is not None:
+            C[i] = link_compliance(frame)
+    return C
+
+
+def link_compliance(frame: Frame) -> NDArray:
+    """(6, 6) compliance of a frame's own body, at the frame in its axes."""
+    link = frame.link
+    if isinstance(link, MatrixLink):
+        return np.linalg.inv(link.stiffness)
+    if isinstance(link, BeamLink):
+        length, axis = beam_axis(frame)
+        section = declared_section(link.section, link.poisson)
+        return beam_compliance(
+            length, section, link.young, link.poisson,
+            theory=link.theory, axis=axis, up=link.up,
+        )  # fmt: skip
+    if isinstance(link, LibraryLink):
+        from stiffness.report.library import read_compliance
+
+        return read_compliance(link.library, link.key)
+    from assembly.model.mesh_link import mesh_compliance
+
+    return mesh_compliance(frame)
+
+
+def joint_compliances(robot: Robot) -> NDArray:
+    """Compliance of every joint, K_B^-1; zero where rigid, free or not given.
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.
+    """
+    C = np.zeros((len(robot.frames), 6, 6))
+    for i, frame in enumerate(robot.frames):
+        K = frame.springs
+        if K is not None:
+            soft = np.ix_(*[np.isfinite(np.diag(K))] * 2)
+            C[i][soft] = np.linalg.inv(K[soft])
+    return C
+
+
+def compliance_factor(C: NDArray) -> NDArray:
+    """Factor L of a compliance, C = L L^T, so that screw = L y stores energy y^2/2.
+
+    Args:
+        C: (6, 6) symmetric positive semidefinite, mixed units.
+
+    Returns:
+        (6, r) of full column rank r.
+    """
+    size = np.sqrt(np.diag(C))
+    soft = np.flatnonzero(size > 0)
+    # scaled to a unit diagonal first: rad and m differ by many powers of ten
+    scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
+    L = np.zeros((6, len(soft)))
+    L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
+    return L
+
+
+def own_screw(frame: Frame) -> NDArray:
+    """(6,) unit screw of a joint's own motion."""
+    return np.eye(6)[frame.own_axis]
+
+
+def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
+    """K_B with a spring put in series in one direction of its own axes.
+
+    Args:
+        stiffness: (6, 6) declared, None if rigid.
+        row: which direction.
+        compliance: [rad/(N m) or m/N] of the spring added.
+
+    Returns:
+        (6, 6) with ``inf`` on the diagonal where rigid.
+    """
+    K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
+    free = np.diag(K) == 0.0  # in series with what resists nothing, nothing resists
+    K[free, free] = np.inf
+    soft = np.isfinite(np.diag(K))
+    C = np.zeros((6, 6))
+    if soft.any():
+        C[np.ix_(soft, soft)] = np.linalg.inv(K[np.ix_(soft, soft)])
+    C[row, row] += compliance
+    soft = np.diag(C) > 0
+    K = np.diag(np.full(6, np.inf))
+    if soft.any():
+        K[np.ix_(soft, soft)] = np.linalg.inv(C[np.ix_(soft, soft)])
+    K[free], K[:, free] = 0.0, 0.0
+    return K

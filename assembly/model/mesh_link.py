@@ -1,0 +1,156 @@
+"""K_E of a mesh link, put where the robot has it: turned from mesh to frame axes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Frame, MeshLink
+from forcefit.inputs.table import BadInput, quoted
+from stiffness.beam.beam import section_axes
+from stiffness.link import LinkStiffness, turn_link
+from stiffness.screws import rotation_matrix
+
+
+def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
+    """Stiffness of a frame's mesh link by finite elements, in the frame's axes.
+
+    Args:
+        frame: one with a :class:`assembly.model.robot.MeshLink`.
+        accuracy: asked of every entry, relative to sqrt(K_ii K_jj).
+
+    Returns:
+        The link, read at the tip interface's centre, which is the frame's origin.
+
+    Raises:
+        BadInput: the surface or an interface is not usable, ``up`` lies along the
+            link, or the distance of the interfaces is not that of the two origins.
+        ValueError: the frame has no mesh link.
+    """
+    link = frame.link
+    if not isinstance(link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    place = f'frame "{frame.name}".link.mesh'
+    solved = _solved(link, accuracy, place)
+    reach = solved.tip - solved.base
+    turn = mesh_turn(frame, reach)
+    if link.axis is None:
+        _check_tip(place, turn @ reach, _between_origins(frame))
+    return turn_link(solved, turn)
+
+
+def mesh_compliance(frame: Frame) -> NDArray:
+    """(6, 6) compliance of a frame's mesh link; see :func:`mesh_link_stiffness`."""
+    return mesh_link_stiffness(frame).compliance
+
+
+_KNOWN: dict[tuple, LinkStiffness] = {}  # solved before by this process
+
+
+def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
+    """Stiffness in the mesh's axes; links of one shape and material are solved once."""
+    from stiffness.fem.fea import mesh_link
+    from stiffness.surface.interface import parse_interface
+
+    try:
+        stamp = link.surface.stat().st_mtime_ns
+    except OSError as error:
+        raise BadInput(
+            f"{place}: surface {link.surface} cannot be read: {error.strerror}"
+        ) from None
+    shape = (link.surface, stamp, link.unit, repr(link.base), repr(link.tip))
+    key = (*shape, link.young, link.poisson, link.interface, accuracy)
+    if key not in _KNOWN:
+        _KNOWN[key] = mesh_link(
+            link.surface,
+            parse_interface(link.base, f"{place}.base"),
+            parse_interface(link.tip, f"{place}.tip"),
+            link.young, link.poisson,
+            unit=link.unit, accuracy=accuracy, interface=link.interface,
+        )  # fmt: skip
+    return _KNOWN[key]
+
+
+def mesh_turn(frame: Frame, reach: NDArray) -> NDArray:
+    """Rotation from a frame's mesh's axes to the frame's.
+
+    Args:
+        frame: one with a :class:`assembly.model.robot.MeshLink`.
+        reach: (3,) [m] from base to tip in the mesh's axes.
+
+    Returns:
+        (3, 3) it lays the reach along the link's ``axis``, or along the way from the
+        parent's origin to the frame's if it has none.
+
+    Raises:
+        BadInput: the mesh's ``up`` lies along the reach.
+        ValueError: the frame has no mesh link.
+    """
+    link = frame.link
+    if not isinstance(link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    if link.up is not None:
+        try:
+            section_axes(reach, link.up)
+        except BadInput as error:
+            place = f"frame {quoted(frame.name)}.link.mesh.up"
+            raise BadInput(f"{place}: {error}; expected another direction") from None
+    span = _between_origins(frame) if link.axis is None else np.array(link.axis)
+    return mesh_rotation(reach, span, link.up, link.frame_up)
+
+
+def _between_origins(frame: Frame) -> NDArray:
+    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
+
+
+def mesh_rotation(
+    mesh_span: NDArray,
+    span: NDArray,
+    up: tuple[float, float, float] | None = None,
+    frame_up: tuple[float, float, float] | None = None,
+) -> NDArray:
+    """Rotation from mesh axes to frame axes that lays one span along the other.
+
+    Args:
+        mesh_span: (3,) [m] base to tip in the mesh's axes.
+        span: (3,) its direction in the frame's axes.
+        up: a direction in the mesh's axes that fixes the roll, with ``frame_up``.
+        frame_up: the same direction in the frame's axes.
+
+    Returns:
+        (3, 3) the rotation; the smallest one if no roll is given.
+    """
+    a, b = mesh_span / np.linalg.norm(mesh_span), span / np.linalg.norm(span)
+    if up is not None and frame_up is not None:
+        return _triad(b, np.array(frame_up)) @ _triad(a, np.array(up)).T
+    axis = np.cross(a, b)
+    sine, cosine = float(np.linalg.norm(axis)), float(a @ b)
+    if sine < 1e-15:
+        if cosine > 0:
+            return np.eye(3)
+        # half a turn: about any axis across, the one nearest to a coordinate axis
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
+    return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
+
+
+def _triad(along: NDArray, up: NDArray) -> NDArray:
+    """Right-handed axes: first along, third as near to up as possible."""
+    side = np.cross(up, along)
+    side = side / np.linalg.norm(side)
+    return np.column_stack([along, side, np.cross(along, side)])
+
+
+def _check_tip(place: str, tip: NDArray, wanted: NDArray) -> None:
+    """The interfaces must be as far apart as the origins they stand for."""
+    length = float(np.linalg.norm(wanted))
+    if np.linalg.norm(tip - wanted) > 1e-6 + 1e-3 * length:
+        raise BadInput(
+            f"{place}: the tip interface's centre lies at {_point(tip)} from the "
+            f"base's, the frame's origin at {_point(wanted)} from its parent's; "
+            "expected the same point within 1e-6 m + 0.1 % of the length"
+        )
+
+
+def _point(p: NDArray) -> str:
+    """Coordinates for a message."""
+    return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

@@ -1,0 +1,4 @@
+"""Answers as text, JSON, tables and pictures.
+
+Begin at ``results.py``.
+"""

@@ -1,0 +1,145 @@
+"""Answers as labelled arrays (xarray) and tables (pandas).
+
+Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
+``long_name`` are attributes of every variable.  Neither package is imported before it
+is asked for.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.screws import SCREW, WRENCH
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from assembly.exact.exact import ExactAssembly
+    from assembly.linear.energy import Assembly
+
+_LABELS = {
+    "screw": SCREW, "wrench_component": WRENCH, "bound": ("lower", "upper")
+}  # fmt: skip
+_SCREW, _WRENCH = ("rad, m", ("screw",)), ("N m, N", ("wrench_component",))
+# name: unit, dimensions beside those of the points or frames, meaning
+_OF_FRAMES = {
+    "geometric_error": (*_SCREW, "delta l"),
+    "clearance_screw": (*_SCREW, "play, and small motions of passive joints"),
+    "link_screw": (*_SCREW, "deformation of the body"),
+    "joint_screw": (*_SCREW, "deformation of the joint"),
+    "wrench": (*_WRENCH, "what the outer part exerts on the inner, at the frame"),
+    "joint_wrench": (*_WRENCH, "the same through the joint"),
+}
+_OF_POINTS = {
+    "energy": ("J", (), "least elastic energy that closes it, eq. (22)"),
+    "potential": ("J", (), "energy minus the work of the loads"),
+    "platform_screw": (*_SCREW, "pose error at the platform's origin, base axes"),
+    "load": (*_WRENCH, "on the platform at its origin, base axes"),
+    "duality_gap": ("J", (), "certified: energy is at most this too high"),
+    "closure_residual": ("1", (), "largest closure error left"),
+    "clearance_excess": ("1", (), "by how much a clearance is exceeded"),
+    "energy_without_play": ("J", (), "what closing would cost without clearances"),
+    "margin": ("1", (), "factor on all clearances at which it just assembles"),
+    "margin_bound": ("1", (), "certified: the margin is at least this"),
+    "rotation_error": ("rad", ("bound",), "bounds of the largest rotation error, (27)"),
+    "translation_error": ("m", ("bound",), "bounds of the largest translation error"),
+    "rotation_screw": (*_SCREW, "attains the lower bound of the rotation"),
+    "translation_screw": (*_SCREW, "attains the lower bound of the translation"),
+    "status": ("", (), "ok, or why there is no answer"),
+    "reason": ("", (), "what was said where the status is not ok"),
+}
+
+
+def assembly_dataset(answer: "Assembly | ExactAssembly") -> "xarray.Dataset":
+    """An assembly over its frames and closures, with the platform's error.
+
+    Args:
+        answer: by the linear model or with finite motions.
+
+    Returns:
+        Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
+        ``closure``; the pose is in coordinates without dimension.
+    """
+    robot = answer.posture.robot
+    frames = {
+        "geometric_error": robot.errors,
+        "clearance_screw": answer.clearance_screws,
+        "link_screw": answer.link_screws,
+        "joint_screw": answer.joint_screws,
+        "wrench": answer.wrenches,
+        "joint_wrench": answer.joint_wrenches,
+    }
+    single = {
+        name: getattr(answer, name)
+        for name in ("energy", "potential", "platform_screw", "load")
+    }
+    data = _dataset(frames, _OF_FRAMES, "frame", [f.name for f in robot.frames])
+    pose = {
+        name: ((), value, {"units": "m" if name[0] == "t" else "rad"})
+        for name, value in answer.posture.pose().items()
+    }
+    data = data.merge(_dataset(single, _OF_POINTS)).assign_coords(pose)
+    about = {"units": "N m, N", "long_name": "second chain on first, at the platform"}
+    data["closure_wrench"] = (
+        ("closure", "wrench_component"), answer.closure_wrenches, about
+    )  # fmt: skip
+    data = data.assign_coords(closure=[" - ".join(pair) for pair in robot.closures])
+    return data.assign_attrs(robot=robot.name)
+
+
+def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
+    """Results of many points over ``point``.
+
+    Args:
+        values: (k, ...) by the names of a sweep's variables.
+
+    Returns:
+        Data set with their units.
+    """
+    count = len(next(iter(values.values())))
+    return _dataset(values, _OF_POINTS, "point", np.arange(count))
+
+
+def frame_table(data: "xarray.Dataset", rows: str) -> "pandas.DataFrame":
+    """The variables over one dimension as a table, a column for each component.
+
+    Args:
+        data: of this module.
+        rows: the dimension that becomes the index.
+
+    Returns:
+        Table whose columns are (variable, component), component empty for plain
+        numbers; units by variable are in its ``attrs["units"]``.
+    """
+    import pandas
+
+    columns: dict[tuple[str, str], NDArray] = {}
+    kept = {str(k): v for k, v in data.data_vars.items() if v.dims[:1] == (rows,)}
+    for name, variable in kept.items():
+        labels = [""] if variable.ndim == 1 else data[variable.dims[1]].values
+        flat = variable.values.reshape(len(variable), len(labels))
+        columns |= {(name, str(c)): flat[:, k] for k, c in enumerate(labels)}
+    table = pandas.DataFrame(columns, index=pandas.Index(data[rows].values, name=rows))
+    table.columns.names = ["variable", "component"]
+    table.attrs["units"] = {name: v.attrs["units"] for name, v in kept.items()}
+    return table
+
+
+def _dataset(
+    values: Mapping[str, Any], known: Mapping[str, tuple], *points: Any
+) -> "xarray.Dataset":
+    """Values with units and meaning; ``points`` names their first axis and labels."""
+    import xarray
+
+    first = points[:1]
+    data, used = {}, set()
+    for name, value in values.items():
+        unit, dims, meaning = known[name]
+        attributes = {"units": unit, "long_name": meaning}
+        data[name] = ((*first, *dims), np.asarray(value), attributes)
+        used |= {*dims}
+    labels: dict[str, Any] = {dim: list(_LABELS[dim]) for dim in _LABELS if dim in used}
+    return xarray.Dataset(data, labels | dict([points] if points else []))

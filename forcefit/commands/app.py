@@ -1,0 +1,127 @@
+"""The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import forcefit.commands.statistics  # adds its commands
+import forcefit.commands.sweep  # likewise
+from forcefit.commands import assembly, stiffness, validation
+from forcefit.commands.options import JsonOption
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.errors import BadInput, one_line
+from forcefit.inputs.writing import write_json
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.add_typer(stiffness.app, name="stiffness", help="How stiff is a link?")
+app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
+app.add_typer(validation.app, name="validation", help="Is it true?")
+
+
+def _print_version(asked: bool) -> None:
+    """What ``--version`` does."""
+    if asked:
+        from forcefit import __version__
+
+        print(f"forcefit {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def forcefit(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=_print_version,
+            help="Show the version and exit.",
+        ),
+    ] = False,
+) -> None:
+    """Forced assembly of parallel manipulators, and the proof of each number.
+
+    Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
+    """
+
+
+@app.command()
+def study(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Study file (TOML).")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder to write.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Run the main job: every check of a study file, one report.
+
+    Writes report.html (self-contained), results.json and results.nc into the folder
+    the study file names.  Exit status 1 if a check fails.
+    """
+    from validation.study.report import results_table, verdict, write_study
+    from validation.study.study import read_study, run_study
+
+    asked = read_study(file, output)
+    with progress_bars() as update:
+        results = run_study(asked, update)
+        update("report", 0, 1)
+        folder = write_study(results)
+        update("report", 1, 1)
+    write_json(results_table(results), json)
+    if json != "-":
+        print(verdict(results))
+        print(f"report: {folder / 'report.html'}")
+    if not results.passed:
+        raise typer.Exit(1)
+
+
+@app.command("warm-up")
+def warm_up() -> None:
+    """Compile the solvers now, once on this machine.
+
+    What is compiled is kept on disk; later commands then start at once.
+    """
+    from forcefit.commands.warm_up import warm_up as compile_all
+
+    with progress_bars() as update:
+        compile_all(lambda done, total: update("compiling", done, total))
+
+
+def main() -> None:
+    """Run the command; bad input is one line on stderr and exit status 2."""
+    try:
+        status = app(prog_name="forcefit", standalone_mode=False)
+    except BadInput as error:
+        sys.exit(_complain(str(error), 2))
+    except (KeyboardInterrupt, typer.Abort):
+        sys.exit(_complain("interrupted", 130))
+    except SystemError as error:
+        # Ctrl-C while compiled code ran
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        sys.exit(_complain("interrupted", 130))
+    except typer.Exit as error:
+        sys.exit(error.exit_code)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except Exception as error:
+        # an option misspelt or missing: the parser's own kind of error
+        if not hasattr(error, "format_message"):
+            raise
+        sys.exit(_complain(error.format_message(), 2))
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _complain(message: str, status: int) -> int:
+    """A message on stderr, if there is one: help without a command has none."""
+    if message:
+        print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
+    return status

@@ -1,0 +1,252 @@
+"""The commands ``forcefit assembly ...``: parse, call one function, print or save."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_direction,
+    parse_gravity,
+    parse_load,
+    parse_vector,
+    posture_of,
+)
+from forcefit.commands.progress import one_thread
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import (
+    PIXELS,
+    check_writable,
+    save_pixels,
+    write_json,
+)
+
+app = typer.Typer(no_args_is_help=True)
+
+
+@app.command()
+def solve(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Close at least energy: pose error, energy, wrenches, margin."""
+    from assembly.effects.acting import act
+    from assembly.report.results import solution_of, solution_text
+
+    acting = act(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under),
+    )  # fmt: skip
+    with one_thread():
+        results = solution_of(acting.posture, acting.load, acting.gravity)
+    if results["status"] == "ok" and acting.conditions.reads_otherwise:
+        results["reading"] = acting.reading(results["platform_screw"])
+    write_json(results, json)
+    if json != "-":
+        print(solution_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
+def zone(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Whether the robot goes together by play alone; the margin."""
+    from assembly.report.results import zone_of, zone_text
+
+    found = zone_of(posture_of(robot, pose, joint))
+    write_json({"robot": robot, "zone": found}, json)
+    if json != "-":
+        print(zone_text(found))
+    if found["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
+def exact(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Close the robot with finite motions: closures hold exactly."""
+    from assembly.effects.acting import act
+    from assembly.report.results import exact_of, exact_text
+
+    acting = act(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=True,
+    )  # fmt: skip
+    with one_thread():
+        results = exact_of(acting.posture, acting.load, acting.gravity)
+    write_json(results, json)
+    if json != "-":
+        print(exact_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
+def error(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    reading: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="frozen | free | budget; default all, under a load the first two."
+        ),
+    ] = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    energy_budget: Annotated[
+        float, typer.Option(help="eta of the budget reading: E <= (1 + eta) E*.")
+    ] = 0.05,
+    tolerance_rotation: Annotated[
+        float, typer.Option(help="[rad] upper minus lower bound.")
+    ] = 1e-6,
+    tolerance_translation: Annotated[
+        float, typer.Option(help="[m] upper minus lower bound.")
+    ] = 1e-6,
+    point: Annotated[
+        list[str] | None,
+        typer.Option(help="Of the platform, in its axes [m], such as x=0.1,z=-0.05."),
+    ] = None,
+    direction: Annotated[
+        list[str] | None,
+        typer.Option(help="Also the largest error along it, such as tx=1,tz=-1."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Certified bounds of the largest pose error, problem (27)."""
+    from assembly.effects.acting import act
+    from assembly.files.joint_file import LARGEST_LENGTH
+    from assembly.linear.reach import READINGS
+    from assembly.report.results import pose_error_of, pose_error_text
+
+    for name in reading or ():
+        if name not in READINGS:
+            hint = nearest(name, READINGS)
+            raise BadInput(f'--reading: found "{name[:60]}"{hint}')
+    options = {
+        "energy_budget": energy_budget,
+        "tolerance_rotation": tolerance_rotation,
+        "tolerance_translation": tolerance_translation,
+    }
+    for key, value in options.items():
+        if not 0 < value <= LARGEST_LENGTH:
+            option = "--" + key.replace("_", "-")
+            expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
+            raise BadInput(f"{option}: found {value}, expected {expected}")
+    acting = act(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under),
+    )  # fmt: skip
+    with one_thread():
+        results = pose_error_of(
+            acting.posture, reading or None, load=acting.load, gravity=acting.gravity,
+            point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
+            direction=parse_direction(direction), **options,
+        )  # fmt: skip
+    write_json(results, json)
+    if json != "-":
+        print(pose_error_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+@app.command()
+def show(
+    robot: RobotArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="PNG, JPEG, BMP or TIFF; a window opens without."
+        ),
+    ] = None,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    exaggeration: Annotated[
+        float | None, typer.Option(help="Factor on displacements.", min=1e-6)
+    ] = None,
+    error_body: Annotated[
+        str | None,
+        typer.Option(help="Also the body of possible errors: translation | rotation."),
+    ] = None,
+    reading: Annotated[
+        str | None,
+        typer.Option(
+            help="Of that body: frozen | free | budget; default budget, of a loaded "
+            "robot frozen."
+        ),
+    ] = None,
+) -> None:
+    """Draw the nominal and the forced robot, and its errors."""
+    from assembly.linear.energy import CannotAssemble, solve_assembly
+    from assembly.linear.error_body import PARTS
+    from assembly.linear.reach import READINGS
+    from assembly.linear.reduction import FreeMotion
+    from assembly.report.plot import draw_assembly
+    from assembly.report.results import failure_status, remark_lines
+    from assembly.solvers.conic import SolverFailed
+
+    if output is not None:
+        check_writable(output, PIXELS)
+    elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
+        raise BadInput("no display to open a window on; name a file with --output")
+    for option, value, valid in (
+        ("--error-body", error_body, PARTS), ("--reading", reading, READINGS)
+    ):  # fmt: skip
+        if value is not None and value not in valid:
+            raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
+    if exaggeration is not None and not exaggeration < float("inf"):
+        raise BadInput(f"--exaggeration: found {exaggeration}, expected a finite one")
+    wrench = parse_load(load)
+    loaded = wrench is not None and any(wrench)
+    if loaded and error_body is not None and reading == "budget":
+        raise BadInput(
+            "--reading: found budget with --load, and a loaded robot has no such "
+            "reading; expected frozen or free"
+        )
+    reading = reading or ("frozen" if loaded else "budget")
+    posture = posture_of(robot, pose, joint)
+    for line in remark_lines(posture.robot.remarks):
+        print(line)
+    try:
+        answer = solve_assembly(posture, wrench)
+        plotter = draw_assembly(
+            answer, exaggeration, error_body, reading, output is not None
+        )
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        print(f"{failure_status(error)}: {error}")
+        raise typer.Exit(1) from None
+    if output is None:
+        plotter.show()
+    else:
+        save_pixels(plotter.screenshot(return_img=True), output)
+    plotter.close()

@@ -1,0 +1,100 @@
+"""What the command line says about a beam."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.commands.options import parse_assignments
+from forcefit.inputs.errors import BadInput, checked, describe, nearest
+from stiffness.beam.beam import THEORIES, beam_compliance
+from stiffness.beam.sections import Section, check_section, declared_section
+from stiffness.link import LinkStiffness
+
+
+@dataclass(frozen=True)
+class BeamOptions:
+    """What the command line says about a beam; absent values are None."""
+
+    young: float
+    poisson: float
+    radius: float | None = None
+    inner_radius: float | None = None
+    width: float | None = None
+    height: float | None = None
+    theory: str = "timoshenko"
+    section_text: str | None = None
+
+    def material(self) -> tuple[float, float]:
+        """Young's modulus [Pa] and Poisson's ratio."""
+        E = checked("--young", self.young, "Pa", above=0)
+        return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
+
+    def declared(self) -> dict[str, float]:
+        """The section's lengths or constants by name; an error that says what lacks."""
+        plain = {
+            "radius": self.radius,
+            "inner_radius": self.inner_radius,
+            "width": self.width,
+            "height": self.height,
+        }
+        given = {name: value for name, value in plain.items() if value is not None}
+        if self.section_text is not None:
+            if given:
+                name = next(iter(given)).replace("_", "-")
+                raise BadInput(f"--section: says it all, --{name} does not go with it")
+            constants = parse_assignments([self.section_text], "--section")
+            check_section("--section", constants)
+            return constants
+        rectangle = "width" in given or "height" in given
+        if ("radius" in given) == rectangle:
+            raise BadInput(
+                "give either --radius, or --width and --height, or --section"
+            )
+        if rectangle and "inner_radius" in given:
+            raise BadInput("--inner-radius: goes with --radius, not with a rectangle")
+        for name in ("width", "height") if rectangle else ("radius",):
+            if name not in given:
+                raise BadInput(f"--{name}: missing; a rectangle has both")
+            checked(f"--{name}", given[name], "m", above=0)
+        if "inner_radius" in given:
+            inner = given["inner_radius"]
+            checked("--inner-radius", inner, "m", least=0, below=given["radius"])
+        return given
+
+    def section(self) -> Section:
+        """The section that the options describe, or an error that says what lacks."""
+        _, nu = self.material()
+        return declared_section(self.declared(), nu)
+
+    def checked_theory(self) -> str:
+        """The name of a beam theory."""
+        if self.theory not in THEORIES:
+            raise BadInput(
+                f"--theory: found {describe(self.theory)}"
+                f"{nearest(self.theory, THEORIES)}"
+            )
+        return self.theory
+
+    def link(
+        self, base: NDArray, tip: NDArray, up: NDArray | None = None
+    ) -> LinkStiffness:
+        """The beam between two points, in the axes they are given in."""
+        E, nu = self.material()
+        theory = self.checked_theory()
+        C = beam_compliance(
+            float(np.linalg.norm(tip - base)),
+            self.section(),
+            E,
+            nu,
+            theory=theory,
+            axis=tip - base,
+            up=up,
+        )
+        return LinkStiffness(beam_name(theory), C, tip=tip, base=base)
+
+
+def beam_name(theory: str) -> str:
+    """What a result of a beam theory is called."""
+    names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
+    return names[theory]

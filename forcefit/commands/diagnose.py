@@ -1,0 +1,70 @@
+"""The command ``forcefit validation diagnose``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.inspect import CampaignArgument
+from forcefit.commands.options import JsonOption
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.writing import PAGE, ROBOT, check_writable, write_json
+
+
+def diagnose(
+    campaign: CampaignArgument,
+    json: JsonOption = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Also write a report, one HTML file.")
+    ] = None,
+    calibrate: Annotated[
+        int, typer.Option(help="Simulate this many campaigns on the same design.")
+    ] = 0,
+    finite_motions: Annotated[
+        bool,
+        typer.Option(
+            "--finite-motions", help="Motions of the declared model are finite."
+        ),
+    ] = False,
+    save: Annotated[
+        Path | None, typer.Option(help="Also write the robot with the effects found.")
+    ] = None,
+) -> None:
+    """Trace measured deviations to the effect the model lacks.
+
+    The verdict is explained, none_needed, ambiguous or outside_library; errors before
+    and after are on rows that played no part in choosing or fitting.
+    """
+    from validation.campaign.campaign_file import read_campaign
+    from validation.diagnosis import results
+    from validation.diagnosis.diagnose import diagnose as trace
+
+    for path, kind in ((report, PAGE), (save, ROBOT)):
+        if path is not None:
+            check_writable(path, kind)
+    data = read_campaign(campaign)
+    with progress_bars() as update:
+        found = trace(data, finite=finite_motions, update=update)
+    tally = None
+    if calibrate:
+        from validation.diagnosis.verdict import calibrate as simulate
+
+        with progress_bars() as update:
+            tally = simulate(
+                found.screen, found.best, calibrate,
+                lambda done, n: update("simulated campaigns", done, n),
+            )  # fmt: skip
+    write_json(results.table(found, tally), json)
+    if json != "-":
+        print(results.text(found, tally))
+    if report is not None:
+        from validation.diagnosis.report import write_report
+
+        write_report(found, report, tally)
+    if save is not None:
+        if found.verdict != "explained":
+            typer.echo(f"{save}: not written, the verdict is {found.verdict}", err=True)
+            raise typer.Exit(1)
+        from assembly.files.robot_file import write_robot
+
+        write_robot(results.corrected(found), save)

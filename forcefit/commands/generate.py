@@ -1,0 +1,167 @@
+"""The command ``forcefit validation generate``: parse, call one function, save."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from forcefit.commands.options import JsonOption, RobotArgument
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import check_json, write_json
+
+DEFAULT_STRENGTH = 5.0  # [-] sigmas
+
+
+def parse_effects(texts: list[str] | None) -> dict[str, float]:
+    """Names and strengths from ``--effect``.
+
+    Args:
+        texts: such as ``["self_weight", "link_length=3"]``.
+
+    Returns:
+        Multiples of the noise by name.
+
+    Raises:
+        BadInput: a strength that is not a number > 0, or an effect given twice.
+    """
+    from forcefit.commands.options import parse_assignments
+
+    wanted: dict[str, float] = {}
+    for text in texts or []:
+        name, equals, strength = (part.strip() for part in text.partition("="))
+        given = parse_assignments([text], "--effect") if equals else {}
+        multiple = given.get(name, DEFAULT_STRENGTH)
+        if not multiple > 0:
+            raise BadInput(f'--effect {name}: found "{strength}", expected > 0')
+        if name in wanted:
+            raise BadInput(f'--effect: "{name[:60]}" is given twice')
+        wanted[name] = multiple
+    return wanted
+
+
+def parse_point(text: str) -> list[float]:
+    """Three numbers from ``--point``.
+
+    Args:
+        text: such as ``"0,0,0.05"``.
+
+    Returns:
+        They.
+
+    Raises:
+        BadInput: not three numbers.
+    """
+    try:
+        point = [float(part) for part in text.split(",")]
+    except ValueError:
+        point = []
+    if len(point) != 3 or not all(abs(x) < 1e6 for x in point):
+        raise BadInput(
+            f'--point: found "{text[:60]}", expected three numbers, as 0,0,0'
+        )
+    return point
+
+
+def generate(
+    robot: RobotArgument,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="To be written.")],
+    truth: Annotated[
+        Path, typer.Option(help="File for what is hidden; not inside FOLDER.")
+    ],
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect", help="Hidden: NAME, or NAME=MULTIPLE of the noise (5)."
+        ),
+    ] = None,
+    configurations: Annotated[int, typer.Option(help="Different ones.")] = 24,
+    rows: Annotated[int, typer.Option(help="Measurements, interleaved.")] = 116,
+    reach: Annotated[
+        float, typer.Option(help="[rad] Largest change of a drive from home.")
+    ] = 0.6,
+    stroke: Annotated[
+        float, typer.Option(help="[m/rad] What a sliding drive moves per rad of reach.")
+    ] = 0.1,
+    force: Annotated[float, typer.Option(help="[N] Largest load.")] = 40.0,
+    loads: Annotated[str, typer.Option(help="many | one")] = "many",
+    temperature: Annotated[
+        str, typer.Option(help="swing | around | constant")
+    ] = "swing",
+    command: Annotated[str, typer.Option(help="joints | pose")] = "joints",
+    humidity: Annotated[
+        bool, typer.Option("--humidity", help="Record it as a covariate.")
+    ] = False,
+    rotation: Annotated[float, typer.Option(help="[rad] 1 sigma.")] = 1e-5,
+    position: Annotated[float, typer.Option(help="[m] 1 sigma.")] = 5e-6,
+    error_size: Annotated[
+        float,
+        typer.Option(help="[rad] Declared errors drawn up to it, 0.5 mm per mrad."),
+    ] = 0.0,
+    outliers: Annotated[int, typer.Option(help="Rows spoilt.")] = 0,
+    missing: Annotated[float, typer.Option(help="Share of empty cells.")] = 0.0,
+    hidden_frame: Annotated[
+        float, typer.Option(help="[rad, m] Size of an unknown measuring frame.")
+    ] = 0.0,
+    point: Annotated[
+        str, typer.Option(help="[m] Measured point, platform axes.")
+    ] = "0,0,0",
+    program: Annotated[str, typer.Option(help="multibody | springs")] = "multibody",
+    seed: Annotated[int, typer.Option(help="Of all draws.")] = 0,
+    json: JsonOption = None,
+) -> None:
+    """Measure a simulated machine with effects its file lacks.
+
+    Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints are tight
+    unless their play is hidden.
+    """
+    import numpy as np
+
+    from assembly.robots import load_robot
+    from validation.multibody.simulation import SimulationFailed, without_clearance
+    from validation.synthetic.design import Design
+    from validation.synthetic.draws import NotApplicable
+    from validation.synthetic.generator import (
+        Noise,
+        check_folder,
+        generate_campaign,
+        write_campaign,
+    )
+    from validation.synthetic.rest import PROGRAMS
+    from validation.synthetic.truth import truth_of
+
+    if program not in PROGRAMS:
+        raise BadInput(
+            f'--program: found "{program[:60]}", expected ' + " | ".join(PROGRAMS)
+        )
+    wanted, measured = parse_effects(effect), parse_point(point)
+    design = Design(
+        configurations, rows, reach, stroke, force, loads, temperature, command,
+        humidity,
+    )  # fmt: skip
+    noise = Noise(rotation, position, outliers, missing, hidden_frame)
+    check_folder(folder)
+    check_json(str(truth))
+    if folder.resolve() in truth.resolve().parents:
+        raise BadInput(
+            f"--truth {truth}: found a place inside {folder}, for all to see"
+        )
+    machine = without_clearance(load_robot(robot))
+    if error_size:
+        drawn = np.random.default_rng(seed + 1).uniform(
+            -error_size, error_size, (len(machine.frames), 6)
+        )
+        machine = machine.with_errors(drawn * np.repeat([1.0, 0.5], 3))
+    try:
+        with progress_bars() as update:
+            campaign = generate_campaign(
+                machine, wanted, design, noise, measured, seed, program, update
+            )
+    except (NotApplicable, SimulationFailed) as error:
+        raise BadInput(str(error)) from None
+    hidden: dict[str, Any] = truth_of(campaign)
+    write_campaign(campaign, folder)
+    write_json({folder.name: hidden}, str(truth))
+    write_json({"folder": str(folder), "rows": len(campaign.readings)}, json)
+    if json != "-":
+        print(f"{folder}: {len(campaign.readings)} rows; what is hidden: {truth}")

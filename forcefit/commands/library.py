@@ -1,0 +1,97 @@
+"""The commands ``forcefit stiffness library ...``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.stiffness_options import Json
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import write_json
+
+library = typer.Typer(no_args_is_help=True)
+Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
+
+
+@library.command()
+def build(
+    spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
+    workers: Annotated[int, typer.Option(help="Processes.")] = 1,
+    json: Json = None,
+) -> None:
+    """Compute the entries of a build file that are not there yet."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from forcefit.inputs.errors import checked
+    from stiffness.report.library import build_library, read_spec
+
+    wanted = read_spec(spec)
+    count = int(checked("--workers", workers, "1", least=1))
+    with Progress(console=Console(stderr=True)) as bars:
+        task = bars.add_task("entries")
+        files = build_library(
+            wanted,
+            count,
+            lambda done, total: bars.update(task, completed=done, total=total),
+        )
+    write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
+    if json != "-":
+        print(f"{len(files)} entries in {wanted.folder}")
+
+
+@library.command(name="list")
+def list_entries(folder: Folder, json: Json = None) -> None:
+    """The entries of a library and how good they are."""
+    from stiffness.report.library import read_library
+
+    entries = read_library(folder)
+    write_json({"entries": [e.about for e in entries]}, json)
+    if json != "-":
+        for entry in entries:
+            error = entry.about["relative_error_estimate"]
+            print(f"{entry.key}  error {error:.2g}")
+
+
+@library.command(name="look-up")
+def look_up_entry(
+    folder: Folder,
+    at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
+    json: Json = None,
+) -> None:
+    """K_E between a library's entries, interpolated, with its error."""
+    from forcefit.commands.options import parse_assignments
+    from stiffness.link import scaled
+    from stiffness.report.library import look_up, read_library
+    from stiffness.report.results import matrix_text
+
+    wanted = parse_assignments(at, "--at")
+    K, error = look_up(read_library(folder), wanted)
+    worst = float(scaled(error, K).max())
+    results = {"parameters": wanted, "stiffness": K, "relative_error_estimate": worst}
+    write_json(results, json)
+    if json != "-":
+        print(matrix_text(K))
+        print(f"largest relative error: {worst:.2g} (estimate)")
+
+
+@library.command()
+def export(
+    folder: Folder,
+    to: Annotated[str, typer.Option(help="csv, json, exudyn, adams or mapdl.")] = "csv",
+    key: Annotated[str | None, typer.Option(help="One entry; all for csv.")] = None,
+) -> None:
+    """Print a library, or one entry's K_E for another program."""
+    from stiffness.report.export import library_csv, stiffness_for
+    from stiffness.report.library import read_entry, read_library
+
+    if to in {"csv", "json"}:
+        entries = read_library(folder) if key is None else [read_entry(folder, key)]
+        if to == "json":
+            write_json({"entries": [entry.about for entry in entries]}, "-")
+        else:
+            print(library_csv(entries), end="")
+        return
+    if key is None:
+        raise BadInput("--key: missing; another program reads one entry at a time")
+    print(stiffness_for(to, read_entry(folder, key).stiffness, key), end="")

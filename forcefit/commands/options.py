@@ -1,0 +1,332 @@
+"""Options that several commands share, and what is read from their texts.
+
+Every mistake names its option.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from forcefit.inputs.errors import BadInput, checked, describe, nearest
+from forcefit.inputs.writing import check_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def _built_in_names(incomplete: str) -> list[str]:
+    """What a shell offers beside files."""
+    from assembly.robots import BUILT_IN
+
+    return [name for name in BUILT_IN if name.startswith(incomplete)]
+
+
+RobotArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A robot file, or a built-in name.",
+        autocompletion=_built_in_names,
+    ),
+]
+
+
+PoseOption = Annotated[
+    list[str] | None,
+    typer.Option("--pose", help="Nominal platform pose, such as tx=0.1,tz=-0.5."),
+]
+
+
+JointOption = Annotated[
+    list[str] | None,
+    typer.Option("--joint", help="Actuated coordinates, such as leg1.drive=0.1."),
+]
+
+
+LoadOption = Annotated[
+    list[str] | None,
+    typer.Option("--load", help="Load on the platform, such as fx=10,mz=1."),
+]
+
+
+GravityOption = Annotated[
+    list[str] | None,
+    typer.Option("--gravity", help="Gravity in base axes [m/s^2], such as z=-9.81."),
+]
+
+
+UnderOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--under",
+        help="What the robot's effects depend on: temperature=5,time=0,approach=1.",
+    ),
+]
+
+
+JsonOption = Annotated[
+    str | None,
+    typer.Option(
+        "--json",
+        help="Write results as JSON to a file; - is stdout.",
+        callback=check_json,
+    ),
+]
+
+
+def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] | None:
+    """Wrench ``[mx my mz fx fy fz]`` given by component; None if not given.
+
+    Args:
+        texts: such as ``["fx=10,mz=1"]``; components not named are zero.
+        option: whose they are, for messages.
+
+    Returns:
+        Six numbers [N m, N].
+
+    Raises:
+        BadInput: an unknown component or not a number.
+    """
+    if not texts:
+        return None
+    from assembly.files.joint_file import LARGEST
+    from stiffness.screws import WRENCH
+
+    names = [name.lower() for name in WRENCH]
+    given = _components(texts, option, names, LARGEST)
+    return [given.get(name, 0.0) for name in names]
+
+
+def _components(
+    texts: list[str], option: str, names: Sequence[str], largest: float
+) -> dict[str, float]:
+    """Numbers given by component, of a known few."""
+    pass
+
+    given = parse_assignments(texts, option, largest)
+    for name in given:
+        if name not in names:
+            hint = nearest(name, names)
+            raise BadInput(f'{option}: unknown component "{name[:60]}"{hint}')
+    return given
+
+
+def parse_gravity(texts: list[str] | None) -> list[float] | None:
+    """Gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
+    return parse_vector(texts, "--gravity")
+
+
+def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
+    """Three numbers given by component; None if not given.
+
+    Args:
+        texts: such as ``["z=-9.81"]``.
+        option: whose they are, for messages.
+
+    Returns:
+        The numbers along x, y and z.
+
+    Raises:
+        BadInput: a name other than x, y, z, or not a number of at most 1e6.
+    """
+    if not texts:
+        return None
+    from assembly.files.joint_file import LARGEST_LENGTH
+
+    pass
+
+    given = parse_assignments(texts, option, LARGEST_LENGTH)
+    for name in given:
+        if name not in {"x", "y", "z"}:
+            raise BadInput(f'{option}: unknown component "{name[:60]}"; valid: x, y, z')
+    return [given.get(name, 0.0) for name in "xyz"]
+
+
+def parse_direction(texts: list[str] | None) -> list[float] | None:
+    """Direction of a platform screw from ``--direction``, as a unit vector.
+
+    Args:
+        texts: such as ``["tx=1,tz=-1"]``.
+
+    Returns:
+        Six numbers ``[rx ry rz tx ty tz]``; None if not given.
+
+    Raises:
+        BadInput: an unknown component, all zero, or rotation mixed with translation.
+    """
+    if not texts:
+        return None
+    from assembly.files.joint_file import LARGEST_LENGTH
+    from stiffness.screws import SCREW
+
+    names = [name.lower() for name in SCREW]
+    given = _components(texts, "--direction", names, LARGEST_LENGTH)
+    length = math.hypot(*given.values())
+    if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
+        raise BadInput(
+            "--direction: expected components of a translation or of a rotation, not "
+            "all zero, not of both"
+        )
+    return [given.get(name, 0.0) / length for name in names]
+
+
+def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
+    """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
+
+    Args:
+        robot: name or file.
+        pose: of the platform.
+        joint: coordinates.
+
+    Returns:
+        The posture, of the robot as the effects of its file make it.
+
+    Raises:
+        BadInput: an effect loads the robot, which the command asking does not know.
+    """
+    from assembly.effects.acting import act
+
+    acting = act(declared_posture(robot, pose, joint))
+    if acting.gravity is not None or acting.load.any():
+        raise BadInput(
+            f"{robot}: its effects load it; expected assembly solve or exact, or "
+            "validation crosscheck, which know loads"
+        )
+    return acting.posture
+
+
+def declared_posture(
+    robot: str, pose: list[str] | None, joint: list[str] | None
+) -> Any:
+    """The posture asked for, of the robot without the effects of its file."""
+    from assembly.files.joint_file import LARGEST_LENGTH
+    from assembly.kinematics.posture import place_robot
+    from assembly.robots import load_robot
+
+    return place_robot(
+        load_robot(robot),
+        pose=parse_assignments(pose, "--pose", LARGEST_LENGTH) if pose else None,
+        joints=parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None,
+    )
+
+
+def parse_covariates(texts: list[str] | None) -> dict[str, float]:
+    """Covariates from ``--under``.
+
+    Args:
+        texts: such as ``["temperature=5,approach=1"]``.
+
+    Returns:
+        Numbers by name.
+
+    Raises:
+        BadInput: not of that form.
+    """
+    if not texts:
+        return {}
+    pass
+
+    return parse_assignments(texts, "--under")
+
+
+def parse_assignments(
+    texts: Iterable[str], option: str, largest: float = 1e40
+) -> dict[str, float]:
+    """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
+
+    Args:
+        texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        option: whose they are, for messages.
+        largest: no sound value is larger than this, either sign.
+
+    Returns:
+        The numbers by name.
+
+    Raises:
+        BadInput: not of that form, not a finite number, too large, or a name given
+            twice.
+    """
+    values: dict[str, float] = {}
+    for part in ",".join(texts).split(","):
+        name, equals, text = (piece.strip() for piece in part.partition("="))
+        try:
+            value = float(text)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
+        if name in values:
+            raise BadInput(f'{option}: "{name[:60]}" is given twice')
+        if not math.isfinite(value):
+            raise BadInput(
+                f"{option} {name[:60]}: found {value}, expected a finite number"
+            )
+        if abs(value) > largest:
+            raise BadInput(
+                f"{option} {name[:60]}: found {value:g}, expected a number of size at "
+                f"most {largest:g}"
+            )
+        values[name] = value
+    return values
+
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def parse_axis(option: str, text: str) -> "NDArray":
+    """A direction as ``x``, ``-y`` or ``1,0,2``.
+
+    Args:
+        option: for the message.
+        text: what was given.
+
+    Returns:
+        (3,) of any length but zero.
+
+    Raises:
+        BadInput: it is neither.
+    """
+    import numpy as np
+
+    from forcefit.inputs.table import comma_numbers
+
+    name = text.strip().lower()
+    if name.lstrip("+-") in _AXES and len(name) <= 2:
+        sign = -1.0 if name.startswith("-") else 1.0
+        return sign * np.array(_AXES[name.lstrip("+-")])
+    vector = comma_numbers(text)
+    if vector.shape != (3,) or not vector.any():
+        raise BadInput(
+            f"{option}: found {describe(text)}, expected x, y, z or three numbers "
+            "such as 0,0,1, not all zero"
+        )
+    return vector
+
+
+def parse_sizes(option: str, text: str, unit: str) -> list[float]:
+    """Positive numbers between commas, smallest first, none twice.
+
+    Args:
+        option: for the message.
+        text: what was given.
+        unit: for the message.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        BadInput: one is not a finite number > 0, or stands there twice.
+    """
+    try:
+        sizes = sorted(float(part) for part in text.split(","))
+    except ValueError:
+        raise BadInput(
+            f"{option}: found {describe(text)}, expected numbers such as 5,10,20"
+        ) from None
+    for one, other in zip(sizes, [*sizes[1:], math.inf], strict=True):
+        checked(option, one, unit, above=0)
+        if one == other:
+            raise BadInput(f"{option}: {one:g} is given twice")
+    return sizes

@@ -1,0 +1,75 @@
+"""Parts of a link on the command line: boxes of another material, added masses."""
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.commands.options import parse_assignments
+from forcefit.inputs.errors import checked
+from forcefit.inputs.table import BadInput, comma_numbers, describe
+from stiffness.fem.mass_properties import PointMass
+from stiffness.fem.material import Material
+
+_PART = '"z=0.2..0.4/young=2e11,poisson=0.3" or "x=0..1,z=0..0.1/...,density=7800"'
+_MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
+
+
+def parse_part(option: str, text: str) -> Material:
+    """A material inside a box along the mesh's axes.
+
+    Args:
+        option: for the message.
+        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``; axes not named
+            are unbounded, the density may be left out.
+
+    Returns:
+        The material.
+
+    Raises:
+        BadInput: it is not that.
+    """
+    region, slash, constants = text.partition("/")
+    values = parse_assignments([constants], option) if slash else {}
+    lacks = {"young", "poisson"} - set(values)
+    if lacks or set(values) - {"young", "poisson", "density"}:
+        raise BadInput(f"{option}: found {describe(text)}, expected {_PART}")
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    for part in region.split(","):
+        axis, _, span = (word.strip() for word in part.partition("="))
+        ends = comma_numbers(span.replace("..", ","))
+        if axis not in {"x", "y", "z"} or ends.shape != (2,) or ends[0] >= ends[1]:
+            raise BadInput(f"{option}: found {describe(text)}, expected {_PART}")
+        low["xyz".index(axis)], high["xyz".index(axis)] = ends
+    density = checked(option, values.get("density", 0.0), "kg/m^3", least=0)
+    try:
+        return Material(
+            values["young"], values["poisson"], density, partial(_inside, low, high)
+        )
+    except BadInput as error:
+        raise BadInput(f"{option}: {error}") from None
+
+
+def parse_mass(option: str, text: str) -> PointMass:
+    """A mass at a point, ``1.5/0,0,0.452``.
+
+    Args:
+        option: for the message.
+        text: what was given.
+
+    Returns:
+        The mass.
+
+    Raises:
+        BadInput: it is not that.
+    """
+    mass, _, place = text.partition("/")
+    weight, point = comma_numbers(mass), comma_numbers(place)
+    if weight.shape != (1,) or point.shape != (3,):
+        raise BadInput(f"{option}: found {describe(text)}, expected {_MASS}")
+    return PointMass(checked(option, float(weight[0]), "kg", above=0), point)
+
+
+def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
+    """Which points are in a box."""
+    return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

@@ -1,0 +1,243 @@
+"""The commands ``forcefit assembly statistics`` and ``tolerances``.
+
+Importing this module adds them to the application.
+"""
+
+import sys
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.assembly import app
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    parse_gravity,
+    parse_load,
+    posture_of,
+)
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+PlayOption = Annotated[
+    str,
+    typer.Option(
+        help="What is assumed of play where a pose error is judged: worst (anywhere, "
+        "the largest error counts) | uniform | contact | least (as it is solved)."
+    ),
+]
+
+
+@app.command()
+def statistics(
+    robot: RobotArgument,
+    errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
+    play: PlayOption = "worst",
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
+    ] = None,
+    yield_strength: Annotated[
+        float | None, typer.Option(help="[Pa] of the links: a limit on their stress.")
+    ] = None,
+    importance: Annotated[
+        int | None,
+        typer.Option(help="Base draws for the importance of errors.", min=16),
+    ] = None,
+    by: Annotated[
+        str, typer.Option(help="Importance by: source | frame | kind.")
+    ] = "kind",
+    margins: Annotated[
+        bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
+    ] = True,
+    confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
+    workers: Annotated[int, typer.Option(help="Threads.", min=1)] = 1,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw histograms, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Draw errors many times: yields, pose errors, what matters.
+
+    With OUTPUT, finished draws are kept in OUTPUT.journal: the same command goes on
+    from there after a kill and ends in the same file.
+    """
+    from assembly.model.error_distributions import read_sources
+    from assembly.statistics.experiment import Experiment, precision_for
+    from assembly.statistics.monte_carlo import run_draws
+    from assembly.statistics.plot import histogram_figure
+    from assembly.statistics.quantities import parse_limit
+    from assembly.statistics.summary import summarise, summary_text
+    from assembly.sweeps.dataset import check_dataset
+
+    _check_play(play)
+    _check_word("--by", by, ("source", "frame", "kind"))
+    if not 0 < confidence < 1:
+        raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
+    if yield_strength is not None and not 0 < yield_strength < float("inf"):
+        raise BadInput(f"--yield-strength: found {yield_strength}, expected > 0")
+    limits = dict(map(parse_limit, limit or ()))
+    if output is not None:
+        check_dataset(output, "draws")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    posture = posture_of(robot, pose, joint)
+    sources = read_sources(errors, posture.robot)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    experiment = Experiment(
+        posture, sources, seed, play, margins,
+        load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
+        precision=precision_for(limits),
+    )  # fmt: skip
+    experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    held = ExitStack()  # keeps the journal until all is written
+    with _interruptible(output), progress_bars() as update:
+        data = run_draws(
+            experiment, draws, output, workers, lambda d, n: update("draws", d, n),
+            None if importance is None else (importance, by), confidence, held,
+        )  # fmt: skip
+    if figure is not None:
+        save_figure(histogram_figure(data), figure)
+    summary = {
+        "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
+        "load": wrench, "gravity": g,
+        **summarise(data, limits, yield_strength, confidence),
+    }  # fmt: skip
+    write_json(summary, json)
+    held.close()
+    if json != "-":
+        print(summary_text(summary))
+
+
+def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
+    """Refuse what is none of a few words."""
+    if word not in valid:
+        raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
+
+
+def _check_play(play: str) -> None:
+    from assembly.statistics.play import PLAY
+
+    _check_word("--play", play, tuple(PLAY))
+
+
+@contextmanager
+def _interruptible(output: Path | None) -> Generator[None, None, None]:
+    """Ctrl-C ends with exit status 130 and says what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = f"; what is finished is kept in {output}.journal" if output else ""
+        print(f"forcefit: interrupted{kept}", file=sys.stderr)
+        raise typer.Exit(130) from None
+
+
+@app.command()
+def tolerances(
+    robot: RobotArgument,
+    grid: Annotated[
+        str, typer.Option(help="Workspace, such as tx=-0.2:0.2:0.1,tz=-0.5.")
+    ],
+    plan: Annotated[
+        Path | None, typer.Option(help="What tightness costs and must hold (TOML).")
+    ] = None,
+    compliant: Annotated[
+        str, typer.Option(help="Present errors: compliant joints free | rigid.")
+    ] = "free",
+    play: PlayOption = "worst",
+    fresh: Annotated[
+        int, typer.Option(help="New draws that verify the answer.", min=0)
+    ] = 2000,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="NetCDF file.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the tolerances, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """How tight errors must be; with a plan, how loose they may be.
+
+    Without --plan the robot's own errors are judged: the factor on all of them at which
+    it goes together everywhere, and which errors it owes its margin to.  With OUTPUT,
+    what is computed is kept in OUTPUT.journal: the same command goes on from there
+    after a kill and ends in the same file.
+    """
+    from dataclasses import replace
+
+    from assembly.robots import load_robot
+    from assembly.statistics.allocation import allocate
+    from assembly.statistics.plot import allocation_figure
+    from assembly.statistics.replay import journalled
+    from assembly.statistics.tolerance_file import read_plan
+    from assembly.statistics.tolerances import (
+        allocation_of,
+        allocation_text,
+        grid_postures,
+        identity_of,
+        present_errors,
+        present_text,
+        tolerance_dataset,
+    )
+    from assembly.sweeps.dataset import check_dataset, save_dataset
+
+    _check_play(play)
+    _check_word("--compliant", compliant, ("free", "rigid"))
+    if plan is None and (output or figure):
+        raise BadInput("tolerances: --output and --figure need a --plan")
+    if output is not None:
+        check_dataset(output, "tolerances")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    machine = load_robot(robot)
+    asked = None if plan is None else replace(read_plan(plan, machine), play=play)
+    postures = grid_postures(machine, grid)
+    results: dict = {"robot": machine.name, "postures": len(postures)}
+    said = []
+    held = ExitStack()  # keeps the journal until all is written
+    with _interruptible(output), progress_bars() as update:
+        if machine.errors.any():
+            results["present"] = present_errors(
+                postures, compliant, lambda d, n: update("present errors", d, n)
+            )
+            said.append(present_text(results["present"]))
+        elif asked is None:
+            raise BadInput(
+                f"{machine.name}: its frames have no errors to judge; give them a "
+                "geometric_error, or ask for tolerances with --plan"
+            )
+        if asked is not None:
+            whose = identity_of(postures, asked, fresh)
+            replay = held.enter_context(journalled(output, whose))
+            answer = allocate(postures, asked, fresh, update, replay)
+            results["allocation"] = allocation_of(answer)
+            said.append(allocation_text(results["allocation"]))
+            data = tolerance_dataset(answer)
+            if output is not None:
+                save_dataset(data, output)
+            if figure is not None:
+                save_figure(allocation_figure(data), figure)
+    write_json(results, json)
+    held.close()
+    if json != "-":
+        print("\n".join(said))
+    check = results.get("allocation", {}).get("verification") or {}
+    if check.get("verdict") == "contradicted":
+        raise typer.Exit(1)

@@ -1,0 +1,373 @@
+"""The commands ``forcefit stiffness ...``: parse, call, print or save."""
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from forcefit.commands.library import library
+from forcefit.commands.stiffness_options import (
+    Accuracy,
+    Base,
+    Density,
+    Figure,
+    Height,
+    InnerRadius,
+    Json,
+    Kind,
+    Masses,
+    Parts,
+    Poisson,
+    Radius,
+    SectionText,
+    Surface,
+    Theory,
+    TimeLimit,
+    Tip,
+    Unit,
+    Up,
+    Width,
+    Young,
+)
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from forcefit.commands.beam_options import BeamOptions
+    from stiffness.link import LinkStiffness
+    from stiffness.surface.interface import Interface
+
+app = typer.Typer(no_args_is_help=True)
+app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
+
+CurveFile = Annotated[
+    Path | None, typer.Option("--curve", help="A beam along a curve (TOML).")
+]
+
+
+def _tell_progress() -> None:
+    """Each mesh's unknowns, error and expected cost, on stderr, as they come."""
+    log = logging.getLogger("stiffness.fem.fea")
+    log.setLevel(logging.INFO)
+    log.handlers = [logging.StreamHandler()]
+
+
+def _interfaces(base: str, tip: str) -> "tuple[Interface, Interface]":
+    """Both interfaces of the options."""
+    from stiffness.surface.interface import parse_interface
+
+    return parse_interface(base, "--base"), parse_interface(tip, "--tip")
+
+
+def _up(text: str | None) -> "NDArray | None":
+    """The section's z, if it was given."""
+    from forcefit.commands.options import parse_axis
+
+    return None if text is None else parse_axis("--up", text)
+
+
+def _accuracy(value: float) -> float:
+    """An accuracy that can be asked for."""
+    from forcefit.inputs.errors import checked
+
+    return checked("--accuracy", value, "1", least=1e-5, below=0.5)
+
+
+def _curve_link(
+    path: Path, options: "BeamOptions"
+) -> "tuple[LinkStiffness, float, float]":
+    """A beam along a curve, its section's size and its length [m]."""
+    from forcefit.commands.beam_options import beam_name
+    from stiffness.beam.curve import curve_compliance, curve_length
+    from stiffness.beam.curve_file import read_curve
+    from stiffness.link import LinkStiffness
+
+    E, nu = options.material()
+    theory = options.checked_theory()
+    pieces = read_curve(path, nu)
+    C = curve_compliance(pieces, E, nu, theory=theory)
+    name = f"{beam_name(theory)} along a curve"
+    link = LinkStiffness(name, C, tip=pieces[-1].place(1.0), base=pieces[0].place(0.0))
+    return link, pieces[0].section(0.0).size, curve_length(pieces)
+
+
+@app.command()
+def beam(
+    length: Annotated[float, typer.Option(help="Base to tip [m].")],
+    young: Young,
+    poisson: Poisson,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    axis: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
+    up: Up = None,
+    theory: Theory = "timoshenko",
+    json: Json = None,
+) -> None:
+    """K_E of a straight beam of constant section, in closed form."""
+    import numpy as np
+
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.commands.options import parse_axis
+    from forcefit.inputs.errors import checked
+    from stiffness.report.results import link_results, link_text
+
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, theory, section
+    )
+    along = parse_axis("--axis", axis)
+    tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
+    link = options.link(np.zeros(3), tip, _up(up))
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+@app.command()
+def curve(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Pieces (TOML).")],
+    young: Young,
+    poisson: Poisson,
+    theory: Theory = "timoshenko",
+    json: Json = None,
+) -> None:
+    """K_E of a beam along a curve: tapered, bent, L-shaped."""
+    from forcefit.commands.beam_options import BeamOptions
+    from stiffness.report.results import link_results, link_text
+
+    link, _, _ = _curve_link(file, BeamOptions(young, poisson, theory=theory))
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+@app.command()
+def fea(
+    surface: Surface,
+    base: Base,
+    tip: Tip,
+    young: Young,
+    poisson: Poisson,
+    unit: Unit = "m",
+    accuracy: Accuracy = 0.005,
+    interface: Kind = "rigid",
+    density: Density = 0.0,
+    part: Parts = None,
+    mass: Masses = None,
+    time_limit: TimeLimit = 300.0,
+    json: Json = None,
+) -> None:
+    """K_E by finite elements, refined to the asked accuracy."""
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.commands.parts import parse_mass, parse_part
+    from forcefit.inputs.errors import checked
+    from stiffness.fem.fea import Budget, solve_link
+    from stiffness.fem.material import Material
+    from stiffness.report.results import link_results, link_text
+    from stiffness.surface.surface import read_surface
+
+    E, nu = BeamOptions(young, poisson).material()
+    held, moved = _interfaces(base, tip)
+    density = checked("--density", density, "kg/m^3", least=0)
+    budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
+    accuracy = _accuracy(accuracy)
+    materials = [Material(E, nu, density)]
+    materials += [parse_part("--part", text) for text in part or ()]
+    masses = [parse_mass("--mass", text) for text in mass or ()]
+    _tell_progress()
+    link = solve_link(
+        read_surface(surface, unit), held, moved, materials,
+        accuracy=accuracy, interface=interface, point_masses=masses, budget=budget,
+    ).link  # fmt: skip
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+@app.command()
+def compare(
+    surface: Surface,
+    base: Base,
+    tip: Tip,
+    young: Young,
+    poisson: Poisson,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    curve: CurveFile = None,
+    up: Up = None,
+    theory: Theory = "timoshenko",
+    unit: Unit = "m",
+    accuracy: Accuracy = 0.005,
+    interface: Kind = "rigid",
+    figure: Figure = None,
+    json: Json = None,
+) -> None:
+    """K_E by finite elements beside a beam, entry by entry.
+
+    The beam is straight, of the section given, or along a curve.
+    """
+    from forcefit.commands.beam_options import BeamOptions
+    from stiffness.fem.fea import mesh_link
+    from stiffness.report.compare import compare_link
+    from stiffness.report.results import comparison_results, comparison_text
+
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, theory, section
+    )
+    (E, nu), roll = options.material(), _up(up)
+    if curve is not None:
+        if {radius, inner_radius, width, height, section, up} != {None}:
+            raise BadInput("--curve: its file has the sections and their axes")
+        bent = _curve_link(curve, options)
+    else:
+        bent, size = None, options.section().size
+    held, moved = _interfaces(base, tip)
+    accuracy = _accuracy(accuracy)
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    _tell_progress()
+    meshed = mesh_link(
+        surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
+    )
+    if bent is None:
+        straight = options.link(meshed.base, meshed.tip, roll)
+        comparison = compare_link(straight, meshed, size)
+    else:
+        comparison = compare_link(bent[0], meshed, *bent[1:])
+    if figure is not None:
+        from stiffness.report.plot import plot_comparison
+
+        save_figure(plot_comparison(comparison), figure)
+    write_json(comparison_results(comparison), json)
+    if json != "-":
+        print(comparison_text(comparison))
+
+
+@app.command()
+def slenderness(
+    young: Young,
+    poisson: Poisson,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    ratios: Annotated[str, typer.Option(help="L / r, two or more.")] = "5,10,20,40",
+    accuracy: Accuracy = 0.002,
+    interface: Kind = "rigid",
+    figure: Figure = None,
+    json: Json = None,
+) -> None:
+    """Beam beside finite elements over L / r: the end effect.
+
+    r is twice the section's larger radius of gyration, a round bar's radius.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.commands.options import parse_sizes
+    from stiffness.report.results import sweep_results, sweep_text
+    from stiffness.report.slenderness import sweep_slenderness
+
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, section_text=section
+    )
+    (E, nu), declared = options.material(), options.declared()
+    wanted = parse_sizes("--ratios", ratios, "1")
+    accuracy = _accuracy(accuracy)
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    with Progress(console=Console(stderr=True)) as bars:
+        task = bars.add_task("lengths", total=len(wanted))
+        sweep = sweep_slenderness(
+            declared, E, nu, wanted, accuracy=accuracy, interface=interface,
+            update=lambda done, total: bars.update(task, completed=done, total=total),
+        )  # fmt: skip
+    if figure is not None:
+        from stiffness.report.plot import plot_slenderness
+
+        save_figure(plot_slenderness(sweep), figure)
+    write_json(sweep_results(sweep), json)
+    if json != "-":
+        print(sweep_text(sweep))
+
+
+@app.command()
+def stress(
+    surface: Surface,
+    base: Base,
+    tip: Tip,
+    young: Young,
+    poisson: Poisson,
+    wrench: Annotated[list[str], typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")],
+    away: Annotated[
+        float | None,
+        typer.Option(help="From the interfaces [m]; one interface radius if absent."),
+    ] = None,
+    radius: Radius = None,
+    inner_radius: InnerRadius = None,
+    width: Width = None,
+    height: Height = None,
+    section: SectionText = None,
+    up: Up = None,
+    unit: Unit = "m",
+    accuracy: Accuracy = 0.005,
+    interface: Kind = "rigid",
+    figure: Figure = None,
+    json: Json = None,
+) -> None:
+    """Peak von Mises stress, away from the clamped edges.
+
+    With a section, the beam formula stands beside it.
+    """
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.commands.options import parse_load
+    from forcefit.inputs.errors import checked
+    from stiffness.fem.fea import solve_link
+    from stiffness.fem.material import Material
+    from stiffness.fem.stress import peak_stress, stress_influence
+    from stiffness.report.results import stress_results, stress_text
+    from stiffness.surface.surface import read_surface
+
+    options = BeamOptions(
+        young, poisson, radius, inner_radius, width, height, section_text=section
+    )
+    (E, nu), roll, load = (
+        options.material(),
+        _up(up),
+        np.array(parse_load(wrench, "--wrench")),
+    )
+    plain = {radius, inner_radius, width, height, section} == {None}
+    declared = None if plain else options.declared()
+    held, moved = _interfaces(base, tip)
+    accuracy = _accuracy(accuracy)
+    if away is not None:
+        checked("--away", away, "m", above=0)
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    _tell_progress()
+    solved = solve_link(
+        read_surface(surface, unit), held, moved, [Material(E, nu)],
+        accuracy=accuracy, interface=interface,
+    )  # fmt: skip
+    peak = peak_stress(solved, load, section=declared, up=roll, away=away)
+    if figure is not None:
+        from stiffness.report.plot import plot_stress
+
+        everywhere = stress_influence(solved, away=0.0)
+        ends = solved.link.base, solved.link.tip
+        drawn = plot_stress(everywhere, peak, *ends, declared, roll)
+        save_figure(drawn, figure)
+    write_json(stress_results(peak), json)
+    if json != "-":
+        print(stress_text(peak))

@@ -1,0 +1,185 @@
+"""The commands ``forcefit assembly sweep`` and ``plot``.
+
+Importing this module adds them to the application.
+"""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.assembly import app
+from forcefit.commands.options import (
+    GravityOption,
+    JsonOption,
+    LoadOption,
+    RobotArgument,
+    UnderOption,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+)
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+
+@app.command()
+def sweep(
+    robot: RobotArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            help="Such as tx=-0.2:0.2:0.025,tz=-0.5, or q.<frame>=.. for joints."
+        ),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV table of postures: pose.tx .. or q.<frame>, perhaps id."
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A number of the robot file, PATH=VALUE,.. or PATH=FIRST:LAST:STEP."
+        ),
+    ] = None,
+    errors: Annotated[
+        Path | None, typer.Option(help="How errors are distributed (TOML).")
+    ] = None,
+    draws: Annotated[
+        int | None, typer.Option(help="Draws of errors at each point.", min=1)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
+    reading: Annotated[
+        str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
+    ] = "frozen",
+    play_alone: Annotated[
+        bool, typer.Option("--play-alone", help="The pose error also without errors.")
+    ] = False,
+    wrench_of: Annotated[
+        list[str] | None, typer.Option(help="A frame whose wrench is kept.")
+    ] = None,
+    linearisation: Annotated[
+        bool,
+        typer.Option("--linearisation", help="What finite motions would change; slow."),
+    ] = False,
+    near: Annotated[
+        float, typer.Option(help="Distance below which a singularity is named.")
+    ] = 0.02,
+    yield_strength: Annotated[
+        float | None, typer.Option(help="[Pa] of the links: their stress and safety.")
+    ] = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes on this machine.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw it, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Margins, energy, errors over postures, designs and draws.
+
+    Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
+    you like, the same command goes on from there and ends in the same file.
+    """
+    from assembly.sweeps.dataset import check_dataset, open_dataset
+    from assembly.sweeps.maps import check_axes, figure_of
+    from assembly.sweeps.request import ask_sweep, summary_of, summary_text
+    from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
+
+    if workers is not None and scheduler is not None:
+        raise BadInput("sweep: found --workers and --scheduler, expected one of them")
+    check_dataset(output, "a sweep")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    push, g = parse_load(load), parse_gravity(gravity)
+    covariates = parse_covariates(under)
+    with progress_bars() as update:
+        update("robot", 0, 1)  # where it is placed, code may be compiled
+        asked = ask_sweep(
+            robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
+            linearisation=linearisation, near=near, yield_strength=yield_strength,
+            load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
+        )  # fmt: skip
+        if figure is not None:
+            check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
+        update("robot", 1, 1)
+    done = [0]
+    solver: Solver = solve_here
+    if workers is not None or scheduler is not None:
+        from assembly.sweeps.cluster import cluster_solver
+
+        solver = cluster_solver(workers, scheduler)
+    held = ExitStack()  # keeps the journal until all is written
+    try:
+        with progress_bars() as update:
+
+            def note(finished: int, total: int) -> None:
+                done[0] = finished
+                update("points", finished, total)
+
+            run_sweep(asked, output, note, solver, held)
+    except KeyboardInterrupt:
+        print(
+            f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
+            f"{journal_path(output)}: the same command goes on",
+            file=sys.stderr,
+        )
+        raise typer.Exit(130) from None
+    data = open_dataset(output)
+    if figure is not None:
+        save_figure(figure_of(data), figure)
+    summary = {"output": str(output)} | summary_of(data)
+    write_json(summary, json)
+    held.close()
+    if json != "-":
+        print(summary_text(summary, data))
+
+
+@app.command()
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="PNG, SVG or PDF file.")
+    ],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Where to stand on other axes, such as draw=3."),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(help="histogram | tornado | allocation; else what the file is."),
+    ] = None,
+) -> None:
+    """Draw a saved file: maps, lines, histograms, tolerances."""
+    from assembly.statistics.plot import KINDS, figure_of_draws
+    from assembly.sweeps.dataset import open_dataset
+    from assembly.sweeps.maps import figure_of
+
+    if kind is not None and kind not in KINDS:
+        raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
+    check_writable(output, PICTURE)
+    places = {}
+    for text in at or ():
+        name, equals, value = (piece.strip() for piece in text.rpartition("="))
+        if not equals:
+            raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
+        places[name] = value
+    data = open_dataset(file)
+    try:
+        drawn = figure_of_draws(data, kind)
+    except ValueError as error:
+        raise BadInput(f"{file}: {error}") from None
+    save_figure(drawn or figure_of(data, places), output)

@@ -1,0 +1,226 @@
+"""The commands ``forcefit validation ...``: parse, call one function, print or save."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from forcefit.commands.diagnose import diagnose
+from forcefit.commands.generate import generate
+from forcefit.commands.inspect import inspect
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+    posture_of,
+)
+from forcefit.commands.progress import progress_bars
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from assembly.kinematics.posture import Posture
+
+app = typer.Typer(no_args_is_help=True)
+app.command()(diagnose)
+app.command()(generate)
+app.command()(inspect)
+
+
+@app.callback()
+def validation() -> None:
+    """Is it true?"""
+
+
+ErrorsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="How errors are distributed (TOML); one draw of them, not the robot's own."
+    ),
+]
+SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0, max=2**63 - 1)]
+
+
+def _with_errors(posture: "Posture", errors: Path | None, seed: int) -> "Posture":
+    """The posture with one draw of errors, or with the robot's own."""
+    if errors is None:
+        return posture
+    from assembly.model.error_distributions import read_sources
+
+    sources = read_sources(errors, posture.robot)
+    drawn = sources.errors(sources.draw(0, 1, seed)[0])
+    return replace(posture, robot=posture.robot.with_errors(drawn))
+
+
+def parse_scales(text: str) -> list[float]:
+    """Factors on the errors, from ``--scale``.
+
+    Args:
+        text: such as ``"1,0.5,0.25"``.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        BadInput: something in it is not a number > 0, or there is only one.
+    """
+    try:
+        scales = [float(part) for part in text.split(",")]
+    except ValueError:
+        scales = []
+    if len(set(scales)) < 2 or not all(0 < s < float("inf") for s in scales):
+        raise BadInput(
+            f'--scale: found "{text[:60]}", expected at least two different numbers '
+            "> 0, such as 1,0.5,0.25"
+        )
+    return scales
+
+
+@app.command()
+def crosscheck(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    scale: Annotated[
+        str,
+        typer.Option(
+            help="Factors on errors and load; smaller ones are added where these "
+            "leave a check undecided."
+        ),
+    ] = "1,0.5,0.25,0.125",
+    links: Annotated[
+        str, typer.Option(help="How the simulation models links: beam | spring | fem.")
+    ] = "beam",
+    clearances: Annotated[
+        bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")
+    ] = False,
+    grid: Annotated[
+        str | None,
+        typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
+    ] = None,
+    json: JsonOption = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
+    ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.0, help="[s] for each simulation.")
+    ] = 600.0,
+) -> None:
+    """Compare with a multibody simulation, at several scales.
+
+    The scales are of errors and loads.  Joint clearances are left out on both sides
+    unless asked for; energies and springs are then compared instead of poses.  Exit
+    status 1 when a check fails, or when the robot has neither errors nor a load:
+    nothing is then compared.
+    """
+    from assembly.effects.acting import act
+    from validation.crosscheck.crosscheck import Crosscheck, attempt
+    from validation.crosscheck.crosscheck import crosscheck as compare_tight
+    from validation.crosscheck.playcheck import PlayCheck, playcheck
+
+    scales, wrench = parse_scales(scale), parse_load(load)
+    g, covariates = parse_gravity(gravity), parse_covariates(under)
+    if clearances and figure is not None:
+        raise BadInput("--figure: with --clearances there is no slope to draw")
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    if grid is not None and (pose or joint or figure):
+        raise BadInput("--grid: not together with --pose, --joint or --figure")
+
+    def compare(posture: "Posture") -> Crosscheck | PlayCheck:
+        given = _with_errors(posture, errors, seed)
+        acting = act(given, wrench, g, covariates)
+        at, pushes = acting.posture, acting.load.tolist()
+        weight = None if acting.gravity is None else acting.gravity.tolist()
+        if clearances:
+            return playcheck(at, scales, pushes, links, weight, time_limit)
+        return compare_tight(at, scales, pushes, links, weight, time_limit)
+
+    if grid is not None:
+        _crosscheck_grid(robot, grid, compare, json)
+        return
+    posture = declared_posture(robot, pose, joint)
+    answer, failure = attempt(posture.robot.name, lambda: compare(posture))
+    write_json(failure if answer is None else answer.table(), json)
+    if json != "-":
+        print(failure["reason"] if answer is None else answer.text())
+    if figure is not None and isinstance(answer, Crosscheck):
+        from validation.crosscheck.plot import slope_figure
+
+        save_figure(slope_figure(answer), figure)
+    if answer is None or not answer.passed:
+        raise typer.Exit(1)
+
+
+def _crosscheck_grid(
+    robot: str, grid: str, compare: "Callable[[Posture], Any]", json: str | None
+) -> None:
+    """Every pose of a grid, with a progress bar."""
+    from assembly.robots import load_robot
+    from assembly.sweeps.targets import parse_grid
+    from validation.crosscheck.poses import check_poses, poses_table, poses_text
+
+    machine, axes = load_robot(robot), parse_grid(grid)
+    with progress_bars() as update:
+        rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
+    write_json(poses_table(rows), json)
+    if json != "-":
+        print(poses_text(rows))
+    if not poses_table(rows)["passed"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def validity(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    errors: ErrorsOption = None,
+    seed: SeedOption = 1,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    solids: Annotated[
+        bool,
+        typer.Option(
+            "--solids", help="Also mesh round beams as solids; minutes for each shape."
+        ),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """What the model's assumptions cost a robot at a pose.
+
+    In position, rotation and energy: linear closures, beams instead of solids, weight
+    at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
+    or 1 % is marked.  Exit status 1 when there is nothing to compare: a robot without
+    errors and load.
+    """
+    from validation.assumptions.assumptions import (
+        assumption_costs,
+        costs_table,
+        costs_text,
+    )
+    from validation.assumptions.validity import Cost
+
+    posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
+    wrench, g = parse_load(load), parse_gravity(gravity)
+    costs = assumption_costs(posture, wrench, g, solids)
+    write_json(costs_table(posture, costs), json)
+    if json != "-":
+        print(costs_text(posture, costs))
+    if not any(isinstance(cost, Cost) for cost in costs.values()):
+        raise typer.Exit(1)

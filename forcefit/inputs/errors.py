@@ -1,0 +1,129 @@
+"""The words of an error: one short line that says whose, what was found, expected.
+
+:class:`BadInput` is a ``ValueError``; the command line prints it and leaves with exit
+status 2.  However large or odd what was found is, its message stays one short line.
+"""
+
+import difflib
+import math
+import reprlib
+import unicodedata
+from collections.abc import Iterable
+
+_LONGEST_MESSAGE = 800  # characters: a path, a place, what was found and expected
+
+
+class BadInput(ValueError):
+    """Something given from outside is not what it should be: one line says what."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message, _LONGEST_MESSAGE))
+
+
+def one_line(text: str, longest: int) -> str:
+    """The text without line breaks and control characters, its middle cut out."""
+    if len(text) > longest:
+        half = (longest - 5) // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    return "".join(c if printable(c) else ascii(c)[1:-1] for c in text)
+
+
+def printable(text: str) -> bool:
+    """Whether a text has no line breaks, other controls or lone surrogates."""
+    return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
+
+
+def plot_label(text: str) -> str:
+    """A text as matplotlib must be given it to show it as it is written.
+
+    Args:
+        text: with a name in it that a user chose.
+
+    Returns:
+        The text; matplotlib reads a formula between two dollar signs.
+    """
+    return text.replace("$", r"\$")
+
+
+def quoted(name: str) -> str:
+    """A name in double quotes, on one line and never pages of it."""
+    return f'"{one_line(name, 60)}"'
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """``'; did you mean "x"?'``, or the list of valid names if none is near."""
+    names = list(dict.fromkeys(str(v) for v in valid))
+    close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean {quoted(close[0])}?"
+    few = [one_line(v, 40) for v in sorted(names)[:12]]
+    shown = ", ".join(few) + (", ..." if len(names) > 12 else "")
+    return f"; valid: {shown}" if names else ""
+
+
+def describe(value: object) -> str:
+    """Short description of a wrong value: what was found, never pages of it."""
+    text = _SHORT.repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+class _Short(reprlib.Repr):
+    """Python's own, which neither loops over pages nor fails on huge integers."""
+
+    def repr_bool(self, x: bool, level: int) -> str:
+        return str(x).lower()
+
+    def repr_int(self, x: int, level: int) -> str:
+        if x.bit_length() < 100:
+            return str(x)
+        return f"an integer of {x.bit_length()} bits"
+
+
+_SHORT = _Short()
+_SHORT.maxstring = 60
+_SHORT.maxlist = 8
+
+
+_LARGEST = 1e15  # in SI: beyond any length, modulus or density; its inverse below
+
+
+def checked(
+    option: str,
+    value: float,
+    unit: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    below: float = math.inf,
+) -> float:
+    """A finite number inside its range.
+
+    Args:
+        option: such as ``--length``, for the message.
+        value: what was given.
+        unit: for the message.
+        above: the value must be larger.
+        least: the value must not be smaller.
+        below: the value must be smaller.
+
+    Returns:
+        The value.
+
+    Raises:
+        BadInput: it is not finite, outside, or beyond what machines are made of.
+    """
+    if math.isfinite(value) and above < value < below and value >= least:
+        sane = abs(value) <= _LARGEST and (above != 0 or value >= 1 / _LARGEST)
+        if not sane:
+            raise BadInput(
+                f"{option}: found {value:g}, expected a size between {1 / _LARGEST:g} "
+                f"and {_LARGEST:g} [{unit}]"
+            )
+        return value
+    limits = [
+        f"> {above:g}" if above > -math.inf else "",
+        f">= {least:g}" if least > -math.inf else "",
+        f"< {below:g}" if below < math.inf else "",
+    ]
+    expected = " ".join(["a finite number", *filter(None, limits), f"[{unit}]"])
+    raise BadInput(f"{option}: found {value:g}, expected {expected}")

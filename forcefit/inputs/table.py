@@ -1,0 +1,424 @@
+"""Reading other people's files: every mistake gets one message.
+
+A message names the file, the place in it, what was found and what was expected, and
+the nearest valid name where a name is wrong; ``forcefit/inputs/errors.py`` words it.
+"""
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import (
+    BadInput,
+    describe,
+    nearest,
+    one_line,
+    printable,
+    quoted,
+)
+
+__all__ = [
+    "BadInput",
+    "Table",
+    "describe",
+    "find_fault",
+    "nearest",
+    "number_array",
+    "quoted",
+    "read_text",
+    "read_toml",
+]
+
+_LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
+_DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
+
+
+def read_text(path: Path | str) -> str:
+    r"""Text of a UTF-8 file, with or without a byte order mark.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its text with line ends as ``\n``.
+
+    Raises:
+        BadInput: the file is absent, a folder, unreadable, far too large, not UTF-8,
+            or holds NUL.
+    """
+    try:
+        with Path(path).open("rb") as file:  # which may be a pipe, or have no end
+            content = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise BadInput(f"{path}: cannot be read: {reason}") from None
+    if len(content) > _LARGEST_FILE:
+        raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    try:
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise BadInput(
+            f"{path}: byte {error.start} is not UTF-8; expected a text file in UTF-8"
+        ) from None
+    if (place := text.find("\0")) >= 0:
+        line = text.count("\n", 0, place) + 1
+        raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
+    return text
+
+
+def read_toml(path: Path | str) -> "Table":
+    """Root table of a TOML file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The table, ready to be asked for its keys.
+
+    Raises:
+        BadInput: the file cannot be read or is not TOML.
+    """
+    text = read_text(path)
+    if _DEEP_KEY.search(text):  # tomllib would take minutes over it
+        raise BadInput(f"{path}: not valid TOML: nested too deeply")
+    try:
+        return Table(tomllib.loads(text), str(path), "")
+    except RecursionError:
+        raise BadInput(f"{path}: not valid TOML: nested too deeply") from None
+    except tomllib.TOMLDecodeError as error:  # its text ends with line and column
+        reason = one_line(str(error), 200)
+        raise BadInput(f"{path}: not valid TOML: {reason}") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        reason = "found a whole number of thousands of digits"
+        raise BadInput(f"{path}: not valid TOML: {reason}") from None
+
+
+@dataclass(eq=False)
+class Table:
+    """A TOML table that is emptied key by key and refuses what is left over.
+
+    Attributes:
+        content: the table's keys and values.
+        file: name of the file, for messages.
+        place: where in the file, such as ``frame "elbow".link``; empty at the root.
+    """
+
+    content: dict[str, Any]
+    file: str
+    place: str
+    _asked: set[str] = field(default_factory=set)
+
+    def bad(self, key: str, message: str) -> BadInput:
+        """The error for a key of this table, to be raised by the caller."""
+        where = ".".join(part for part in (self.place, key) if part)
+        return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there; it then counts as known."""
+        self._asked.add(key)
+        return key in self.content
+
+    def get(self, key: str, default: object = None) -> Any:
+        """The raw value of a key, or the default."""
+        self._asked.add(key)
+        return self.content.get(key, default)
+
+    def require(self, key: str, expected: str) -> Any:
+        """The raw value of a key that must be there.
+
+        Args:
+            key: its name.
+            expected: what should stand there, for the message.
+
+        Returns:
+            The value.
+
+        Raises:
+            BadInput: the key is missing.
+        """
+        if not self.has(key):
+            near = difflib.get_close_matches(key, set(self.content), n=1, cutoff=0.7)
+            hint = f"; found {quoted(near[0])} instead" if near else ""
+            raise self.bad(key, f"missing; expected {expected}{hint}")
+        return self.content[key]
+
+    def text(
+        self,
+        key: str,
+        default: str | None = None,
+        *,
+        expected: str = "a string",
+        longest: int = 4000,
+    ) -> str:
+        """A string of one line.
+
+        Args:
+            key: its name.
+            default: taken when the key is absent; absent is an error without one.
+            expected: what should stand there, for the message.
+            longest: most characters it may have.
+
+        Returns:
+            The string.
+
+        Raises:
+            BadInput: missing without a default, not a string, empty, too long, or
+                with line breaks or other control characters.
+        """
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, expected)
+        if not isinstance(value, str) or not value.strip():
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        if len(value) > longest:
+            found = f"found {quoted(value)} of {len(value)} characters"
+            raise self.bad(key, f"{found}, expected at most {longest}")
+        if not printable(value):
+            message = f"found {describe(value)}, expected no control characters"
+            raise self.bad(key, message)
+        return value
+
+    def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
+        """A string out of a few.
+
+        Returns:
+            The string.
+
+        Raises:
+            BadInput: missing without a default, or not one of them.
+        """
+        valid = tuple(valid)
+        names = " | ".join(f'"{v}"' for v in valid)
+        value = self.text(key, default, expected=names)
+        if value not in valid:
+            hint = nearest(value, valid)
+            hint = hint if "did you mean" in hint else ""
+            raise self.bad(key, f"found {describe(value)}, expected {names}{hint}")
+        return value
+
+    def boolean(self, key: str, default: bool) -> bool:
+        """True or false.
+
+        Returns:
+            The value, or the default.
+
+        Raises:
+            BadInput: something else.
+        """
+        value = self.get(key, default)
+        if not isinstance(value, bool):
+            raise self.bad(key, f"found {describe(value)}, expected true or false")
+        return value
+
+    def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
+        """A whole number of at least ``least``.
+
+        Returns:
+            The number.
+
+        Raises:
+            BadInput: missing without a default, or something else.
+        """
+        expected = f"a whole number >= {least}"
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, expected)
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        return value
+
+    def number(
+        self,
+        key: str,
+        unit: str,
+        default: float | None = None,
+        *,
+        above: float = -math.inf,
+        least: float = -math.inf,
+        below: float = math.inf,
+        largest: float = math.inf,
+    ) -> float:
+        """A finite number.
+
+        Args:
+            key: its name.
+            unit: for the message.
+            default: taken when the key is absent; absent is an error without one.
+            above: the value must be larger than this.
+            least: the value must not be smaller than this.
+            below: the value must be smaller than this.
+            largest: no sound value is larger than this, either sign.
+
+        Returns:
+            The number.
+
+        Raises:
+            BadInput: missing without a default, not a number, or out of range.
+        """
+        limits = [
+            f"> {above:g}" if above > -math.inf else "",
+            f">= {least:g}" if least > -math.inf else "",
+            f"< {below:g}" if below < math.inf else "",
+        ]
+        range_ = " and ".join(filter(None, limits))
+        expected = " ".join(filter(None, ["a finite number", range_, f"[{unit}]"]))
+        if default is not None and not self.has(key):
+            return default
+        value = _number(self.require(key, expected))
+        if not (math.isfinite(value) and above < value < below and value >= least):
+            found = describe(self.content[key])
+            raise self.bad(key, f"found {found}, expected {expected}")
+        if abs(value) > largest:
+            found = describe(self.content[key])
+            expected = f"a number of size at most {largest:g} [{unit}]"
+            raise self.bad(key, f"found {found}, expected {expected}")
+        return value
+
+    def array(
+        self,
+        key: str,
+        shape: tuple[int, ...],
+        unit: str,
+        default: NDArray | None = None,
+        *,
+        largest: float = math.inf,
+    ) -> NDArray:
+        """An array of finite numbers of a given shape.
+
+        Args:
+            key: its name.
+            shape: expected.
+            unit: for the message.
+            default: taken when the key is absent; absent is an error without one.
+            largest: no sound entry is larger than this, either sign.
+
+        Returns:
+            The array.
+
+        Raises:
+            BadInput: missing without a default, another shape, or not finite numbers.
+        """
+        size = " rows of ".join(str(n) for n in shape)
+        expected = f"{size} finite numbers [{unit}]"
+        if default is not None and not self.has(key):
+            return default
+        value = self.require(key, expected)
+        array = number_array(value)
+        if array is None or array.shape != shape or not np.isfinite(array).all():
+            found = find_fault(value, shape)
+            raise self.bad(key, f"found {found}, expected {expected}")
+        if np.abs(array).max(initial=0.0) > largest:
+            expected = f"numbers of size at most {largest:g} [{unit}]"
+            raise self.bad(key, f"found {describe(value)}, expected {expected}")
+        return array
+
+    def table(self, key: str) -> "Table":
+        """A table inside this one.
+
+        Returns:
+            The table.
+
+        Raises:
+            BadInput: missing, or not a table.
+        """
+        value = self.require(key, "a table")
+        if not isinstance(value, dict):
+            raise self.bad(key, f"found {describe(value)}, expected a table")
+        return Table(value, self.file, ".".join(filter(None, (self.place, key))))
+
+    def tables(self, key: str) -> list["Table"]:
+        """The tables of ``[[key]]``, none if the key is absent.
+
+        Returns:
+            One :class:`Table` for each, numbered from 1 in messages.
+
+        Raises:
+            BadInput: the key holds something else.
+        """
+        value = self.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
+            message = f"found {describe(value)}, expected tables [[{key}]]"
+            raise self.bad(key, message)
+        prefix = f"{self.place}." if self.place else ""
+        return [
+            Table(v, self.file, f"{prefix}{key}[{i}]") for i, v in enumerate(value, 1)
+        ]
+
+    def finish(self) -> None:
+        """Refuse whatever was never asked for.
+
+        Raises:
+            BadInput: a key that this table does not have.
+        """
+        for key in self.content:
+            if key not in self._asked:
+                hint = nearest(key, self._asked)
+                raise self.bad("", f"unknown key {quoted(key)}{hint}")
+
+
+def _number(value: object) -> float:
+    """The number, or nan for anything that is not one (true and false are not)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
+
+def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
+    """What is wrong with numbers of a given shape, and where, counted from 1.
+
+    Args:
+        value: nested lists that are not that, or something else.
+        shape: expected.
+        infinite: whether inf is a number here.
+
+    Returns:
+        The wrong entry or row with its place, or the whole, shortened.
+    """
+    if not isinstance(value, list):
+        return describe(value)
+    if len(value) != shape[0]:
+        return f"{describe(value)} of length {len(value)}"
+    for i, inner in enumerate(value, 1):
+        if len(shape) > 1:
+            fault = find_fault(inner, shape[1:], infinite)
+            if fault:
+                return f"{fault} in row {i}"
+        elif not (math.isfinite(x := _number(inner)) or (infinite and math.isinf(x))):
+            return f"{describe(inner)} as number {i}"
+    return ""
+
+
+def number_array(value: object) -> NDArray | None:
+    """Nested lists of numbers as an array; None when ragged or not numbers."""
+    if not isinstance(value, list):
+        return None
+    if value and all(isinstance(v, list) for v in value):
+        rows = [row for row in map(number_array, value) if row is not None]
+        same = len(rows) == len(value) and len({row.shape for row in rows}) == 1
+        return np.array(rows) if same else None
+    return np.array([_number(v) for v in value]) if _proper(value) else None
+
+
+def comma_numbers(text: str) -> NDArray:
+    """Finite numbers between commas; none at all if one of them is not."""
+    try:
+        found = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        return np.empty(0)
+    return found if np.isfinite(found).all() else np.empty(0)
+
+
+def _proper(values: list) -> bool:
+    """Whether all are numbers that a float can hold; nan and inf are, true is not."""
+    return all(isinstance(v, float) or not math.isnan(_number(v)) for v in values)

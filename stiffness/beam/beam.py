@@ -1,0 +1,147 @@
+"""Straight beams in closed form.
+
+========  ======================================================  =====
+symbol    meaning                                                 unit
+========  ======================================================  =====
+x y z     section axes: x along the beam, from base to tip, z up  -
+I_y I_z   second moments of area; I_y bends about y               m^4
+J         Saint-Venant's torsion constant                         m^4
+shear_*   factor on the area that resists a force along y, z      1
+C         tip compliance, ``screw = C @ wrench``                  SI
+========  ======================================================  =====
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.errors import BadInput, describe, nearest
+from stiffness.beam.sections import Section, check_material, check_positive
+
+THEORIES = ("timoshenko", "euler")
+
+
+def beam_compliance(
+    length: float,
+    section: Section,
+    E: float,
+    nu: float,
+    *,
+    theory: str = "timoshenko",
+    axis: ArrayLike = (1.0, 0.0, 0.0),
+    up: ArrayLike | None = None,
+) -> NDArray:
+    r"""Tip compliance of a straight cantilever of constant section.
+
+    The link is clamped at its base; the screw is read at its tip.  Bending, torsion,
+    stretching and (Timoshenko) shear are included; warping restraint, taper and the
+    local compliance of the end fittings are not: :func:`stiffness.fem.fea.mesh_link`
+    has them.
+
+    Args:
+        length: [m] from the clamped section to the tip, > 0.
+        section: its constants.
+        E: [Pa] Young's modulus, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5).
+        theory: ``"timoshenko"``, or ``"euler"``, which leaves shear out.
+        axis: (3,) any length, from base to tip, in the axes of the result.
+        up: (3,) the section's z, in the same axes; what it has along the axis is
+            dropped.  Default: y, unless the beam lies along y, then z.
+
+    Returns:
+        (6, 6) [rad/(N m), rad/N, m/(N m), m/N] symmetric positive definite.
+
+    Raises:
+        BadInput: an argument is out of its range.
+
+    Sources:
+        Timoshenko & Gere, *Mechanics of Materials*: cantilever under an end load.
+
+    Example:
+        A downward force of 100 N turns the tip about y:
+
+        >>> from stiffness.beam.sections import round_section
+        >>> section = round_section(0.04, nu=0.3)
+        >>> C = beam_compliance(0.452, section, E=60e9, nu=0.3)
+        >>> print(f"{C[1] @ [0, 0, 0, 0, 0, -100.0] * 1e6:.1f} urad")
+        84.7 urad
+    """
+    check_positive("beam_compliance", "length", length)
+    check_material("beam_compliance", E, nu)
+    if theory not in THEORIES:
+        raise BadInput(
+            f"beam_compliance: theory = {describe(theory)}{nearest(theory, THEORIES)}"
+        )
+    C = _compliance_in_section_axes(length, section, E, nu, theory == "timoshenko")
+    R = np.kron(np.eye(2), section_axes(axis, up))
+    return R @ C @ R.T
+
+
+def _compliance_in_section_axes(
+    length: float, section: Section, E: float, nu: float, shear: bool
+) -> NDArray:
+    """Tip compliance in the section's own x, y, z."""
+    G = E / (2 * (1 + nu))
+    slope_y, slope_z = length / (E * section.I_y), length / (E * section.I_z)
+    C = np.diag([
+        length / (G * section.J),
+        slope_y,
+        slope_z,
+        length / (E * section.area),
+        slope_z * length**2 / 3,
+        slope_y * length**2 / 3,
+    ])
+    if shear:
+        C[4, 4] += length / (G * section.area * section.shear_y)
+        C[5, 5] += length / (G * section.area * section.shear_z)
+    C[2, 4] = C[4, 2] = slope_z * length / 2  # fy turns the tip about +z
+    C[1, 5] = C[5, 1] = -slope_y * length / 2  # fz turns the tip about -y
+    return C
+
+
+def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
+    """Axes of a section, as columns x (along the beam), y, z (up).
+
+    Args:
+        axis: (3,) any length, from base to tip.
+        up: (3,) the section's z, orthogonalised against the axis.  Default: y, unless
+            the beam lies along y, then z.
+
+    Returns:
+        (3, 3) proper orthogonal.
+
+    Raises:
+        BadInput: a vector is not three finite numbers, is zero, or ``up`` lies along
+            the axis.
+    """
+    x = unit_vector("axis", axis)
+    if up is None:
+        along_y = np.linalg.norm(np.cross(x, [0.0, 1.0, 0.0])) < 1e-9
+        up = (0.0, 0.0, 1.0) if along_y else (0.0, 1.0, 0.0)
+    z = unit_vector("up", up)
+    across = z - (z @ x) * x
+    if np.linalg.norm(across) < 1e-9:
+        raise BadInput(f"up = {z.tolist()} lies along the axis {x.tolist()}")
+    z = across / np.linalg.norm(across)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def unit_vector(name: str, vector: ArrayLike) -> NDArray:
+    """The direction of a vector given from outside.
+
+    Args:
+        name: for the message.
+        vector: (3,) any length but zero.
+
+    Returns:
+        (3,) of length one.
+
+    Raises:
+        BadInput: it is not three finite numbers, or zero.
+    """
+    direction = np.asarray(vector, dtype=float)
+    if direction.shape != (3,) or not np.isfinite(direction).all():
+        raise BadInput(f"{name}: found {describe(vector)}, expected 3 finite numbers")
+    length = np.linalg.norm(direction)
+    if length == 0:
+        raise BadInput(f"{name} is zero; expected a direction")
+    return direction / length

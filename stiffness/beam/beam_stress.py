@@ -1,0 +1,230 @@
+r"""Largest von Mises stress in a straight beam that a wrench at its tip loads.
+
+========  ==========================================================  ======
+symbol    meaning                                                     unit
+========  ==========================================================  ======
+x y z     axes of the beam: x from base to tip, z up                  -
+N V       force on a section along x, and along y and z               N
+M         moment on a section, about x (torsion), y and z             N m
+sigma     normal stress along x                                       Pa
+tau       shear stress along y and along z                            Pa
+========  ==========================================================  ======
+
+In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Shear forces and torsion load
+every section alike and M is linear in x, so the von Mises stress of a fibre,
+sqrt(sigma^2 + 3 tau^2), is convex in x: its largest value is at the base or at the tip,
+and only these two sections are looked at.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.table import BadInput
+from stiffness.beam.sections import Section, declared_section
+
+_AROUND = 360  # fibres around a round section; between two the cosine loses 4e-5
+_ACROSS = 33  # fibres along a side; between two a parabola loses 1e-3
+_CHUNK = 2048  # wrenches at a time: 2048 x 1089 x 3 numbers are 54 MB
+_SHAPES = "radius (inner_radius), or width and height (wall)"
+
+
+def peak_beam_stress(
+    section: Mapping[str, float], length: float, wrench: ArrayLike
+) -> tuple[NDArray, NDArray]:
+    """Largest von Mises stress in a straight beam, and where it is.
+
+    Axial force, bending, torsion and shear act together.  Looked at are, in the
+    sections at the base and at the tip,
+
+    - round bar and tube: 360 points of the outer circle;
+    - solid rectangle: a grid of 33 x 33 points, corners and middles included;
+    - hollow rectangle: 33 points along each outer side.
+
+    Left out: what the joint that holds the link does to its ends (a held edge is
+    singular, see :mod:`stiffness.fem.stress`), and the stress in the inner corners of a
+    hollow rectangle, which their fillets decide.
+
+    Args:
+        section: ``radius`` and perhaps ``inner_radius``, or ``width`` (along y) and
+            ``height`` (along z) and perhaps ``wall`` [m].
+        length: [m] of the beam, >= 0.
+        wrench: (..., 6) [N m, N] at the tip, in the axes of the beam.
+
+    Returns:
+        (...) [Pa], and (..., 3) [m] the place, in the axes of the beam from its base.
+
+    Raises:
+        BadInput: the section is known by its constants only, or is not proper; the
+            length or the wrench is not proper.
+
+    Sources:
+        Timoshenko & Gere, *Mechanics of Materials*, for bending and for shear by
+        V Q / (I b); Timoshenko & Goodier, *Theory of Elasticity*, section 109, for a
+        twisted rectangle; Bredt (1896), with the wall's own twist, for a hollow one.
+
+    Example:
+        A bar pushed sideways at its tip is bent most at its base:
+
+        >>> bar = {"radius": 0.04}
+        >>> stress, where = peak_beam_stress(bar, 0.452, [0, 0, 0, 0, 0, 1e3])
+        >>> print(f"{stress / 1e6:.3f} MPa at x = {where[0]:g} m")
+        8.992 MPa at x = 0 m
+    """
+    w = np.asarray(wrench, dtype=float)
+    if w.shape[-1:] != (6,) or not np.isfinite(w).all():
+        raise BadInput(
+            f"peak_beam_stress: wrench has shape {w.shape}, expected (..., 6) of "
+            "finite numbers"
+        )
+    if not (math.isfinite(length) and length >= 0):
+        raise BadInput(f"peak_beam_stress: length = {length:g} must be >= 0")
+    fibres, influence = section_stress(section)
+    to_base = np.eye(6)
+    to_base[1, 5], to_base[2, 4] = -length, length  # arm x force
+    flat = w.reshape(-1, 6)
+    stress, fibre, at_tip = (np.zeros(len(flat), dtype=t) for t in (float, int, bool))
+    for first in range(0, len(flat), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        sigma, shear = _stresses(influence, flat[part])
+        tip = np.sqrt(sigma**2 + shear)
+        sigma = flat[part] @ (influence[:, 0] @ to_base).T
+        base = np.sqrt(sigma**2 + shear)
+        at_tip[part] = tip.max(axis=1) > base.max(axis=1)
+        worst = np.where(at_tip[part, None], tip, base)
+        fibre[part], stress[part] = worst.argmax(axis=1), worst.max(axis=1)
+    where = np.column_stack([np.where(at_tip, length, 0.0), fibres[fibre]])
+    return stress.reshape(w.shape[:-1]), where.reshape(*w.shape[:-1], 3)
+
+
+def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
+    """(n, p) sigma [Pa] and 3 tau^2 [Pa^2] at each fibre, of (n, 6) section loads."""
+    sigma, tau_y, tau_z = (forces @ influence[:, k].T for k in range(3))
+    return sigma, 3 * (tau_y**2 + tau_z**2)
+
+
+def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
+    """Fibres of a section and the stresses that moments and forces cause there.
+
+    Args:
+        section: as in :func:`peak_beam_stress`.
+
+    Returns:
+        (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along
+        y and along z there, of each of the moments and forces x, y, z on the section.
+
+    Raises:
+        BadInput: the section is known by its constants only, or is not proper.
+    """
+    if "area" in section:
+        raise BadInput(
+            "stress: a section given by area, I_y, I_z, J says nothing of its outer "
+            f"fibres; expected {_SHAPES}"
+        )
+    known = {"radius", "inner_radius", "width", "height", "wall"}
+    if not {"radius"} <= set(section) <= {"radius", "inner_radius"} and not (
+        {"width", "height"} <= set(section) <= known - {"radius", "inner_radius"}
+    ):
+        raise BadInput(
+            f"stress: found a section of {', '.join(section) or 'nothing'}; "
+            f"expected {_SHAPES}"
+        )
+    # Poisson's ratio enters the factors of shear deformation only
+    constants = declared_section(section, nu=0.3)
+    if "radius" in section:
+        return _round(constants, section["radius"], section.get("inner_radius", 0.0))
+    width, height = section["width"], section["height"]
+    if "wall" in section:
+        return _hollow(constants, width, height, section["wall"])
+    return _rectangle(constants, width, height)
+
+
+def _bent(section: Section, y: NDArray, z: NDArray) -> NDArray:
+    """(p, 3, 6) what axial force and bending cause; shear still zero."""
+    influence = np.zeros((len(y), 3, 6))
+    influence[:, 0, 1] = z / section.I_y
+    influence[:, 0, 2] = -y / section.I_z
+    influence[:, 0, 3] = 1 / section.area
+    return influence
+
+
+def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArray]:
+    """The outer circle: shear stress runs along it."""
+    angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
+    out = np.column_stack([np.cos(angle), np.sin(angle)])
+    along = np.column_stack([-out[:, 1], out[:, 0]])
+    influence = _bent(section, *(radius * out.T))
+    influence[:, 1:, 0] = along * radius / section.J
+    # V Q / (I b) at the neutral axis: 4/3 of the mean in a bar, 2 in a thin tube
+    most = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
+    # its share along the circle, from nothing where V points to all of it across
+    influence[:, 1:, 4:] = most / section.area * along[:, :, None] * along[:, None, :]
+    return radius * out, influence
+
+
+def _rectangle(
+    section: Section, width: float, height: float
+) -> tuple[NDArray, NDArray]:
+    """A grid over the whole section."""
+    share = np.linspace(-0.5, 0.5, _ACROSS)
+    y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
+    influence = _bent(section, y, z)
+    if width <= height:
+        tau_y, tau_z = _twisted(y, z, width / 2, height / 2)
+    else:  # a quarter turn about x: the short side lies along z
+        tau_z, minus_tau_y = _twisted(z, -y, height / 2, width / 2)
+        tau_y = -minus_tau_y
+    influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
+    influence[:, 1, 4] = 1.5 / section.area * (1 - (2 * y / width) ** 2)
+    influence[:, 2, 5] = 1.5 / section.area * (1 - (2 * z / height) ** 2)
+    return np.column_stack([y, z]), influence
+
+
+def _twisted(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
+    """Shear [m] along p and q for unit G theta; half sides a <= b along p and q."""
+    along_p, along_q = np.zeros_like(p), 2 * p
+    # the terms fall as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
+    for n in range(1, 400, 2):
+        k = n * np.pi / (2 * a)
+        factor = 16 * a / np.pi**2 / n**2 * (-1) ** ((n - 1) // 2)
+        fall = np.exp(k * (np.abs(q) - b)) / (1 + np.exp(-2 * k * b))
+        again = np.exp(-2 * k * np.abs(q))
+        along_p -= factor * np.sign(q) * fall * (1 - again) * np.cos(k * p)
+        along_q -= factor * fall * (1 + again) * np.sin(k * p)
+    return along_p, along_q
+
+
+def _hollow(
+    section: Section, width: float, height: float, wall: float
+) -> tuple[NDArray, NDArray]:
+    """The outer sides, counterclockwise; shear runs along them."""
+    share = np.linspace(-0.5, 0.5, _ACROSS)
+    places, influences = [], []
+    for turns in range(4):
+        # the side at the right of a section turned by so many quarters
+        across, up = (width, height) if turns % 2 == 0 else (height, width)
+        second = section.I_y if turns % 2 == 0 else section.I_z
+        out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
+        along = np.array([-out[1], out[0]])
+        where = across / 2 * out + up * share[:, None] * along
+        influence = _bent(section, *where.T)
+        b, h = across - wall, up - wall
+        around = 2 * (b + h)
+        # Bredt's flow over the wall, and the wall's own twist at its outer face
+        twist = 2 * b * h / around / section.J + wall / section.J
+        # V Q / (I b): flange above, then the wall; beyond the hole there is no wall
+        inside = np.minimum(np.abs(up * share), up / 2 - wall)
+        flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
+        Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)
+        parallel = Q / (second * 2 * wall)
+        # a force across flows along this side from its middle, wall x arm x way
+        other = section.I_z if turns % 2 == 0 else section.I_y
+        crossing = -b / 2 * (up * share) / other
+        flow = parallel[:, None] * along + crossing[:, None] * out
+        influence[:, 1:, 0] = twist * along
+        influence[:, 1:, 4:] = along[:, None] * flow[:, None, :]
+        places.append(where)
+        influences.append(influence)
+    return np.concatenate(places), np.concatenate(influences)

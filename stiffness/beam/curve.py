@@ -1,0 +1,234 @@
+r"""Beams along a curve: tapered, bent, L-shaped, by integrating compliance.
+
+A cantilever carries its tip's wrench through every section, so its compliance is the
+sum of what each slice adds, each read at the tip,
+
+    C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
+
+with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
+section's axes R(s).  Exact for beams whose curvature is small against their section
+(the theory of thick curved bars and the warping at kinks are left out).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.table import BadInput, describe, nearest
+from stiffness.beam.beam import THEORIES, section_axes, unit_vector
+from stiffness.beam.sections import Section, check_material
+from stiffness.screws import rotation_matrix, screw_map
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+_MOST_PARTS = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A smooth piece of a beam, from t = 0 at its base to t = 1.
+
+    Attributes:
+        place: position (3,) [m] at t.
+        tangent: derivative (3,) [m] of the position by t.
+        section: at t.
+        up: (3,) the section's z at t, orthogonalised against the tangent; None for
+            the default of :func:`stiffness.beam.beam.section_axes`.
+    """
+
+    place: Callable[[float], NDArray]
+    tangent: Callable[[float], NDArray]
+    section: Callable[[float], Section]
+    up: Callable[[float], NDArray] | None = None
+
+
+def straight_piece(
+    start: ArrayLike,
+    end: ArrayLike,
+    section: Section | Callable[[float], Section],
+    up: ArrayLike | None = None,
+) -> Piece:
+    """A straight piece, tapered if its section is a function of t.
+
+    Args:
+        start: (3,) [m].
+        end: (3,) [m].
+        section: constant, or at t from 0 to 1.
+        up: (3,) the section's z.
+
+    Returns:
+        The piece.
+
+    Raises:
+        BadInput: the ends coincide or are not finite.
+    """
+    p, q = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    unit_vector("piece from start to end", q - p)
+    fixed = None if up is None else unit_vector("up", up)
+    return Piece(
+        place=lambda t: p + t * (q - p),
+        tangent=lambda t: q - p,
+        section=_as_function(section),
+        up=None if fixed is None else lambda t: fixed,
+    )
+
+
+def arc_piece(
+    start: ArrayLike,
+    center: ArrayLike,
+    turn: ArrayLike,
+    section: Section | Callable[[float], Section],
+) -> Piece:
+    """An arc of a circle; the section's z is the axis it turns about.
+
+    Args:
+        start: (3,) [m] where it begins.
+        center: (3,) [m] of the circle.
+        turn: (3,) [rad] rotation vector from start to end about the centre.
+        section: constant, or at t from 0 to 1.
+
+    Returns:
+        The piece.
+
+    Raises:
+        BadInput: the turn is zero, or not across the radius.
+    """
+    p, c = np.asarray(start, dtype=float), np.asarray(center, dtype=float)
+    angle = np.asarray(turn, dtype=float)
+    axis = unit_vector("turn", angle)
+    spoke = p - c
+    if abs(spoke @ axis) > 1e-9 * np.linalg.norm(spoke):
+        raise BadInput("arc: the axis of the turn must be across the radius")
+    return Piece(
+        place=lambda t: c + rotation_matrix(t * angle) @ spoke,
+        tangent=lambda t: np.cross(angle, rotation_matrix(t * angle) @ spoke),
+        section=_as_function(section),
+        up=lambda t: axis,
+    )
+
+
+def _as_function(
+    section: Section | Callable[[float], Section],
+) -> Callable[[float], Section]:
+    """A section at t, whether or not it changes."""
+    return (lambda t: section) if isinstance(section, Section) else section
+
+
+def curve_compliance(
+    pieces: Sequence[Piece],
+    E: float,
+    nu: float,
+    *,
+    theory: str = "timoshenko",
+    tolerance: float = 1e-10,
+) -> NDArray:
+    """Tip compliance of a beam along a curve.
+
+    Args:
+        pieces: from base to tip, each beginning where the one before ends.
+        E: [Pa] Young's modulus, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5).
+        theory: ``"timoshenko"``, or ``"euler"``, which leaves shear out.
+        tolerance: [1] of the integral, entries scaled by sqrt(C_ii C_jj).
+
+    Returns:
+        (6, 6) [rad/(N m) .. m/N] symmetric positive definite, read at the last
+        piece's end, in the axes the pieces are given in.
+
+    Raises:
+        BadInput: no pieces, a gap between two, an argument out of range, or a section
+            that changes too abruptly to be integrated.
+
+    Example:
+        An L of two bars, pushed at its end along the first, bends both:
+
+        >>> from stiffness.beam.beam import round_section
+        >>> bar = round_section(0.01, nu=0.3)
+        >>> L = [straight_piece([0, 0, 0], [0.2, 0, 0], bar),
+        ...      straight_piece([0.2, 0, 0], [0.2, 0.2, 0], bar)]
+        >>> C = curve_compliance(L, E=210e9, nu=0.3)
+        >>> print(f"{C[3, 3] * 1e6:.3f} um/N along x")
+        6.479 um/N along x
+    """
+    check_material("curve_compliance", E, nu)
+    if theory not in THEORIES:
+        raise BadInput(
+            f"curve_compliance: theory = {describe(theory)}{nearest(theory, THEORIES)}"
+        )
+    if not pieces:
+        raise BadInput("curve_compliance: no pieces; expected at least one")
+    _check_joined(pieces)
+    tip = pieces[-1].place(1.0)
+
+    def slices(parts: int) -> NDArray:
+        return sum(
+            (_integral(piece, tip, E, nu, theory, parts) for piece in pieces),
+            start=np.zeros((6, 6)),
+        )
+
+    parts, C = 2, slices(1)
+    while parts <= _MOST_PARTS:
+        finer = slices(parts)
+        scale = np.sqrt(np.outer(np.diag(finer), np.diag(finer)))
+        if np.all(np.abs(finer - C) <= tolerance * scale):
+            return (finer + finer.T) / 2
+        parts, C = 2 * parts, finer
+    raise BadInput(
+        f"curve_compliance: the integral did not settle to {tolerance:g}; cut the "
+        "pieces where the section jumps"
+    )
+
+
+def curve_length(pieces: Sequence[Piece]) -> float:
+    """Length of a beam along its curve.
+
+    Args:
+        pieces: straight ones and arcs, base to tip.
+
+    Returns:
+        [m].
+    """
+    speeds = [
+        [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
+        for piece in pieces
+    ]
+    return float(np.sum(np.array(speeds) @ _WEIGHTS) / 2)
+
+
+def _check_joined(pieces: Sequence[Piece]) -> None:
+    """Each piece must begin where the one before ends."""
+    for number, (one, next_one) in enumerate(
+        zip(pieces[:-1], pieces[1:], strict=True), start=2
+    ):
+        gap = float(np.linalg.norm(next_one.place(0.0) - one.place(1.0)))
+        size = float(np.linalg.norm(one.tangent(1.0)))
+        if gap > 1e-6 * size:
+            raise BadInput(
+                f"curve_compliance: piece {number} begins {gap:.3g} m away from where "
+                "the one before ends"
+            )
+
+
+def _integral(
+    piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
+) -> NDArray:
+    """What one piece adds, by ten Gauss points in each of its equal parts."""
+    G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
+    total = np.zeros((6, 6))
+    for first in range(parts):
+        for x, weight in zip(_POINTS, _WEIGHTS, strict=True):
+            t = (first + (x + 1) / 2) / parts
+            s, along = piece.section(t), piece.tangent(t)
+            R = section_axes(along, None if piece.up is None else piece.up(t))
+            A = screw_map(piece.place(t) - tip, R)
+            c = np.array([
+                1 / (G * s.J),
+                1 / (E * s.I_y),
+                1 / (E * s.I_z),
+                1 / (E * s.area),
+                shear / (G * s.area * s.shear_y),
+                shear / (G * s.area * s.shear_z),
+            ])
+            total += weight / (2 * parts) * np.linalg.norm(along) * (A * c) @ A.T
+    return total

@@ -1,0 +1,105 @@
+"""Beams along a curve from a file: straight pieces, tapers, arcs."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, Table, read_toml
+from stiffness.beam.curve import Piece, arc_piece, straight_piece
+from stiffness.beam.sections import Section, check_section, declared_section
+
+_LARGEST = 1e6  # in SI: beyond any beam
+
+
+def read_curve(path: Path | str, nu: float) -> list[Piece]:
+    """The pieces of a beam.
+
+    Args:
+        path: TOML with tables ``[[piece]]``.  Each has a ``section``, as in a robot
+            file or with ``wall`` (a box), ``web`` and ``flange`` (an I); the one before
+            counts where it is absent.  A straight piece has ``end``, and
+            ``tip_section`` if it tapers (its lengths change linearly) and perhaps
+            ``up``; an arc has ``center`` and ``turn``, a rotation vector.  ``start``
+            [m] belongs to the first piece and is the origin if absent.
+        nu: [-] Poisson's ratio, for the shear factors.
+
+    Returns:
+        The pieces, base to tip.
+
+    Raises:
+        BadInput: the file, a name or a value is not proper.
+    """
+    table = read_toml(path)
+    tables = table.tables("piece")
+    table.finish()
+    if not tables:
+        raise table.bad("piece", "missing; expected at least one [[piece]]")
+    pieces: list[Piece] = []
+    section: dict[str, float] | None = None
+    for number, part in enumerate(tables):
+        start = pieces[-1].place(1.0) if pieces else np.zeros(3)
+        if number == 0 and part.has("start"):
+            start = part.array("start", (3,), "m", largest=_LARGEST)
+        section = _section(part, "section") if part.has("section") else section
+        if section is None:
+            raise part.bad("section", "missing; the first piece needs one")
+        pieces.append(_piece(part, start, section, nu))
+        section = _section(part, "tip_section") if part.has("tip_section") else section
+        part.finish()
+    return pieces
+
+
+def _section(part: Table, key: str) -> dict[str, float]:
+    """Lengths or constants of a section by name."""
+    inner = part.table(key)
+    given = {
+        name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
+    }
+    check_section(f"{part.file}: {part.place}.{key}", given)
+    return given
+
+
+def _piece(
+    part: Table, start: NDArray, section: Mapping[str, float], nu: float
+) -> Piece:
+    """One piece of the curve."""
+    try:
+        shape = _tapered(part, section, nu)
+        if part.has("turn"):
+            return arc_piece(
+                start,
+                part.array("center", (3,), "m", largest=_LARGEST),
+                part.array("turn", (3,), "rad", largest=_LARGEST),
+                shape,
+            )
+        up = part.array("up", (3,), "1", largest=_LARGEST) if part.has("up") else None
+        end = part.array("end", (3,), "m", largest=_LARGEST)
+        return straight_piece(start, end, shape, up)
+    except BadInput as error:
+        if str(error).startswith(part.file):
+            raise
+        raise part.bad("", str(error)) from None
+
+
+def _tapered(
+    part: Table, section: Mapping[str, float], nu: float
+) -> Section | Callable[[float], Section]:
+    """A constant section, or one whose lengths change linearly."""
+    constant = declared_section(section, nu)
+    if not part.has("tip_section"):
+        return constant
+    tip = _section(part, "tip_section")
+    if set(tip) != set(section) or "area" in tip:
+        raise part.bad(
+            "tip_section", "a taper has lengths of the same names at both ends"
+        )
+    declared_section(tip, nu)
+
+    def between(t: float) -> Section:
+        return declared_section(
+            {k: (1 - t) * v + t * tip[k] for k, v in section.items()}, nu
+        )
+
+    return between

@@ -1,0 +1,306 @@
+"""Sections of beams: round, rectangular, thin-walled, or by their constants.
+
+========  ======================================================  =====
+symbol    meaning                                                 unit
+========  ======================================================  =====
+y z       section axes, z up                                      -
+I_y I_z   second moments of area; I_y bends about y               m^4
+J         Saint-Venant's torsion constant                         m^4
+shear_*   factor on the area that resists a force along y, z      1
+========  ======================================================  =====
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from forcefit.inputs.errors import BadInput, nearest
+
+_LARGEST = 1e15  # in SI: beyond any length or constant of a section
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a straight beam needs to know about its section.
+
+    Attributes:
+        area: [m^2].
+        I_y: [m^4] second moment of area for bending about y (deflection along z).
+        I_z: [m^4] the same about z.
+        J: [m^4] torsion constant.
+        shear_y: [1] share of the area that resists a force along y.
+        shear_z: [1] the same along z.
+    """
+
+    area: float
+    I_y: float
+    I_z: float
+    J: float
+    shear_y: float
+    shear_z: float
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            check_positive("section", item.name, getattr(self, item.name))
+
+    @property
+    def size(self) -> float:
+        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
+        return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
+
+
+_SECTIONS = (
+    {"radius"},
+    {"radius", "inner_radius"},
+    {"width", "height"},
+    {"width", "height", "wall"},
+    {"width", "height", "web", "flange"},
+    {item.name for item in fields(Section)},
+)
+
+
+def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Section:
+    """Section of a round bar or tube.
+
+    Args:
+        radius: [m] outer radius, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+        inner_radius: [m] of the hole, 0 for a solid bar, < radius.
+
+    Returns:
+        The section.
+
+    Raises:
+        BadInput: a dimension or Poisson's ratio is out of its range.
+
+    Sources:
+        Cowper (1966), "The shear coefficient in Timoshenko's beam theory", for a circle
+        and for a thick tube.
+    """
+    check_positive("round_section", "radius", radius)
+    if not 0.0 <= inner_radius < radius:
+        raise BadInput(
+            f"round_section: inner_radius = {inner_radius:g} must lie between 0 "
+            f"and radius = {radius:g}"
+        )
+    check_material("round_section", 1.0, nu)
+    m2 = (inner_radius / radius) ** 2
+    area = math.pi * radius**2 * (1 - m2)
+    second_moment = math.pi / 4 * radius**4 * (1 - m2**2)
+    whole = (7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2
+    shear = 6 * (1 + nu) * (1 + m2) ** 2 / whole
+    return Section(area, second_moment, second_moment, 2 * second_moment, shear, shear)
+
+
+def rectangular_section(width: float, height: float, nu: float) -> Section:
+    """Section of a solid rectangular bar.
+
+    Args:
+        width: [m] along the section's y, > 0.
+        height: [m] along the section's z, the ``up`` of the beam, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5); the shear factor depends on it.
+
+    Returns:
+        The section.
+
+    Raises:
+        BadInput: a dimension or Poisson's ratio is out of its range.
+
+    Sources:
+        Cowper (1966) for the shear factor; Timoshenko & Goodier, *Theory of
+        Elasticity*, section 109, for Saint-Venant's torsion series.
+    """
+    check_positive("rectangular_section", "width", width)
+    check_positive("rectangular_section", "height", height)
+    check_material("rectangular_section", 1.0, nu)
+    shear = 10 * (1 + nu) / (12 + 11 * nu)
+    return Section(
+        area=width * height,
+        I_y=width * height**3 / 12,
+        I_z=height * width**3 / 12,
+        J=_rectangle_torsion(width, height),
+        shear_y=shear,
+        shear_z=shear,
+    )
+
+
+def _rectangle_torsion(width: float, height: float) -> float:
+    """Saint-Venant's series; the terms left out sum to less than 1e-16 of it."""
+    long, short = max(width, height), min(width, height)
+    odd = np.arange(1.0, 2001.0, 2.0)
+    # tanh is 1 for all but the first few terms; their tail decays as n^-4
+    tail = np.sum(np.tanh(odd * math.pi * long / (2 * short)) / odd**5)
+    return long * short**3 / 3 * (1 - 192 / math.pi**5 * short / long * float(tail))
+
+
+def box_section(width: float, height: float, wall: float, nu: float) -> Section:
+    """Hollow rectangle of one wall thickness.
+
+    Args:
+        width: [m] outside, along y.
+        height: [m] outside, along z (up).
+        wall: [m] thickness, less than half of either.
+        nu: [-] Poisson's ratio.
+
+    Returns:
+        The section; its torsion is that of a closed thin wall with the wall's own
+        twist added, its shear factors those of thin walls.
+
+    Raises:
+        BadInput: a dimension or Poisson's ratio is out of its range.
+
+    Sources:
+        Bredt (1896) for torsion; Cowper (1966) for the shear factor of a thin box.
+    """
+    _check(width=width, height=height, wall=wall)
+    check_material("box_section", 1.0, nu)
+    if not 2 * wall < min(width, height):
+        raise BadInput(f"box_section: wall = {wall:g} m must leave a hole")
+    inner_width, inner_height = width - 2 * wall, height - 2 * wall
+    b, h = width - wall, height - wall
+    return Section(
+        area=width * height - inner_width * inner_height,
+        I_y=(width * height**3 - inner_width * inner_height**3) / 12,
+        I_z=(height * width**3 - inner_height * inner_width**3) / 12,
+        J=2 * wall * (b * h) ** 2 / (b + h) + 2 * (b + h) * wall**3 / 3,
+        shear_y=_box_shear(along=b, across=h, nu=nu),
+        shear_z=_box_shear(along=h, across=b, nu=nu),
+    )
+
+
+def _box_shear(along: float, across: float, nu: float) -> float:
+    """Cowper's thin box of one wall; force along ``along``."""
+    m = n = across / along  # flange over web area of equal walls is the same ratio
+    top = 10 * (1 + nu) * (1 + 3 * m) ** 2
+    plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
+    poisson = 11 + 66 * m + 135 * m**2 + 90 * m**3
+    wide = 10 * n**2 * ((3 + nu) * m + 3 * m**2)
+    return top / (plain + nu * poisson + wide)
+
+
+def i_section(
+    width: float, height: float, web: float, flange: float, nu: float
+) -> Section:
+    """I-beam with equal flanges, the web along z (up).
+
+    Args:
+        width: [m] of the flanges, along y.
+        height: [m] overall, along z.
+        web: [m] thickness, less than the width.
+        flange: [m] thickness, less than half the height.
+        nu: [-] Poisson's ratio.
+
+    Returns:
+        The section; torsion is that of an open thin wall (warping free), shear along y
+        is carried by the flanges as by two rectangles.
+
+    Raises:
+        BadInput: a dimension or Poisson's ratio is out of its range.
+
+    Sources:
+        Cowper (1966) for the shear factors of a thin I and of a rectangle.
+    """
+    _check(width=width, height=height, web=web, flange=flange)
+    check_material("i_section", 1.0, nu)
+    if not (web < width and 2 * flange < height):
+        raise BadInput("i_section: web or flange is thicker than the section allows")
+    clear, h = height - 2 * flange, height - flange
+    area = 2 * width * flange + clear * web
+    m, n = 2 * width * flange / (h * web), width / h
+    top = 10 * (1 + nu) * (1 + 3 * m) ** 2
+    plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
+    poisson = 11 + 66 * m + 135 * m**2 + 90 * m**3
+    wide = 30 * n**2 * (m + m**2) + 5 * nu * n**2 * (8 * m + 9 * m**2)
+    flanges = 2 * width * flange / area
+    return Section(
+        area=area,
+        I_y=(width * height**3 - (width - web) * clear**3) / 12,
+        I_z=(2 * flange * width**3 + clear * web**3) / 12,
+        J=(2 * width * flange**3 + h * web**3) / 3,
+        shear_y=flanges * 10 * (1 + nu) / (12 + 11 * nu),
+        shear_z=top / (plain + nu * poisson + wide),
+    )
+
+
+def declared_section(given: Mapping[str, float], nu: float) -> Section:
+    """The section of a beam from the numbers that declare it.
+
+    Args:
+        given: ``radius`` and perhaps ``inner_radius``; or ``width`` and ``height`` and
+            perhaps ``wall`` (a box) or ``web`` and ``flange`` (an I); or the attributes
+            of a :class:`Section` [m, m^2, m^4].
+        nu: [-] Poisson's ratio.
+
+    Returns:
+        The section.
+    """
+    if "radius" in given:
+        return round_section(given["radius"], nu, given.get("inner_radius", 0.0))
+    from stiffness.beam.sections import box_section, i_section  # which needs Section
+
+    if "wall" in given:
+        return box_section(given["width"], given["height"], given["wall"], nu)
+    if "web" in given:
+        return i_section(
+            given["width"], given["height"], given["web"], given["flange"], nu
+        )
+    if "width" in given:
+        return rectangular_section(given["width"], given["height"], nu)
+    return Section(**given)
+
+
+def check_section(place: str, given: Mapping[str, float]) -> None:
+    """Refuse what describes no section.
+
+    Args:
+        place: where it stands, for the message.
+        given: lengths or constants by name, see
+            :func:`stiffness.beam.sections.declared_section`.
+
+    Raises:
+        BadInput: a name belongs to no section, one lacks, or a value is of no section.
+    """
+    if set(given) in _SECTIONS:
+        for name, value in given.items():
+            if not (value == 0 or 1e-40 <= abs(value) <= _LARGEST):
+                raise BadInput(f"{place}.{name}: found {value:g}, no size of a section")
+        return
+    known = set().union(*_SECTIONS)
+    for name in given:
+        if name not in known:
+            raise BadInput(f'{place}: unknown "{name}"{nearest(name, known)}')
+    kinds = "; ".join(", ".join(sorted(kind)) for kind in _SECTIONS)
+    raise BadInput(
+        f"{place}: found {', '.join(given) or 'nothing'}, expected one of: {kinds}"
+    )
+
+
+def check_material(who: str, E: float, nu: float) -> None:
+    """Refuse elastic constants of no isotropic solid.
+
+    Args:
+        who: whose they are, for the message.
+        E: [Pa] Young's modulus.
+        nu: [-] Poisson's ratio.
+
+    Raises:
+        BadInput: E is not finite and positive, or nu not in (-1, 0.5).
+    """
+    check_positive(who, "E", E)
+    if not -1.0 < nu < 0.5:
+        raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
+
+
+def check_positive(who: str, name: str, value: float) -> None:
+    """Refuse anything but a finite positive number."""
+    if not (math.isfinite(value) and value > 0):
+        raise BadInput(f"{who}: {name} = {value:g} must be finite and > 0")
+
+
+def _check(**lengths: float) -> None:
+    """All lengths must be positive and finite."""
+    for name, value in lengths.items():
+        if not 0 < value < float("inf"):
+            raise BadInput(f"section: {name} = {value:g} m must be finite and > 0")

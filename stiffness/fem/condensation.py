@@ -1,0 +1,166 @@
+"""A solid condensed on its two interfaces: six numbers at the base, six at the tip.
+
+``rigid`` (RBE2): every node of an interface moves with its joint, as when it is bolted
+to something much stiffer.  ``distributing`` (RBE3): the base is held like that, but the
+tip's wrench is spread over its interface as tractions that vary linearly, the interface
+is free to deform, and the tip's screw is the mean motion, the least-squares rigid one
+over the area.  ``distributing-both`` does the same at the base, so that the answer does
+not depend on which end is called the tip.  Each is softer than the one before.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from stiffness.fem.elements import Elements, assemble, triangle_areas
+from stiffness.fem.sparse_solver import solve
+from stiffness.link import inverted
+from stiffness.screws import screw_map, skew
+
+KINDS = ("rigid", "distributing", "distributing-both")
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """A link's stiffness on one mesh, and the fields behind it.
+
+    Attributes:
+        stiffness: (6, 6) at the tip's centre, base held.
+        fields: (n, 3, 6) [m] displacements for unit screws of the tip.
+        unknowns: size of the system that was solved.
+    """
+
+    stiffness: NDArray
+    fields: NDArray
+    unknowns: int
+
+
+def condense(
+    mesh: Elements,
+    lam: NDArray,
+    mu: NDArray,
+    centers: NDArray,
+    kind: str = "rigid",
+) -> Condensed:
+    """Stiffness of a meshed link.
+
+    Args:
+        mesh: the tetrahedra; patch 0 is the base, 1 the tip.
+        lam: (t,) [Pa] Lame's first constant.
+        mu: (t,) [Pa] shear modulus.
+        centers: (2, 3) [m] centres of base and tip.
+        kind: of the interfaces, one of ``KINDS``.
+
+    Returns:
+        The stiffness and its fields.
+    """
+    upper = assemble(mesh, lam, mu)
+    if kind == "rigid":
+        return _rigid(mesh, upper, centers[1])
+    if kind == "distributing":
+        return _mean_of_tip(mesh, upper, centers[1])
+    return _distributing(mesh, upper, centers)
+
+
+def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
+    """Displacements of points for unit screws at a centre.
+
+    Args:
+        points: (n, 3) [m].
+        center: (3,) [m].
+
+    Returns:
+        (n, 3, 6).
+    """
+    shift = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    return np.concatenate([-skew(points - center), shift], axis=2)
+
+
+def _product(upper: csr_array, fields: NDArray) -> NDArray:
+    """K times fields, from K's upper triangle."""
+    return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
+
+
+def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
+    """Base nodes stand still, tip nodes follow six unit screws."""
+    fields = np.zeros((len(mesh.nodes), 3, 6))
+    base = np.unique(mesh.faces[mesh.patch == 0])
+    tip = np.unique(mesh.faces[mesh.patch == 1])
+    fields[tip] = rigid_motions(mesh.nodes[tip], tip_center)
+    free = np.ones(len(mesh.nodes), dtype=bool)
+    free[base] = free[tip] = False
+    free = np.repeat(free, 3)
+    flat = fields.reshape(-1, 6)
+    loads = -_product(upper, flat)[free]
+    flat[free] = solve(upper[free][:, free], loads)
+    # energy of the fields: errors of the solution enter squared
+    K = flat.T @ _product(upper, flat)
+    return Condensed((K + K.T) / 2, fields, int(free.sum()))
+
+
+def _mean_of_tip(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
+    """Base nodes stand still; wrenches spread at the tip, its mean motion read."""
+    flat = _averaging(mesh, 1, tip_center).reshape(-1, 6)
+    free = np.ones(len(mesh.nodes), dtype=bool)
+    free[np.unique(mesh.faces[mesh.patch == 0])] = False
+    free = np.repeat(free, 3)
+    return _from_loads(upper, flat, free)
+
+
+def _distributing(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
+    """Wrenches spread at the tip, balanced at the base; mean motions read."""
+    base, tip = (_averaging(mesh, k, centers[k]) for k in (0, 1))
+    # unit wrenches at the tip and what balances them at the base
+    carry = screw_map(centers[0] - centers[1])
+    loads = tip - np.einsum("nij,jk->nik", base, carry.T)
+    flat = loads.reshape(-1, 6)
+    held = _three_supports(mesh)
+    free = np.ones(len(flat), dtype=bool)
+    free[held] = False
+    # the tip's mean motion as seen from the base's: the supports carry nothing
+    return _from_loads(upper, flat, free)
+
+
+def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
+    """Stiffness from the work of six load cases on each other's displacements."""
+    u = np.zeros_like(loads)
+    u[free] = solve(upper[free][:, free], loads[free])
+    C = loads.T @ u
+    K = inverted((C + C.T) / 2)
+    fields = u.reshape(-1, 3, 6) @ K
+    return Condensed(K, fields, int(free.sum()))
+
+
+def _averaging(mesh: Elements, patch: int, center: NDArray) -> NDArray:
+    """(n, 3, 6) nodal loads of unit wrenches; transposed, the mean of a field."""
+    faces = mesh.faces[mesh.patch == patch]
+    nodes, index = np.unique(faces, return_inverse=True)
+    index = index.reshape(faces.shape)
+    mass = np.zeros((len(nodes), len(nodes)))
+    N, area = triangle_areas(mesh, faces)
+    blocks = np.einsum("tq,qa,qb->tab", area, N, N)
+    np.add.at(mass, (index[:, :, None], index[:, None, :]), blocks)
+    motions = rigid_motions(mesh.nodes[nodes], center)
+    weighted = np.einsum("ab,bij->aij", mass, motions)
+    gram = np.einsum("aij,aik->jk", motions, weighted)
+    loads = np.zeros((len(mesh.nodes), 3, 6))
+    loads[nodes] = weighted @ inverted(gram)
+    return loads
+
+
+def _three_supports(mesh: Elements) -> NDArray:
+    """Six unknowns that hold a body without straining it: three nodes far apart."""
+    points = mesh.nodes
+    first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
+    apart = np.linalg.norm(points - points[first], axis=1)
+    second = int(np.argmax(apart))
+    line = (points[second] - points[first]) / apart[second]
+    off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
+    third = int(np.argmax(off))
+    normal = np.abs(np.cross(points[third] - points[first], line))
+    # the second is free where the line to it mostly runs, the third held off the plane
+    second_held = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
+    third_held = 3 * third + int(np.argmax(normal))
+    return np.array([*(3 * first + d for d in range(3)), *second_held, third_held])

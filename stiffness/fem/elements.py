@@ -1,0 +1,339 @@
+r"""Isoparametric tetrahedra for linear elasticity.
+
+====== ========================================================== ==========
+symbol meaning                                                    shape
+====== ========================================================== ==========
+N      shape functions at quadrature points                       (q, m)
+G      their gradients in space                                   (t, q, m, 3)
+w      quadrature weights times the Jacobian's determinant        (t, q)
+====== ========================================================== ==========
+
+An element's m nodes are its lattice's (:mod:`stiffness.mesh.lagrange`): 20 in a cubic
+tetrahedron, 10 in a quadratic one.  The quadrature is scikit-fem's.  The stiffness is
+assembled from the scalar gradients, all elements at once, much faster than from a weak
+form: K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
+Straight tetrahedra are integrated exactly; curved ones two degrees beyond.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from stiffness.mesh.curved_elements import curved
+from stiffness.mesh.edge_grading import Parts, uncut
+from stiffness.mesh.lagrange import (
+    FACES,
+    face_nodes,
+    lattice,
+    numbered,
+    quadrature,
+    shape_functions,
+)
+from stiffness.mesh.mesh import Solid
+
+ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
+_CHUNK = 3_600_000  # numbers of the elements' matrices at a time, 30 MB
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """A solid's isoparametric tetrahedra.
+
+    Attributes:
+        order: of the polynomials, 2 or 3.
+        nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
+        cells: (t, m) nodes of each tetrahedron.
+        faces: (f, k) nodes of each boundary triangle.
+        patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
+        owner: (f,) the tetrahedron each boundary triangle belongs to.
+        curved: (t,) whether the tetrahedron is bent.
+    """
+
+    order: int
+    nodes: NDArray
+    cells: NDArray
+    faces: NDArray
+    patch: NDArray
+    owner: NDArray
+    curved: NDArray
+
+
+class Chunk(NamedTuple):
+    """Some elements, with what integrals over them need.
+
+    Attributes:
+        part: (c,) indices of the elements.
+        L: (q, 4) barycentric coordinates of the quadrature's points.
+        weights: (q,) on the reference element.
+        N: (q, m) shape functions.
+        G: (c, q, m, 3) [1/m] their gradients in space.
+        w: (c, q) [m^3] weights in space.
+    """
+
+    part: NDArray
+    L: NDArray
+    weights: NDArray
+    N: NDArray
+    G: NDArray
+    w: NDArray
+
+
+def isoparametric(
+    solid: Solid, order: int = ORDER, parts: Parts | None = None
+) -> Elements:
+    """Elements whose boundary nodes lie on the known shapes.
+
+    Args:
+        solid: the straight tetrahedra.
+        order: of the polynomials, 2 or 3.
+        parts: of the tetrahedra, to be elements in their stead.
+
+    Returns:
+        The elements.
+    """
+    whole, parts = curved(solid, order), parts or uncut(solid)
+    cells, count = numbered(parts.corners, order)
+    nodes = np.zeros((count, 3))
+    L = (lattice(order) / order) @ parts.places
+    # parts are cut in few different ways: all parts of a way at once
+    ways = parts.places.reshape(len(L), 16)
+    _, first, way = np.unique(ways, axis=0, return_index=True, return_inverse=True)
+    for k, example in enumerate(first):
+        members = np.flatnonzero(way == k)
+        N, _ = shape_functions(order, L[example])
+        corners = whole.nodes[whole.cells[parts.parent[members]]]
+        nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
+    # a part's face is on the boundary if it lies in a face there of its tetrahedron
+    faces, patch, owner = [], [], []
+    for side, on in zip(FACES, face_nodes(order), strict=True):
+        for other, missing in enumerate((3, 2, 1, 0)):
+            known = whole.patch[parts.parent, other]
+            inside = (parts.places[:, side, missing] == 0).all(axis=1)
+            member = np.flatnonzero(inside & (known >= 0))
+            faces.append(cells[member][:, on])
+            patch.append(known[member])
+            owner.append(member)
+    return Elements(
+        order,
+        nodes,
+        cells,
+        np.concatenate(faces),
+        np.concatenate(patch),
+        np.concatenate(owner),
+        whole.bent[parts.parent],
+    )
+
+
+def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
+    """Elements in chunks, with what integrals over them need.
+
+    Args:
+        mesh: the tetrahedra.
+        some: (t,) which of them; all if absent.
+
+    Yields:
+        A :class:`Chunk`.
+    """
+    straight = 2 * (mesh.order - 1)
+    some = np.ones(len(mesh.cells), dtype=bool) if some is None else some
+    for bent, degree in ((False, straight), (True, straight + 2)):
+        L, weights = quadrature(degree)
+        N, dN = shape_functions(mesh.order, L)
+        members = np.flatnonzero(some & (mesh.curved == bent))
+        for part in _chunks(members, N.shape[1]):
+            J = _jacobians(dN, mesh.nodes[mesh.cells[part]])
+            G = dN @ np.linalg.inv(J)
+            w = weights * np.abs(np.linalg.det(J))
+            yield Chunk(part, L, weights, N, G, w)
+
+
+def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
+    """Some elements of so many nodes at a time, as many as memory is meant for."""
+    step = max(1, _CHUNK // (9 * nodes**2))
+    for first in range(0, len(members), step):
+        yield members[first : first + step]
+
+
+def gradients_on_faces(
+    mesh: Elements, faces: NDArray
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """What integrals of stresses over boundary triangles need.
+
+    Args:
+        mesh: the tetrahedra.
+        faces: (f,) indices of boundary triangles.
+
+    Returns:
+        Places (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
+        gradients (f, q, m, 3) [1/m] of the owners' shape functions.
+    """
+    N, area = _face_vectors(mesh, mesh.faces[faces])
+    size = np.linalg.norm(area, axis=2)
+    places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.faces[faces]])
+    cells = mesh.cells[mesh.owner[faces]]
+    inner = mesh.nodes[cells].mean(axis=1)[:, None]
+    outward = np.sign(np.einsum("tqx,tqx->tq", area, places - inner))
+    G = np.zeros((*size.shape, cells.shape[1], 3))
+    corners = mesh.faces[faces, :3]
+    for side in FACES:
+        members = np.flatnonzero((cells[:, side] == corners).all(axis=1))
+        L = np.zeros((len(N), 4))
+        L[:, side] = quadrature(2 * mesh.order, corners=3)[0]
+        slope = shape_functions(mesh.order, L)[1]
+        J = _jacobians(slope, mesh.nodes[cells[members]])
+        G[members] = slope @ np.linalg.inv(J)
+    return places, area * (outward / size)[..., None], size, G
+
+
+def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
+    """(c, q, 3, 3) derivatives of the place, reference coordinates first."""
+    q, m, _ = dN.shape
+    flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
+    return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
+
+
+def node_gradients(mesh: Elements) -> Iterator[tuple[NDArray, NDArray]]:
+    """Gradients of the shape functions at the nodes of each element.
+
+    Args:
+        mesh: the tetrahedra.
+
+    Yields:
+        Indices (c,) of elements and gradients (c, m, m, 3) [1/m]: node, function,
+        direction.
+    """
+    dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
+    for part in _chunks(np.arange(len(mesh.cells)), dN.shape[1]):
+        yield part, dN @ np.linalg.inv(_jacobians(dN, mesh.nodes[mesh.cells[part]]))
+
+
+def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
+    """What integrals over curved triangles need.
+
+    Args:
+        mesh: whose nodes they have.
+        faces: (f, k) nodes of triangles.
+
+    Returns:
+        Shape functions (q, k) at the quadrature points and weights (f, q) [m^2].
+    """
+    N, area = _face_vectors(mesh, faces)
+    return N, np.linalg.norm(area, axis=2)
+
+
+def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
+    """Shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
+    N, dN, weights = triangle_rule(mesh.order)
+    J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
+    return N, np.cross(J[:, :, 0], J[:, :, 1]) * weights[:, None]
+
+
+def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Quadrature on a triangle that integrates products of two shape functions.
+
+    Args:
+        order: of the polynomials.
+
+    Returns:
+        Shape functions (q, k), their gradients (q, k, 2) and weights (q,).
+    """
+    L, weights = quadrature(2 * order, corners=3)
+    N, dN = shape_functions(order, L)
+    return N, dN, weights
+
+
+def lame(E: float, nu: float) -> tuple[float, float]:
+    """Lame's constants.
+
+    Args:
+        E: [Pa] Young's modulus.
+        nu: [-] Poisson's ratio.
+
+    Returns:
+        lambda and mu [Pa].
+    """
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+
+def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
+    """The stiffness of all elements together.
+
+    Args:
+        mesh: the tetrahedra.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
+
+    Returns:
+        (3n, 3n) [N/m] the upper triangle; row 3 i + k is direction k of node i.
+    """
+    cells, count = mesh.cells, np.int64(len(mesh.nodes))
+    a, b = np.triu_indices(cells.shape[1])
+    row, column = cells[:, a], cells[:, b]
+    swapped = row > column
+    code = np.minimum(row, column) * count + np.maximum(row, column)
+    code, position = np.unique(code.ravel(), return_inverse=True)
+    position = position.reshape(row.shape)
+    values = np.zeros((9, len(code)))
+    for part, block in _node_blocks(mesh, lam, mu, a, b):
+        turned = block.reshape(-1, 3, 3, len(a)).swapaxes(1, 2).reshape(block.shape)
+        block = np.where(swapped[part, None], turned, block)
+        place = position[part].ravel()
+        low, high = place.min(), place.max() + 1
+        for k in range(9):
+            entries = block[:, k].ravel()
+            values[k, low:high] += np.bincount(place - low, entries, high - low)
+    return _upper(values, code // count, code % count, int(count))
+
+
+def _node_blocks(
+    mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
+) -> Iterator[tuple[NDArray, NDArray]]:
+    """Indices (c,) of elements and stiffness (c, 9, p) of pairs a, b (p,) of nodes."""
+    L, weights = quadrature(2 * (mesh.order - 1))
+    _, dN = shape_functions(mesh.order, L)
+    # integrals of products of derivatives in a straight element's own coordinates
+    own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
+    for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
+        corners = mesh.nodes[mesh.cells[part, :4]]
+        J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
+        inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))
+        # [c, i, j, x, y]: what G_ai G_bj has of the derivatives along x and y
+        turn = np.einsum("c,cxi,cyj->cijxy", size, inverse, inverse)
+        yield part, _hooke(turn.reshape(-1, 3, 3, 9), lam[part], mu[part]) @ own
+    for part, _, _, _, G, w in integration(mesh, mesh.curved):
+        count, points, nodes, _ = G.shape
+        flat = (G * np.sqrt(w)[:, :, None, None]).reshape(count, points, -1)
+        S = (flat.swapaxes(1, 2) @ flat).reshape(count, nodes, 3, nodes, 3)
+        S = S[:, a, :, b, :].transpose(1, 2, 3, 0)  # sum w G_ai G_bj
+        yield part, _hooke(S, lam[part], mu[part])
+
+
+def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
+    """(c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
+    m = mu[:, None, None, None]
+    block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
+    block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
+    return np.asarray(block.reshape(len(S), 9, -1))
+
+
+def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
+    """The upper triangle from blocks (9, k) of nodes' pairs, row by row in order."""
+    start = np.searchsorted(row, np.arange(count + 1))
+    width = np.diff(start)
+    # a node's own block comes first: its second row lacks one entry, its third two
+    indptr = np.zeros(3 * count + 1, dtype=np.int32)
+    lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)
+    indptr[1:] = np.cumsum(lengths.ravel())
+    data, indices = np.empty(indptr[-1]), np.empty(indptr[-1], dtype=np.int32)
+    further = 3 * (np.arange(len(row)) - start[row])
+    for i in range(3):
+        first = indptr[3 * row + i] + further - i
+        for j in range(3):
+            there = slice(None) if j >= i else np.flatnonzero(further)
+            data[first[there] + j] = values[3 * i + j, there]
+            indices[first[there] + j] = 3 * column[there] + j
+    return csr_array((data, indices, indptr), shape=(3 * count, 3 * count))

@@ -1,0 +1,337 @@
+"""A link's stiffness from its surface, by finite elements, with its error.
+
+The surface becomes tetrahedra, the tetrahedra a stiffness and an estimate of its error
+(:mod:`stiffness.fem.adaptive_step`); elements that contribute most are refined until
+the asked accuracy is reached or the budget is used.
+"""
+
+import logging
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, describe, nearest
+from stiffness.fem.adaptive_step import Level, estimated_error, finer, solve_level
+from stiffness.fem.condensation import KINDS
+from stiffness.fem.mass_properties import PointMass, mass_properties
+from stiffness.fem.material import Material
+from stiffness.fem.quality import mesh_report
+from stiffness.fem.sparse_solver import expected_cost, solver_name
+from stiffness.link import LinkStiffness, inverted, scaled
+from stiffness.mesh.mesh import MeshFailed, Solid, mesh_solid
+from stiffness.surface.interface import Interface
+from stiffness.surface.patches import triangles_on
+from stiffness.surface.surface import Surface, read_surface
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a solution may cost.
+
+    Attributes:
+        seconds: [s] after which no finer mesh is begun.
+        unknowns: [1] of the largest system; memory grows with it.
+        levels: [1] meshes at most, the first included.
+    """
+
+    seconds: float = 300.0
+    unknowns: int = 1_000_000
+    levels: int = 12
+
+
+@dataclass(frozen=True, eq=False)
+class MeshedLink:
+    """A link solved on its finest mesh, ready to be asked for more than its stiffness.
+
+    Attributes:
+        link: the stiffness, with error, mesh report, mass.
+        level: the finest mesh, its fields and materials.
+        centers: (2, 3) [m] of the base and the tip interface.
+    """
+
+    link: LinkStiffness
+    level: Level
+    centers: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def mesh_link(
+    surface: Path | str,
+    base: Interface,
+    tip: Interface,
+    E: float,
+    nu: float,
+    *,
+    unit: str = "m",
+    accuracy: float = 0.005,
+    interface: str = "rigid",
+    density: float = 0.0,
+    budget: Budget | None = None,
+    cache: Path | str | None = None,
+) -> LinkStiffness:
+    """Stiffness of a link of one material, from a surface file.
+
+    Args:
+        surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
+        base: the held interface, in metres, in the surface's axes.
+        tip: the interface that moves.
+        E: [Pa] Young's modulus, > 0.
+        nu: [-] Poisson's ratio, in (-1, 0.5).
+        unit: of the surface file's coordinates.
+        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
+        interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
+            see :mod:`stiffness.fem.condensation`.
+        density: [kg/m^3] for mass and inertia; 0 leaves them out.
+        budget: what it may cost.
+        cache: folder of meshes; the user's cache if absent.
+
+    Returns:
+        The stiffness at the tip's centre, in the surface's axes; its ``mesh`` says
+        whether the asked accuracy was ``reached``.
+
+    Raises:
+        BadInput: the file, an interface, the material or an option is not proper.
+
+    Sources:
+        Rivara (1984) for the bisection; :mod:`stiffness.fem.error_indicator` for the
+        error.
+    """
+    shape = read_surface(Path(surface), unit)
+    material = (Material(E, nu, density),)
+    return solve_link(
+        shape,
+        base,
+        tip,
+        material,
+        accuracy=accuracy,
+        interface=interface,
+        budget=budget,
+        cache=cache,
+    ).link
+
+
+def solve_link(
+    surface: Surface,
+    base: Interface,
+    tip: Interface,
+    materials: Sequence[Material],
+    *,
+    accuracy: float = 0.005,
+    interface: str = "rigid",
+    point_masses: Sequence[PointMass] = (),
+    budget: Budget | None = None,
+    cache: Path | str | None = None,
+) -> MeshedLink:
+    """Solve a link to an asked accuracy.
+
+    Args:
+        surface: of the link.
+        base: the held interface.
+        tip: the interface that moves.
+        materials: the first fills the link, later ones where they say.
+        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
+        interface: ``"rigid"``, ``"distributing"`` or ``"distributing-both"``.
+        point_masses: added to mass, centre and inertia.
+        budget: what it may cost.
+        cache: folder of meshes; the user's cache if absent.
+
+    Returns:
+        The link and its finest mesh.
+
+    Raises:
+        BadInput: an interface or an option is not proper.
+    """
+    if interface not in KINDS:
+        raise BadInput(
+            f"interface: found {describe(interface)}{nearest(str(interface), KINDS)}"
+        )
+    if not 1e-5 <= accuracy <= 0.5:
+        raise BadInput(f"accuracy = {accuracy:g} must lie between 1e-05 and 0.5")
+    budget = budget or Budget()
+    start = time.monotonic()
+    centers = np.array([
+        interface_center(surface, f, n) for f, n in ((base, "base"), (tip, "tip"))
+    ])
+    level = solve_level(
+        first_mesh(surface, base, tip, budget, cache), materials, centers, interface
+    )
+    history, sizes = [level.totals()], [len(level.solid.cells)]
+    while True:
+        error, factor = estimated_error(history)
+        worst = float(np.abs(scaled(error, level.solution.stiffness)).max())
+        _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
+        if worst <= accuracy or len(history) == budget.levels:
+            break
+        growth = _wanted_growth(history, sizes, worst / accuracy)
+        solid = _affordable_mesh(level, growth, budget, start)
+        if solid is None:
+            break
+        level = solve_level(solid, materials, centers, interface)
+        history.append(level.totals())
+        sizes.append(len(level.solid.cells))
+    report = _report(level, surface, len(history), start) | {
+        "accuracy": accuracy,
+        "reached": worst <= accuracy,
+        "estimate_over_indicator": factor,
+    }
+    method = f"finite elements, {interface} interfaces"
+    stiffness = _link(method, level, centers, error, report, point_masses)
+    return MeshedLink(stiffness, level, centers)
+
+
+def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
+    """Where an interface's screws are read.
+
+    Args:
+        surface: of the link.
+        interface: on it.
+        name: base or tip, for messages.
+
+    Returns:
+        (3,) [m] the given point of a disc or a bore, the area's centroid of a plane.
+
+    Raises:
+        BadInput: no part of the surface lies on the interface.
+    """
+    members = triangles_on(surface, interface, name)
+    if interface.kind != "plane":
+        return np.array(interface.point)
+    areas = np.linalg.norm(surface.normals()[members], axis=1)
+    corners = surface.points[surface.triangles[members]]
+    center = np.average(corners.mean(axis=1), axis=0, weights=areas)
+    # single precision of STL: exactly onto the plane that was asked for
+    height = (center - interface.point) @ interface.direction
+    center = center - height * interface.direction
+    return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
+
+
+def first_mesh(
+    surface: Surface,
+    base: Interface,
+    tip: Interface,
+    budget: Budget,
+    cache: Path | str | None = None,
+) -> Solid:
+    """A coarse mesh to refine from, fine enough for the part's walls.
+
+    Args:
+        surface: of the link.
+        base: the held interface.
+        tip: the interface that moves.
+        budget: its seconds limit the mesher.
+        cache: folder of meshes; the user's cache if absent.
+
+    Returns:
+        The solid.
+
+    Raises:
+        MeshFailed: three tries gave nothing usable.
+    """
+    wall = 2 * surface.volume / surface.area / surface.diagonal
+    envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
+
+    def mesh(share: float) -> Solid:
+        return mesh_solid(
+            surface,
+            base,
+            tip,
+            edge=share * edge,
+            envelope=share * envelope,
+            time_limit=budget.seconds,
+            cache=cache,
+        )
+
+    start = time.monotonic()
+    for share in (1.0, 0.5):
+        try:
+            return mesh(share)
+        except MeshFailed as error:
+            if time.monotonic() - start > budget.seconds:
+                raise
+            _LOG.info("a finer mesh is tried: %s", error)
+    return mesh(0.2)
+
+
+def _wanted_growth(
+    history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
+) -> float:
+    """How many times the elements would bring the error down by an excess."""
+    rate = 1.3  # of the error over the count of elements; 2 were it smooth
+    if len(history) > 1:
+        then, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
+        fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
+        rate = min(max(fell, 1.0), 2.0)  # what was gained on coarse meshes ends
+    return float(np.clip((1.12 * excess) ** (1 / rate), 1.2, 6.0))
+
+
+def _affordable_mesh(
+    level: Level, growth: float, budget: Budget, start: float
+) -> Solid | None:
+    """A finer mesh that the budget allows, of as many times the elements as wanted."""
+    part = growth**0.55 - 1  # what neighbours add is about as much again
+    solid = finer(level, 1 + part)
+    added = len(solid.cells) / len(level.solid.cells) - 1
+    if not 0.85 < added / (growth - 1) < 1.08:
+        part *= (growth - 1) / added
+        solid = finer(level, 1 + part)
+    for share in (1.0, 0.7, 0.4, 0.1):
+        solid = solid if share == 1 else finer(level, 1 + share * part)
+        each = level.solution.unknowns / len(level.solid.cells)
+        unknowns = int(each * len(solid.cells))
+        memory, seconds = expected_cost(unknowns)
+        spent = time.monotonic() - start
+        _LOG.info(
+            "next: about %d unknowns, %.1f GB, %.0f s", unknowns, memory / 1e9, seconds
+        )
+        if unknowns <= budget.unknowns and spent + seconds <= budget.seconds:
+            return solid
+    return None
+
+
+def _report(
+    level: Level, surface: Surface, meshes: int, start: float
+) -> dict[str, Any]:
+    """The finest mesh, the surface it stands for, and what it took."""
+    return mesh_report(level.solid, level.mesh) | {
+        "unknowns": level.solution.unknowns,
+        "meshes": meshes,
+        "surface_volume": surface.volume,
+        "surface_area": surface.area,
+        "repairs": list(surface.repairs),
+        "solver": solver_name(),
+        "seconds": time.monotonic() - start,
+    }
+
+
+def _link(
+    method: str,
+    level: Level,
+    centers: NDArray,
+    error: NDArray,
+    report: dict[str, Any],
+    point_masses: Sequence[PointMass],
+) -> LinkStiffness:
+    """Everything known of the link, as a table."""
+    density = level.material[:, 2]
+    mass, center, inertia = mass_properties(level.mesh, density, point_masses)
+    return LinkStiffness(
+        method=method,
+        compliance=inverted(level.solution.stiffness),
+        tip=centers[1],
+        base=centers[0],
+        stiffness_error=error,
+        mesh=report,
+        mass=mass,
+        center_of_mass=center,
+        inertia=inertia,
+    )

@@ -1,0 +1,55 @@
+"""A meshed link as a rigid body: mass, centre, inertia."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.fem.elements import Elements, integration
+
+
+@dataclass(frozen=True, eq=False)
+class PointMass:
+    """Something heavy on the link that does not stiffen it.
+
+    Attributes:
+        mass: [kg].
+        place: (3,) [m] in the mesh's axes.
+    """
+
+    mass: float
+    place: NDArray
+
+
+def mass_properties(
+    mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
+) -> tuple[float, NDArray, NDArray]:
+    """Mass, centre and inertia of elements and added points.
+
+    Args:
+        mesh: the tetrahedra.
+        density: (t,) [kg/m^3] of each element.
+        point_masses: added to the elements.
+
+    Returns:
+        [kg], (3,) [m] the centre, (3, 3) [kg m^2] about the centre; zeros without mass.
+    """
+    origin = mesh.nodes.mean(axis=0)
+    mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+    for part, _, _, N, _, w in integration(mesh, density > 0):
+        x = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
+        x, dm = x - origin, w * density[part, None]
+        mass += float(dm.sum())
+        first += np.einsum("tq,tqx->x", dm, x)
+        second += np.einsum("tq,tqx,tqy->xy", dm, x, x)
+    for point in point_masses:
+        x = np.asarray(point.place) - origin
+        mass, first = mass + point.mass, first + point.mass * x
+        second = second + point.mass * np.outer(x, x)
+    if mass == 0:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    center = first / mass
+    about_center = second - mass * np.outer(center, center)
+    inertia = np.trace(about_center) * np.eye(3) - about_center
+    return mass, center + origin, inertia

@@ -1,0 +1,61 @@
+"""What a link is made of, and where."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput
+from stiffness.beam.sections import check_material
+from stiffness.fem.elements import Elements, lame
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """An isotropic solid, and where in the link it is.
+
+    Attributes:
+        E: [Pa] Young's modulus.
+        nu: [-] Poisson's ratio.
+        density: [kg/m^3], 0 for a link without mass.
+        where: tells of points (n, 3) [m], in the mesh's axes, which are of it; the
+            last material that claims an element's centre has it.
+    """
+
+    E: float
+    nu: float
+    density: float = 0.0
+    where: Callable[[NDArray], NDArray] | None = None
+
+    def __post_init__(self) -> None:
+        check_material("material", self.E, self.nu)
+        if not (math.isfinite(self.density) and self.density >= 0):
+            raise BadInput(f"material: density = {self.density:g} must be >= 0")
+
+
+def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArray:
+    """Material of each element, told at its centre.
+
+    Args:
+        mesh: the tetrahedra.
+        materials: the first fills the link, later ones where they say.
+
+    Returns:
+        (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
+
+    Raises:
+        BadInput: there is none, or the first does not fill the link.
+    """
+    if not materials:
+        raise BadInput("materials: at least one is needed")
+    centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
+    table = np.zeros((len(centers), 3))
+    for material in materials:
+        lam, mu = lame(material.E, material.nu)
+        where = material.where or (lambda points: np.ones(len(points), dtype=bool))
+        table[where(centers)] = lam, mu, material.density
+    if not (table[:, 1] > 0).all():
+        raise BadInput("materials: the first must fill the whole link")
+    return table

@@ -1,0 +1,77 @@
+"""How good a mesh of tetrahedra is, for the report."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.fem.elements import Elements, integration, triangle_areas
+from stiffness.mesh.lagrange import EDGES
+from stiffness.mesh.mesh import Solid
+
+
+def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
+    """Counts, size and shape of a mesh.
+
+    Args:
+        solid: the straight tetrahedra.
+        mesh: its elements, curved and with the layers along singular edges.
+
+    Returns:
+        ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
+        elements; ``closed``, whether every edge of the boundary has two faces;
+        ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
+        ``largest_angle`` [rad] between two faces of a tetrahedron.  Quality and angles
+        are those of the tetrahedra before layers are cut off them, thin on purpose.
+    """
+    quality, angles = element_quality(solid), dihedral_angles(solid)
+    edges = np.sort(solid.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    return {
+        "nodes": len(mesh.nodes),
+        "elements": len(mesh.cells),
+        "volume": sum(float(w.sum()) for *_, w in integration(mesh)),
+        "area": float(triangle_areas(mesh, mesh.faces)[1].sum()),
+        "closed": bool((count % 2 == 0).all()),
+        "worst_quality": float(quality.min()),
+        "mean_quality": float(quality.mean()),
+        "smallest_angle": float(angles.min()),
+        "largest_angle": float(angles.max()),
+    }
+
+
+def element_quality(solid: Solid) -> NDArray:
+    """How well shaped tetrahedra are.
+
+    Args:
+        solid: straight tetrahedra.
+
+    Returns:
+        (t,) [1] 1 for a regular one, 0 for a flat one: 6 sqrt(2) volume over the cube
+        of the root mean square edge.
+    """
+    corners = solid.points[solid.cells]
+    i, j = EDGES.T
+    mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
+    return 6 * np.sqrt(2) * solid.volumes() / mean_square**1.5
+
+
+def dihedral_angles(solid: Solid) -> NDArray:
+    """Angles between the faces of tetrahedra.
+
+    Args:
+        solid: straight tetrahedra.
+
+    Returns:
+        (t, 6) [rad] at the edges 01 02 03 12 13 23; arccos(1/3) in a regular one.
+    """
+    corners = solid.points[solid.cells]
+    found = []
+    for i, j in EDGES:
+        k, l = (v for v in range(4) if v not in (i, j))
+        along = corners[:, j] - corners[:, i]
+        # what is left of the way to the other corners, across the edge
+        one, other = (np.cross(along, corners[:, v] - corners[:, i]) for v in (k, l))
+        across = np.linalg.norm(np.cross(one, other), axis=1)
+        found.append(np.arctan2(across, np.einsum("ij,ij->i", one, other)))
+    return np.stack(found, axis=1)

@@ -1,0 +1,233 @@
+"""Stress that a tip wrench causes in a link.
+
+Six fields, one for each component of the wrench, hold every answer: stresses superpose.
+At the edge of a rigid interface the elastic solution is singular: the peak there grows
+without bound as the mesh is refined and means nothing.  Stresses are therefore reported
+only at some distance from the interfaces, one interface radius unless told otherwise,
+and the report says so.  What happens inside that distance, and how a real joint holds
+the link, is left out.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import section_axes
+from stiffness.beam.beam_stress import peak_beam_stress
+from stiffness.fem.adaptive_step import Level
+from stiffness.fem.elements import Elements, node_gradients, triangle_areas
+from stiffness.fem.error_indicator import PAIRS
+from stiffness.fem.fea import MeshedLink
+from stiffness.mesh.edge_grading import singular_edges
+
+
+@dataclass(frozen=True, eq=False)
+class StressInfluence:
+    """Stresses of unit tip wrenches at the nodes of a mesh, away from interfaces.
+
+    Attributes:
+        places: (p, 3) [m] nodes, in the link's axes.
+        influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
+            of the tip's wrench.
+        away: [m] nothing nearer than this to an interface is here.
+        inner_edges: whether some of the nodes lie on inner edges without a fillet,
+            where the elastic stress is singular too.
+    """
+
+    places: NDArray
+    influence: NDArray
+    away: float
+    inner_edges: bool = False
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def region(self) -> str:
+        """Where the stresses are from, in words."""
+        words = (
+            f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
+            "interfaces, whose clamped edges are singular"
+        )
+        if self.inner_edges:
+            words += (
+                "; some of them on inner edges without a fillet, where stress is "
+                "singular too and grows with the mesh's fineness"
+            )
+        return words
+
+    def stresses(self, wrench: ArrayLike) -> NDArray:
+        """Stresses of a tip wrench.
+
+        Args:
+            wrench: (6,) [N m, N] at the tip, in the link's axes.
+
+        Returns:
+            (p, 6) [Pa] xx yy zz yz xz xy.
+        """
+        return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
+
+    def peak(self, wrench: ArrayLike) -> tuple[float, NDArray]:
+        """Largest von Mises stress of a tip wrench, and where.
+
+        Args:
+            wrench: (6,) [N m, N] at the tip, in the link's axes.
+
+        Returns:
+            [Pa] and (3,) [m].
+        """
+        values = von_mises(self.stresses(wrench))
+        worst = int(np.argmax(values))
+        return float(values[worst]), self.places[worst]
+
+
+@dataclass(frozen=True, eq=False)
+class PeakStress:
+    """The largest von Mises stress of one wrench at the tip of a meshed link.
+
+    Attributes:
+        wrench: (6,) [N m, N] at the tip, in the link's axes.
+        von_mises: [Pa].
+        place: (3,) [m] of it.
+        region: what was looked at, in words.
+        away: [m] nothing nearer than this to an interface was looked at.
+        beam: [Pa] and (3,) [m] by the beam formula, between the sections that are so
+            far from base and tip; None without a section.
+        beam_whole: [Pa] by the beam formula over the whole length; NaN without.
+    """
+
+    wrench: NDArray
+    von_mises: float
+    place: NDArray
+    region: str
+    away: float
+    beam: tuple[float, NDArray] | None = None
+    beam_whole: float = float("nan")
+
+
+def peak_stress(
+    solved: MeshedLink,
+    wrench: ArrayLike,
+    *,
+    section: Mapping[str, float] | None = None,
+    up: ArrayLike | None = None,
+    away: float | None = None,
+) -> PeakStress:
+    """Largest von Mises stress of a tip wrench, with the beam formula beside it.
+
+    Args:
+        solved: from :func:`stiffness.fem.fea.solve_link`.
+        wrench: (6,) [N m, N] at the tip, in the link's axes.
+        section: of a straight beam from base to tip, as for
+            :func:`stiffness.beam.beam_stress.peak_beam_stress`.
+        up: (3,) the section's z, in the link's axes.
+        away: [m] from the interfaces; one interface radius if absent.
+
+    Returns:
+        The peak, its place and region.
+
+    Raises:
+        BadInput: nothing of the link is so far away, or the section has no formula.
+    """
+    w = np.asarray(wrench, dtype=float)
+    if section is not None:
+        peak_beam_stress(section, 0.0, np.zeros(6))  # refused before the work
+    field = stress_influence(solved, away)
+    value, place = field.peak(w)
+    if section is None:
+        return PeakStress(w, value, place, field.region, field.away)
+    base, tip = solved.link.base, solved.link.tip
+    R = section_axes(tip - base, up)
+    length = float(np.linalg.norm(tip - base))
+    in_beam = np.r_[w[:3] @ R, w[3:] @ R]
+    whole, _ = peak_beam_stress(section, length, in_beam)
+    near_tip = in_beam.copy()
+    near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
+    stress, where = peak_beam_stress(section, length - 2 * field.away, near_tip)
+    where = base + R @ (where + [field.away, 0, 0])
+    beam = (float(stress), where)
+    return PeakStress(w, value, place, field.region, field.away, beam, float(whole))
+
+
+def von_mises(stress: ArrayLike) -> NDArray:
+    """Equivalent stress.
+
+    Args:
+        stress: (..., 6) [Pa] xx yy zz yz xz xy.
+
+    Returns:
+        (...) [Pa].
+    """
+    s = np.asarray(stress, dtype=float)
+    x, y, z, yz, xz, xy = np.moveaxis(s, -1, 0)
+    normal = (x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2
+    return np.sqrt(normal / 2 + 3 * (yz**2 + xz**2 + xy**2))
+
+
+def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
+    """Stresses of the six unit tip wrenches of a solved link.
+
+    Args:
+        solved: from :func:`stiffness.fem.fea.solve_link`; of one material, or read the
+            stresses at the seams of several with care: they are averaged there.
+        away: [m] from the interfaces; one interface radius if absent.
+
+    Returns:
+        The influence.
+
+    Raises:
+        BadInput: nothing of the link is so far away.
+    """
+    from scipy.spatial import cKDTree
+
+    level = solved.level
+    mesh = level.mesh
+    sizes = [_interface_radius(mesh, k) for k in (0, 1)]
+    distance = max(sizes) if away is None else away
+    held = np.unique(mesh.faces[mesh.patch <= 1])
+    gap = cKDTree(mesh.nodes[held]).query(mesh.nodes)[0]
+    far = gap >= distance * (1 - 1e-9)  # a layer of nodes at just that distance
+    if not far.any():
+        raise BadInput(
+            f"stress: nothing of the link is {distance:.4g} m away from its "
+            f"interfaces; the furthest node is {gap.max():.4g} m"
+        )
+    per_screw = _nodal_stresses(level)[far]
+    influence = np.einsum("pks,kw->pws", per_screw, solved.link.compliance)
+    inner = np.unique(singular_edges(level.solid, ()))
+    return StressInfluence(
+        mesh.nodes[far], influence, float(distance), bool(far[inner].any())
+    )
+
+
+def _interface_radius(mesh: Elements, patch: int) -> float:
+    """[m] largest distance of an interface's nodes from its area's middle."""
+    faces = mesh.faces[mesh.patch == patch]
+    N, area = triangle_areas(mesh, faces)
+    first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
+    points = mesh.nodes[np.unique(faces)]
+    return float(np.linalg.norm(points - first / area.sum(), axis=1).max())
+
+
+def _nodal_stresses(level: Level) -> NDArray:
+    """(n, 6, 6) stress of each unit screw at each node, averaged over elements."""
+    mesh, fields = level.mesh, level.solution.fields
+    total = np.zeros((len(mesh.nodes), 6, 6))
+    count = np.bincount(mesh.cells.ravel(), minlength=len(mesh.nodes))
+    for part, G in node_gradients(mesh):
+        nodes = mesh.cells[part]
+        slope = np.einsum("cqax,caik->cqkix", G, fields[nodes], optimize=True)
+        lam, mu, _ = level.material[part].T[:, :, None, None]
+        pressure = lam * np.trace(slope, axis1=-2, axis2=-1)
+        stress = np.stack(
+            [
+                mu * (slope[..., i, j] + slope[..., j, i]) + (i == j) * pressure
+                for i, j in PAIRS
+            ],
+            axis=-1,
+        )
+        np.add.at(total, nodes, stress)
+    return total / np.maximum(count, 1)[:, None, None]

@@ -1,0 +1,37 @@
+"""The mesher's own process: pytetwild on a stored surface.
+
+``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz``
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+
+def main(given: Path, made: Path) -> None:
+    """Read a surface and its settings, write points and cells.
+
+    Args:
+        given: ``points`` (n, 3) [m], ``triangles`` (m, 3), ``settings``: edge length
+            [m] and envelope as a share of the diagonal.
+        made: ``points`` (n, 3) [m] and ``cells`` (t, 4).
+    """
+    import pytetwild
+
+    with np.load(given) as stored:
+        points, triangles = stored["points"], stored["triangles"]
+        edge, envelope = stored["settings"]
+    points, cells = pytetwild.tetrahedralize(
+        np.ascontiguousarray(points, dtype=float),
+        np.ascontiguousarray(triangles, dtype=np.int32),
+        edge_length_abs=float(edge),
+        epsilon=float(envelope),
+        stop_energy=8.0,
+        quiet=True,
+    )
+    np.savez(made, points=np.asarray(points, dtype=float), cells=np.asarray(cells))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

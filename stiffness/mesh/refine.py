@@ -1,0 +1,168 @@
+"""Finer tetrahedra where they are asked for, by bisecting longest edges (Rivara).
+
+An edge is split only when it is the longest of every tetrahedron around it, so the mesh
+stays conforming at every step; neighbours are split first where it is not.  Boundary
+triangles are split with their tetrahedra and keep their patch, and new corners are
+moved onto the patch's shape.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.lagrange import EDGES
+from stiffness.mesh.mesh import Solid, moved_onto_shapes
+
+_TRIANGLE = np.array([[0, 1], [1, 2], [0, 2]])
+
+
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """A refined solid.
+
+    Attributes:
+        solid: the finer one.
+        parent: (t,) tetrahedron of the coarser one that each came from.
+    """
+
+    solid: Solid
+    parent: NDArray
+
+
+def refine(solid: Solid, halvings: NDArray) -> Finer:
+    """Bisect tetrahedra as often as asked; neighbours where conformity needs it.
+
+    Args:
+        solid: to refine.
+        halvings: (t,) how many times each tetrahedron's volume is to be halved.
+
+    Returns:
+        The finer solid.
+    """
+    parent, need = np.arange(len(solid.cells)), np.array(halvings, dtype=int)
+    while (need > 0).any():
+        ends, of_cell = edges_of(solid.cells, len(solid.points))
+        split = _terminal_edges(solid.points, ends, of_cell, need > 0)
+        solid, row = split_edges(solid, ends, of_cell, split)
+        need[row] = np.maximum(need[row] - 1, 0)
+        need, parent = np.r_[need, need[row]], np.r_[parent, parent[row]]
+    return Finer(moved_onto_shapes(solid), parent)
+
+
+def split_edges(
+    solid: Solid, ends: NDArray, of_cell: NDArray, split: NDArray
+) -> tuple[Solid, NDArray]:
+    """Halve some edges with all that is around them; at most one of each tetrahedron.
+
+    Args:
+        solid: to refine; new corners are not yet moved onto its shapes.
+        ends: (e, 2) of :func:`edges_of`.
+        of_cell: (t, 6) of :func:`edges_of`.
+        split: (e,) whether an edge is to be halved.
+
+    Returns:
+        The solid, and the tetrahedra (r,) that were halved: their first halves keep
+        their places, the second ones are appended in this order.
+    """
+    count = len(solid.points)
+    middle = np.full(len(ends), -1)
+    middle[split] = count + np.arange(split.sum())
+    points = np.concatenate([solid.points, solid.points[ends[split]].mean(axis=1)])
+    pairs = np.sort(solid.faces[:, _TRIANGLE], axis=2)
+    of_face = np.searchsorted(edge_code(ends, count), edge_code(pairs, count))
+    faces, face_row = _halved(solid.faces, middle[of_face], _TRIANGLE)
+    cells, row = _halved(solid.cells, middle[of_cell], EDGES)
+    patch = np.r_[solid.patch, solid.patch[face_row]]
+    return Solid(points, cells, faces, patch, solid.shapes), row
+
+
+def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
+    """Edges of tetrahedra.
+
+    Args:
+        cells: (t, 4) corners.
+        points: how many corners there are.
+
+    Returns:
+        Ends (e, 2), the smaller number first, in order; the edges (t, 6) of each cell.
+    """
+    ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
+    code, index = np.unique(edge_code(ends, points), return_inverse=True)
+    ends = np.column_stack([code // points, code % points])
+    return ends, index.reshape(-1, 6)
+
+
+def edge_code(ends: NDArray, points: int) -> NDArray:
+    """One number for each pair of corners, whose order counts.
+
+    Args:
+        ends: (..., 2) corners.
+        points: how many corners there are.
+
+    Returns:
+        (...) ; pairs in order have rising numbers.
+    """
+    return np.asarray(ends[..., 0] * np.int64(points) + ends[..., 1])
+
+
+def ranked(points: NDArray, ends: NDArray) -> NDArray:
+    """Edges in the order of their lengths.
+
+    Args:
+        points: (n, 3) [m].
+        ends: (e, 2) corners.
+
+    Returns:
+        (e,) each edge's place, 0 the shortest; of equal ones the first is lower.
+    """
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    rank = np.empty(len(ends), dtype=int)
+    rank[np.lexsort((np.arange(len(ends)), length))] = np.arange(len(ends))
+    return rank
+
+
+def agreed(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
+    """Edges that all tetrahedra around them have chosen.
+
+    Args:
+        of_cell: (t, 6) of :func:`edges_of`.
+        chosen: one edge of each tetrahedron that chooses.
+        edges: how many there are.
+
+    Returns:
+        (e,) booleans.
+    """
+    around = np.bincount(of_cell.ravel(), minlength=edges)
+    return np.asarray(around == np.bincount(chosen, minlength=edges))
+
+
+def _terminal_edges(
+    points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
+) -> NDArray:
+    """(e,) edges to split now: longest in all their cells, in a wanted one's way."""
+    rank = ranked(points, ends)
+    longest = np.take_along_axis(
+        of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
+    ).ravel()
+    marked = np.zeros(len(ends), dtype=bool)
+    marked[longest[wanted]] = True
+    while True:
+        reached = longest[marked[of_cell].any(axis=1)]
+        if marked[reached].all():
+            break
+        marked[reached] = True
+    return marked & agreed(of_cell, longest, len(ends))
+
+
+def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
+    """Cells with a split edge become two, the second ones appended; and which did."""
+    row, which = np.nonzero(middle >= 0)
+    new = middle[row, which]
+    first, second = cells[row].copy(), cells[row].copy()
+    each = np.arange(len(row))
+    first[each, pairs[which, 1]] = new
+    second[each, pairs[which, 0]] = new
+    result = cells.copy()
+    result[row] = first
+    return np.concatenate([result, second]), row

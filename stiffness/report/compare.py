@@ -1,0 +1,157 @@
+"""A beam beside finite elements: where they differ, and which part is physics.
+
+A beam's section warps and shrinks freely; a rigid face holds it.  The ends of a solid
+link are therefore stiffer than the beam, by about what a beam shorter by a fixed share
+of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section and on
+Poisson's ratio only.  It fades as the link grows slender; a difference that does not
+fade is an error of one of the two models.
+
+The commonest one is a section whose width and height are swapped, or an ``up`` left
+out: the beam is then turned about its own axis.  So the beam is turned by quarters, and
+if it agrees much better somewhere, that is said instead.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
+from stiffness.link import LinkStiffness, scaled
+from stiffness.screws import rotation_matrix, screw_map
+
+_MUCH_BETTER = 0.25  # of the largest difference, and no less than the mesh's error
+_TURNS = {90: "a quarter", 180: "half a turn", 270: "three quarters"}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One link by a beam formula and by finite elements.
+
+    Attributes:
+        beam: the formula's answer.
+        fea: the finite elements' answer, same tip and axes.
+        difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
+        length: [m] base to tip, along the beam.
+        size: [m] of the section: radius of gyration times 2, the radius of a round bar.
+    """
+
+    beam: LinkStiffness
+    fea: LinkStiffness
+    difference: NDArray
+    length: float
+    size: float
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def slenderness(self) -> float:
+        """Length over the section's size, L / r."""
+        return self.length / self.size
+
+    @property
+    def end_effect(self) -> NDArray:
+        """(6,) [1] c of ``K_ii / K_ii of the beam = 1 + c r / L``."""
+        return np.diag(self.difference) * self.slenderness
+
+    @property
+    def better_turn(self) -> tuple[int, float]:
+        """A turn of the beam about base to tip that makes it agree much better.
+
+        Its degrees, 0 if there is none, and the largest difference [1] it leaves.
+        """
+        worst = float(np.abs(self.difference).max())
+        axis = self.fea.tip - self.fea.base
+        if not np.linalg.norm(axis) > 0:
+            return 0, worst
+        left = {
+            angle: _turned_difference(self, np.radians(angle) * axis)
+            for angle in _TURNS
+        }
+        noise = 2 * self.fea.relative_error_estimate
+        # of turns that are the same but for the mesh and rounding, the smallest
+        least = min(left.values()) + noise + 1e-9 * worst
+        best = min(angle for angle in left if left[angle] <= least)
+        found = left[best] < _MUCH_BETTER * worst and worst > noise
+        return (best, left[best]) if found else (0, worst)
+
+    @property
+    def explanation(self) -> str:
+        """The difference in words."""
+        angle, left = self.better_turn
+        if angle:
+            worst = 100 * np.abs(self.difference).max()
+            swap = "" if angle == 180 else ", or width and height swapped"
+            return (
+                f"The beam's axes look swapped: turned by {_TURNS[angle]} about base "
+                f"to tip it would differ by {100 * left:.3g} % at most, not "
+                f"{worst:.3g} %.  Expected another up{swap}."
+            )
+        c = self.end_effect
+        noise = self.fea.relative_error_estimate * self.slenderness
+        turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
+        chord = float(np.linalg.norm(self.fea.tip - self.fea.base))
+        bent = (
+            "  A solid's corner is stiffer than two beams that meet in a point: part "
+            "of c is no end effect."
+        )
+        return (
+            f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
+            f"K / K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
+            f"(translations); the mesh's error is worth {noise:.2f}."
+            f"{bent if self.length > 1.001 * chord else ''}"
+        )
+
+
+def _turned_difference(comparison: Comparison, rotation: NDArray) -> float:
+    """[1] largest difference from the beam turned about the tip by a vector."""
+    axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
+    A = screw_map(np.zeros(3), rotation_matrix(axis))
+    K = A @ comparison.beam.stiffness @ A.T
+    return float(np.abs(scaled(comparison.fea.stiffness - K, K)).max())
+
+
+def compare_link(
+    beam: LinkStiffness,
+    fea: LinkStiffness,
+    size: float,
+    length: float | None = None,
+) -> Comparison:
+    """Put two answers for one link side by side.
+
+    Args:
+        beam: by formula.
+        fea: by finite elements, read at the same tip in the same axes.
+        size: [m] of the section, the radius of a round bar.
+        length: [m] of the beam; from base to tip if absent.
+
+    Returns:
+        The comparison.
+
+    Raises:
+        BadInput: the two tips are further apart than 1e-6 m and 0.1 % of the length.
+    """
+    length = float(np.linalg.norm(fea.tip - fea.base)) if length is None else length
+    gap = float(np.linalg.norm(fea.tip - beam.tip))
+    if gap > 1e-6 + 1e-3 * length:
+        ends = [", ".join(f"{v:.6g}" for v in link.tip) for link in (beam, fea)]
+        raise BadInput(
+            f"compare: the beam ends at ({ends[0]}) m, the surface's tip is at "
+            f"({ends[1]}) m; both must be one point"
+        )
+    difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
+    return Comparison(beam, fea, difference, length, size)
+
+
+def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
+    """Upper entries of a stiffness that are more than a thousandth of their scale.
+
+    Args:
+        stiffness: (6, 6).
+
+    Returns:
+        Rows and columns.
+    """
+    matters = np.abs(np.triu(scaled(stiffness, stiffness))) > 1e-3
+    return [(int(i), int(j)) for i, j in zip(*np.nonzero(matters), strict=True)]

@@ -1,0 +1,87 @@
+"""Stiffnesses in the order and words of other programs."""
+
+import csv
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.table import BadInput, nearest
+from stiffness.report.library import Entry
+from stiffness.screws import SCREW
+
+# ours is [R T] / [m f]; all of these put translations and forces first
+PROGRAMS = ("exudyn", "adams", "mapdl")
+_SWAPPED = [3, 4, 5, 0, 1, 2]
+
+
+def translations_first(matrix: ArrayLike) -> NDArray:
+    """A stiffness or compliance in the order [T R] / [f m].
+
+    Args:
+        matrix: (6, 6) in our order.
+
+    Returns:
+        (6, 6).
+    """
+    return np.asarray(matrix, dtype=float)[np.ix_(_SWAPPED, _SWAPPED)]
+
+
+def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
+    """K_E as another program reads it, SI units.
+
+    Args:
+        program: ``"exudyn"``: ``stiffness`` of a RigidBodySpringDamper; ``"adams"``:
+            the K matrix of a FIELD statement; ``"mapdl"``: a MATRIX27 stiffness, lower
+            triangle of nodes I (base, at the same place) and J (tip).
+        stiffness: (6, 6) in our order.
+        name: of the link, for comments.
+
+    Returns:
+        Text.
+
+    Raises:
+        BadInput: an unknown program.
+    """
+    if program not in PROGRAMS:
+        raise BadInput(f'program: unknown "{program}"{nearest(program, PROGRAMS)}')
+    K = translations_first(stiffness)
+    rows = [", ".join(f"{v:.12e}" for v in row) for row in K]
+    if program == "exudyn":
+        body = ",\n    ".join(f"[{row}]" for row in rows)
+        return f"# {name}: order [TX TY TZ RX RY RZ]\nstiffness = [\n    {body}]\n"
+    if program == "adams":
+        # K(i, j) column by column, as FIELD's KMATRIX lists it
+        columns = ",\n, ".join(", ".join(f"{v:.12e}" for v in column) for column in K.T)
+        return f"! {name}: order X Y Z AX AY AZ\n, KMATRIX = {columns}\n"
+    both = np.block([[K, -K], [-K, K]])
+    lower = both[np.tril_indices(12)]
+    lines = [f"! {name}: MATRIX27, KEYOPT(3)=4, order UX UY UZ ROTX ROTY ROTZ"]
+    for start in range(0, 78, 6):
+        values = ",".join(f"{v:.12e}" for v in lower[start : start + 6])
+        command = "R,1" if start == 0 else "RMORE"
+        lines.append(f"{command},{values}")
+    return "\n".join(lines) + "\n"
+
+
+def library_csv(entries: Sequence[Entry]) -> str:
+    """A library as a table: a row an entry, parameters, then the upper half of K.
+
+    Args:
+        entries: of one library.
+
+    Returns:
+        CSV text with a header.
+    """
+    names = sorted({name for e in entries for name in e.parameters})
+    upper = [(i, j) for i in range(6) for j in range(i, 6)]
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    heads = [f"K_{SCREW[i]}_{SCREW[j]}" for i, j in upper]
+    table.writerow(["key", *names, *heads, "relative_error_estimate"])
+    for e in entries:
+        values = [repr(float(e.stiffness[i, j])) for i, j in upper]
+        given = [e.parameters.get(name, "") for name in names]
+        table.writerow([e.key, *given, *values, e.about["relative_error_estimate"]])
+    return out.getvalue()

@@ -1,0 +1,159 @@
+r"""Beam and finite elements over slenderness: what the ends add, and how it fades.
+
+The same section at several lengths.  A rigid face keeps the section from warping and
+shrinking over a distance that the section sets, not the length, so that the link is as
+stiff as a beam shorter by that much:
+
+    K / K_beam = 1 + c r / L + d (r / L)^2.
+
+c is a number of the section, the interfaces and Poisson's ratio; what the two terms do
+not explain is left as the residual and should be no more than the meshes' error.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.sections import declared_section
+from stiffness.link import LinkStiffness
+from stiffness.report.compare import Comparison, compare_link
+from stiffness.surface.beam_surfaces import shape_surface
+
+_SHAPES = {
+    frozenset({"radius"}): "round",
+    frozenset({"radius", "inner_radius"}): "tube",
+    frozenset({"width", "height"}): "rectangle",
+    frozenset({"width", "height", "wall"}): "box",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SlendernessSweep:
+    """One section at several lengths, by beam and by finite elements.
+
+    Attributes:
+        comparisons: a beam beside finite elements, shortest first.
+        end_effect: (6, 6) [1] c, for K scaled by sqrt(K_ii K_jj) of the beam.
+        end_effect_error: (6, 6) [1] what the meshes' estimated errors are worth in c.
+        second: (6, 6) [1] d.
+        residual: (n, 6, 6) [1] differences that c and d leave.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    end_effect: NDArray
+    end_effect_error: NDArray
+    second: NDArray
+    residual: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def slenderness(self) -> NDArray:
+        """(n,) L / r of each comparison."""
+        return np.array([c.slenderness for c in self.comparisons])
+
+    @property
+    def explanation(self) -> str:
+        """What the ends add, in words."""
+        c, error = np.diag(self.end_effect), np.diag(self.end_effect_error)
+        turns, shifts = (" ".join(f"{v:.3f}" for v in part) for part in (c[:3], c[3:]))
+        left = 100 * np.abs(self.residual).max()
+        mesh = 100 * max(k.fea.relative_error_estimate for k in self.comparisons)
+        return (
+            f"Held faces cannot warp or shrink: K / K_beam = 1 + c r / L + d (r / L)^2 "
+            f"with c = {turns} (rotations), {shifts} (translations), +- "
+            f"{error.max():.2g} by the meshes.  Left over: {left:.2g} % at most, where "
+            f"the meshes are good to {mesh:.2g} %."
+        )
+
+
+def sweep_slenderness(
+    section: Mapping[str, float],
+    E: float,
+    nu: float,
+    ratios: Sequence[float],
+    *,
+    accuracy: float = 0.002,
+    interface: str = "rigid",
+    update: Callable[[int, int], None] | None = None,
+) -> SlendernessSweep:
+    """Compare a section's beam and solid at several lengths.
+
+    Args:
+        section: ``radius`` and perhaps ``inner_radius``, or ``width`` and ``height``
+            and perhaps ``wall`` [m].
+        E: [Pa] Young's modulus.
+        nu: [-] Poisson's ratio.
+        ratios: L / r, two or more, r as in
+            :attr:`stiffness.beam.sections.Section.size`.
+        accuracy: [1] asked of finite elements.
+        interface: of the solid's ends.
+        update: called with lengths done and wanted.
+
+    Returns:
+        The comparisons and the fit.
+
+    Raises:
+        BadInput: a section of another kind, or fewer than two lengths.
+    """
+    from stiffness.fem.fea import solve_link
+    from stiffness.fem.material import Material
+    from stiffness.surface.interface import parse_interface
+
+    if frozenset(section) not in _SHAPES:
+        raise BadInput(
+            f"slenderness: found a section of {', '.join(section) or 'nothing'}; "
+            "expected radius (inner_radius), or width and height (wall)"
+        )
+    if len(ratios) < 2:
+        raise BadInput("slenderness: found one length, expected two or more")
+    constants = declared_section(section, nu)
+    found = []
+    for done, ratio in enumerate(ratios, start=1):
+        length = ratio * constants.size
+        surface = shape_surface(
+            _SHAPES[frozenset(section)], {**section, "length": length}
+        )
+        fea = solve_link(
+            surface,
+            parse_interface("z=0"),
+            parse_interface(f"z={length!r}"),
+            [Material(E, nu)],
+            accuracy=accuracy,
+            interface=interface,
+        ).link
+        C = beam_compliance(length, constants, E, nu, axis=[0, 0, 1], up=[0, 1, 0])
+        beam = LinkStiffness("Timoshenko beam", C, tip=fea.tip, base=fea.base)
+        found.append(compare_link(beam, fea, constants.size))
+        if update is not None:
+            update(done, len(ratios))
+    return fit_end_effect(found)
+
+
+def fit_end_effect(comparisons: Sequence[Comparison]) -> SlendernessSweep:
+    """Fit c and d of K / K_beam = 1 + c r / L + d (r / L)^2.
+
+    Args:
+        comparisons: of one section at two or more lengths.
+
+    Returns:
+        The comparisons with the fit.
+    """
+    x = np.array([1 / c.slenderness for c in comparisons])
+    terms = np.column_stack([x, x**2])
+    values = np.array([c.difference for c in comparisons]).reshape(len(x), 36)
+    errors = np.array([c.fea.relative_errors for c in comparisons]).reshape(len(x), 36)
+    inverse = np.linalg.pinv(terms)
+    fit = inverse @ values
+    return SlendernessSweep(
+        comparisons=tuple(comparisons),
+        end_effect=fit[0].reshape(6, 6),
+        end_effect_error=(np.abs(inverse[0]) @ errors).reshape(6, 6),
+        second=fit[1].reshape(6, 6),
+        residual=(values - terms @ fit).reshape(-1, 6, 6),
+    )

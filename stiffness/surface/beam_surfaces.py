@@ -1,0 +1,133 @@
+"""Surfaces of common link shapes, from a few lengths; the axis is z, the base at 0."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, nearest
+from stiffness.beam.curve import Piece, straight_piece
+from stiffness.beam.sections import Section, declared_section, round_section
+from stiffness.surface.surface import Surface, check_surface
+
+# what each shape needs; an optional length stands with its default
+SHAPES: dict[str, dict[str, float | None]] = {
+    "round": {"length": None, "radius": None},
+    "tube": {"length": None, "radius": None, "inner_radius": None},
+    "cone": {"length": None, "radius": None, "tip_radius": None},
+    "rectangle": {"length": None, "width": None, "height": None},
+    "box": {"length": None, "width": None, "height": None, "wall": None},
+}
+_FACETS = 64
+
+
+def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
+    """Refuse an unknown shape, or lengths that are not its own.
+
+    Args:
+        shape: one of ``SHAPES``.
+        lengths: by name [m].
+
+    Raises:
+        BadInput: an unknown name, a missing one, or one that is not > 0.
+    """
+    if shape not in SHAPES:
+        raise BadInput(f'shape: unknown "{shape}"{nearest(shape, SHAPES)}')
+    for name in lengths:
+        if name not in SHAPES[shape]:
+            raise BadInput(
+                f'{shape}: unknown length "{name}"{nearest(name, SHAPES[shape])}'
+            )
+    for name in SHAPES[shape]:
+        if not (name in lengths and 0 < lengths[name] < float("inf")):
+            found = f"found {lengths[name]:g}" if name in lengths else "missing"
+            raise BadInput(f"{shape}: {name}: {found}, expected a length > 0 [m]")
+    if shape == "tube" and lengths["inner_radius"] >= lengths["radius"]:
+        raise BadInput("tube: inner_radius must be smaller than radius")
+    if shape == "box" and 2 * lengths["wall"] >= min(
+        lengths["width"], lengths["height"]
+    ):
+        raise BadInput("box: wall must leave a hole")
+
+
+def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
+    """Closed surface of a shape.
+
+    Args:
+        shape: one of ``SHAPES``.
+        lengths: by name [m].
+
+    Returns:
+        The surface, facets' corners on the true one.
+
+    Raises:
+        BadInput: the shape or a length is not proper.
+    """
+    check_shape(shape, lengths)
+    L = lengths["length"]
+    if shape in {"rectangle", "box"}:
+        corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
+        # the height stands along y: `up` of a beam along z
+        sides = np.array([lengths["width"], lengths["height"]])
+        hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
+        return _prism([corner * sides] * 2, L, shape, hole)
+    angle = 2 * np.pi * np.arange(_FACETS) / _FACETS
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    r = lengths["radius"]
+    if shape == "tube":
+        return _prism([r * circle] * 2, L, shape, lengths["inner_radius"] * circle)
+    tip = lengths["tip_radius"] if shape == "cone" else r
+    return _prism([r * circle, tip * circle], L, shape)
+
+
+def _prism(
+    rings: list[NDArray], length: float, name: str, hole: NDArray | None = None
+) -> Surface:
+    """Two outlines joined, closed by fans, or by rings around a hole."""
+    count = len(rings[0])
+    inner = [np.zeros((1, 2))] * 2 if hole is None else [hole, hole]
+    layers = [rings[0], rings[1], *inner]
+    heights = [0.0, length, 0.0, length]
+    points = np.concatenate([
+        np.insert(p, 2, z, axis=1) for p, z in zip(layers, heights, strict=True)
+    ])
+    i = np.arange(count)
+    j = (i + 1) % count
+    many = len(inner[0])
+    low, high = 2 * count + i % many, 2 * count + many + i % many
+    low_j, high_j = 2 * count + j % many, 2 * count + many + j % many
+    sides = [(i, j, j + count), (i, j + count, i + count)]
+    ends = [(low, j, i), (high, i + count, j + count)]
+    if hole is not None:
+        ends += [(low, low_j, j), (high, j + count, high_j)]
+        sides += [(low, high_j, low_j), (low, high, high_j)]
+    triangles = np.concatenate([np.column_stack(t) for t in sides + ends])
+    return check_surface(points, triangles, name)
+
+
+def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
+    """The same shape as a beam along z, height along y.
+
+    Args:
+        shape: one of ``SHAPES``.
+        lengths: by name [m].
+        nu: [-] Poisson's ratio, for the shear factors.
+
+    Returns:
+        Its one piece.
+
+    Raises:
+        BadInput: the shape or a length is not proper.
+    """
+    check_shape(shape, lengths)
+    top = [0.0, 0.0, lengths["length"]]
+    r = lengths.get("radius", 0.0)
+    if shape == "cone":
+        taper = lengths["tip_radius"] - r
+
+        def section(t: float) -> Section:
+            return round_section(r + taper * t, nu)
+
+        return [straight_piece([0, 0, 0], top, section, [0, 1, 0])]
+    constant = declared_section({k: v for k, v in lengths.items() if k != "length"}, nu)
+    return [straight_piece([0, 0, 0], top, constant, [0, 1, 0])]

@@ -1,0 +1,84 @@
+"""A curved patch of no known shape, as smooth as its facets let one guess.
+
+Between the corners a facet is lifted toward what the corners' normals say: half of the
+mean of the projections onto the corners' tangent planes (Boubekeur & Alexa 2008, Phong
+tessellation).  On an arc of half-angle a this leaves a^4 of the radius where a flat
+facet leaves a^2.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.surface.surface import area_vectors
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """A patch of triangles, lifted.
+
+    Attributes:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices, outward.
+        normals: (n, 3) unit normals at the points, filled in from this patch alone.
+    """
+
+    points: NDArray
+    triangles: NDArray
+    normals: NDArray = field(init=False)
+    _mesh: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        import pyvista
+
+        mesh = pyvista.PolyData.from_regular_faces(self.points, self.triangles)
+        object.__setattr__(self, "_mesh", mesh)
+        object.__setattr__(self, "normals", self._corner_normals())
+
+    def _corner_normals(self) -> NDArray:
+        """Facets' normals averaged at corners, weighted by the angle there."""
+        facing = area_vectors(self.points, self.triangles)
+        facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
+        corners = self.points[self.triangles]
+        total = np.zeros_like(self.points)
+        for k in range(3):
+            u = corners[:, (k + 1) % 3] - corners[:, k]
+            v = corners[:, (k + 2) % 3] - corners[:, k]
+            sine = np.linalg.norm(np.cross(u, v), axis=1)
+            angle = np.arctan2(sine, np.einsum("ij,ij->i", u, v))
+            np.add.at(total, self.triangles[:, k], angle[:, None] * facing)
+        return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+
+    def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        """Signed distances (n,) [m] from the lifted facets, and unit gradients."""
+        cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
+        members = self.triangles[np.atleast_1d(cell)]
+        foot = np.atleast_2d(foot)
+        corners, normals = self.points[members], self.normals[members]
+        share = _barycentric(corners, foot)
+        height = np.einsum("pci,pci->pc", corners - foot[:, None], normals)
+        lift = 0.5 * np.einsum("pc,pc,pci->pi", share, height, normals)
+        facing = np.einsum("pc,pci->pi", share, normals)
+        facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
+        return np.einsum("pi,pi->p", points - foot - lift, facing), facing
+
+
+def _barycentric(corners: NDArray, points: NDArray) -> NDArray:
+    """(p, 3) shares of the corners (p, 3, 3) in points of their planes."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.maximum(np.einsum("pi,pi->p", normal, normal), 1e-300)
+    shares = [
+        np.einsum(
+            "pi,pi->p",
+            normal,
+            np.cross(
+                corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3],
+                points - corners[:, (k + 1) % 3],
+            ),
+        )
+        / size
+        for k in range(3)
+    ]
+    return np.stack(shares, axis=1)

@@ -1,0 +1,160 @@
+"""Where a link meets its joints: a plane of its surface, a disc, a bearing bore."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.table import (
+    BadInput,
+    comma_numbers,
+    describe,
+    nearest,
+    number_array,
+)
+from stiffness.beam.beam import unit_vector
+
+_EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """The part of a link's surface that a joint holds, in the mesh's axes.
+
+    Attributes:
+        kind: ``"plane"`` all of the surface on a plane; ``"disc"`` what lies on the
+            plane within a radius of the point; ``"bore"`` a cylindrical seat.
+        point: (3,) [m] on the plane; the disc's centre; on the bore's axis, where its
+            screws are read.
+        direction: (3,) unit normal of the plane, or axis of the bore.
+        radius: [m] of the disc or the bore; infinite for a plane.
+    """
+
+    kind: str
+    point: NDArray
+    direction: NDArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        point = np.array(self.point, dtype=float)
+        direction = unit_vector(f"{self.kind} direction", self.direction)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise BadInput(f"{self.kind}: the point must be 3 finite numbers [m]")
+        if not self.radius > 0:
+            raise BadInput(f"{self.kind}: radius = {self.radius:g} must be > 0 [m]")
+        for name, array in (("point", point), ("direction", direction)):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __str__(self) -> str:
+        p, d = (",".join(f"{v:g}" for v in a) for a in (self.point, self.direction))
+        radius = "" if math.isinf(self.radius) else f"/{self.radius:g}"
+        return f"{self.kind}={p}/{d}{radius}"
+
+    def distance(self, points: ArrayLike) -> NDArray:
+        """Distance of points from the interface's plane or cylinder.
+
+        Args:
+            points: (..., 3) [m].
+
+        Returns:
+            (...) [m] >= 0.
+        """
+        offset = np.asarray(points, dtype=float) - self.point
+        along = offset @ self.direction
+        if self.kind != "bore":
+            return np.abs(along)
+        across = offset - along[..., None] * self.direction
+        return np.abs(np.linalg.norm(across, axis=-1) - self.radius)
+
+
+def parse_interface(text: object, place: str = "interface") -> Interface:
+    """An interface as people write it, on the command line or in a robot file.
+
+    Args:
+        text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
+            ``"disc=px,py,pz/nx,ny,nz/r"``, ``"plane=px,py,pz/nx,ny,nz"``, or a table
+            ``{plane = {point, normal}, radius}`` or ``{bore = {point, axis, radius}}``.
+            All in metres, in the mesh's axes.
+        place: where it stands, for the message.
+
+    Returns:
+        The interface.
+
+    Raises:
+        BadInput: it is none of these.
+    """
+    try:
+        if isinstance(text, str):
+            return _from_text(text)
+        if isinstance(text, Mapping):
+            return _from_table(text)
+        raise BadInput(f"found {describe(text)}, expected {_EXPECTED}")
+    except BadInput as error:
+        raise BadInput(f"{place}: {error}") from None
+
+
+def _from_text(text: str) -> Interface:
+    """An interface of one line."""
+    kind, equals, value = (part.strip() for part in text.partition("="))
+    parts = [comma_numbers(part) for part in value.split("/")]
+    lengths = [len(part) for part in parts]
+    if equals and kind in _AXES and lengths == [1]:
+        direction = np.array(_AXES[kind])
+        return Interface("plane", parts[0][0] * direction, direction, math.inf)
+    if equals and kind == "plane" and lengths == [3, 3]:
+        return Interface("plane", parts[0], parts[1], math.inf)
+    if equals and kind in {"bore", "disc"} and lengths == [3, 3, 1]:
+        return Interface(kind, parts[0], parts[1], float(parts[2][0]))
+    raise BadInput(f"found {describe(text)}, expected {_EXPECTED}")
+
+
+def _from_table(table: Mapping) -> Interface:
+    """An interface from a table of a robot file."""
+    kind = "bore" if "bore" in table else "plane"
+    known = {"bore"} if kind == "bore" else {"plane", "radius"}
+    _refuse_unknown(table, known, "")
+    inner = table.get(kind)
+    if not isinstance(inner, Mapping):
+        raise BadInput(f"found {describe(dict(table))}, expected {_EXPECTED}")
+    if kind == "bore":
+        _refuse_unknown(inner, {"point", "axis", "radius"}, "bore: ")
+        radius = _length(inner, "radius", "bore.radius")
+        return Interface(
+            "bore", _vector(inner, "point"), _vector(inner, "axis"), radius
+        )
+    _refuse_unknown(inner, {"point", "normal"}, "plane: ")
+    point, normal = _vector(inner, "point"), _vector(inner, "normal")
+    if "radius" not in table:
+        return Interface("plane", point, normal, math.inf)
+    return Interface("disc", point, normal, _length(table, "radius", "radius"))
+
+
+def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
+    """One error for a key that does not belong there."""
+    for key in table:
+        if key not in known:
+            raise BadInput(f'{place}unknown key "{key}"{nearest(str(key), known)}')
+
+
+def _vector(table: Mapping, key: str) -> NDArray:
+    """Three finite numbers of a table."""
+    value = table.get(key)
+    array = number_array(value.tolist() if isinstance(value, np.ndarray) else value)
+    if array is None or array.shape != (3,) or not np.isfinite(array).all():
+        found = describe(value) if key in table else "nothing"
+        raise BadInput(f"{key}: found {found}, expected 3 finite numbers")
+    return array
+
+
+def _length(table: Mapping, key: str, name: str) -> float:
+    """A positive length of a table."""
+    value = table.get(key)
+    array = number_array([value])
+    if array is None or not (np.isfinite(array[0]) and array[0] > 0):
+        found = describe(value) if key in table else "nothing"
+        raise BadInput(f"{name}: found {found}, expected a finite number > 0 [m]")
+    return float(array[0])

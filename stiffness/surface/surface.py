@@ -1,0 +1,308 @@
+"""A link's surface from a file: read, checked, repaired with the repair named."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, describe, nearest
+
+UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
+FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
+_LARGEST_LINK = 20.0  # [m] diagonal; beyond it the unit is taken to be wrong
+_SMALLEST_LINK = 1e-3  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed surface of triangles seen counterclockwise from outside.
+
+    Attributes:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices of points.
+        name: of the file, for messages.
+        repairs: what had to be put right, in words.
+    """
+
+    points: NDArray
+    triangles: NDArray
+    name: str
+    repairs: tuple[str, ...] = ()
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def normals(self) -> NDArray:
+        """(m, 3) [m^2] outward, as long as the triangle's area."""
+        return area_vectors(self.points, self.triangles)
+
+    @property
+    def volume(self) -> float:
+        """[m^3] inside."""
+        return signed_volume(self.points, self.triangles)
+
+    @property
+    def area(self) -> float:
+        """[m^2]."""
+        return float(np.linalg.norm(self.normals(), axis=1).sum())
+
+    @property
+    def diagonal(self) -> float:
+        """[m] of the bounding box."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def digest(self) -> str:
+        """Fingerprint of the geometry alone, to the last bit."""
+        content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
+        content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
+        return content.hexdigest()
+
+
+def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
+    """Normals of triangles, as long as their areas.
+
+    Args:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices.
+
+    Returns:
+        (m, 3) [m^2].
+    """
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    return np.cross(b - a, c - a) / 2
+
+
+def signed_volume(points: NDArray, triangles: NDArray) -> float:
+    """Volume inside a closed surface, negative when it is inside out.
+
+    Args:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices.
+
+    Returns:
+        [m^3].
+    """
+    origin = points.mean(axis=0)
+    a, b, c = np.moveaxis(points[triangles] - origin, 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def read_surface(path: Path | str, unit: str = "m") -> Surface:
+    """Read a surface and refuse what bounds no solid.
+
+    Args:
+        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed.
+        unit: of the file's coordinates: m, cm, mm, um or inch; a STEP file states its
+            own, which counts.
+
+    Returns:
+        The surface in metres, closed and outward.
+
+    Raises:
+        BadInput: the file cannot be read, or holds no single closed surface of a
+            plausible size.
+    """
+    if unit not in UNITS:
+        raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
+    path = Path(path)
+    points, triangles = _read_triangles(path)
+    if path.suffix.lower() in {".step", ".stp"}:
+        unit = "m"
+    return check_surface(points * UNITS[unit], triangles, str(path), unit)
+
+
+def _read_triangles(path: Path) -> tuple[NDArray, NDArray]:
+    """Points and triangles of a file, as they stand there."""
+    if path.suffix.lower() not in FORMATS:
+        found = nearest(path.suffix, FORMATS)
+        raise BadInput(f"{path}: unknown kind of surface file{found}")
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise BadInput(f"{path}: the file is empty")
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
+    from stiffness.surface.surface_files import read_triangles
+
+    return read_triangles(path)
+
+
+def check_surface(
+    points: NDArray, triangles: NDArray, name: str, unit: str = "m"
+) -> Surface:
+    """Check and put right a surface.
+
+    Args:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices.
+        name: for messages.
+        unit: the unit that was stated, for messages.
+
+    Returns:
+        The surface: vertices merged, degenerate triangles dropped, turned outward.
+
+    Raises:
+        BadInput: nothing there, not finite, of an implausible size, open, with edges
+            shared by more than two triangles, self-intersecting, or of several bodies.
+    """
+    if len(triangles) == 0:
+        raise BadInput(f"{name}: holds no triangles")
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise BadInput(f"{name}: a triangle has a corner that is not among the points")
+    _check_coordinates(points, triangles, name, unit)
+    points, triangles, repairs = _merge(points, triangles)
+    if len(triangles) < 4:
+        raise BadInput(f"{name}: {len(triangles)} proper triangles bound no solid")
+    _check_closed(points, triangles, name)
+    triangles, turned = _orient(points, triangles, name)
+    from stiffness.surface.intersections import crossing_triangles
+
+    crossing = crossing_triangles(points, triangles)
+    if len(crossing):
+        where = points[triangles[crossing[0]]].reshape(-1, 3).mean(axis=0)
+        raise BadInput(
+            f"{name}: the surface cuts itself at {len(crossing)} pairs of triangles, "
+            f"first near {_place(where)}; unite the parts before meshing"
+        )
+    return Surface(points, triangles, name, (*repairs, *turned))
+
+
+def _place(point: NDArray) -> str:
+    """A point for a message."""
+    return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
+
+
+def _check_coordinates(
+    points: NDArray, triangles: NDArray, name: str, unit: str
+) -> None:
+    """Refuse coordinates that are not finite, or a size that betrays the unit."""
+    used = points[np.unique(triangles)]
+    wrong = ~np.isfinite(used).all(axis=1)
+    if wrong.any():
+        raise BadInput(f"{name}: {wrong.sum()} vertices are not finite numbers")
+    size = math.hypot(*np.ptp(used, axis=0))
+    if not _SMALLEST_LINK <= size <= _LARGEST_LINK:
+        hint = "mm" if size > _LARGEST_LINK and unit == "m" else "m"
+        raise BadInput(
+            f'{name}: the part is {size:.4g} m across with unit = "{unit}"; '
+            f'is the file in "{hint}"?'
+        )
+
+
+def _merge(points: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, list[str]]:
+    """Vertices at one place become one; triangles without area go."""
+    repairs = []
+    used, triangles = np.unique(triangles, return_inverse=True)
+    points, triangles = points[used], triangles.reshape(-1, 3)
+    points, index = np.unique(points, axis=0, return_inverse=True)
+    triangles = index.reshape(-1)[triangles]
+    from scipy.spatial import cKDTree
+
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(1e-7 * size, output_type="ndarray")
+    if len(pairs):
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        shape = (len(points), len(points))
+        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape)
+        _, label = connected_components(graph, directed=False)
+        _, first = np.unique(label, return_index=True)
+        points, triangles = points[first], label[triangles]
+        repairs.append(f"{len(pairs)} pairs of nearly equal vertices merged")
+    a, b, c = triangles.T
+    flat = (a == b) | (b == c) | (c == a)
+    if flat.any():
+        repairs.append(f"{flat.sum()} triangles without area dropped")
+    return points, triangles[~flat], repairs
+
+
+def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
+    """Every edge must be shared by exactly two triangles."""
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    if (count == 1).any():
+        where = points[edges[count == 1][0]].mean(axis=0)
+        raise BadInput(
+            f"{name}: the surface is open: {(count == 1).sum()} edges have a triangle "
+            f"on one side only, first near {_place(where)}; close it before meshing"
+        )
+    if (count > 2).any():
+        where = points[edges[count > 2][0]].mean(axis=0)
+        raise BadInput(
+            f"{name}: {(count > 2).sum()} edges are shared by more than two triangles, "
+            f"first near {_place(where)}; a solid's surface has two at each"
+        )
+
+
+def _orient(
+    points: NDArray, triangles: NDArray, name: str
+) -> tuple[NDArray, list[str]]:
+    """Turn all triangles outward; refuse several bodies."""
+    triangles, shell, flipped = _orient_shells(triangles)
+    repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
+    shells = [triangles[shell == k] for k in range(shell.max() + 1)]
+    volumes = np.array([signed_volume(points, part) for part in shells])
+    main = int(np.argmax(np.abs(volumes)))
+    if abs(volumes[main]) < 1e-12 * np.linalg.norm(np.ptp(points, axis=0)) ** 3:
+        raise BadInput(f"{name}: the surface encloses no volume")
+    for k, part in enumerate(shells):
+        cavity = k != main
+        if cavity and not _inside(points[part[0, 0]], points, shells[main]):
+            raise BadInput(
+                f"{name}: {len(shells)} separate bodies, the second near "
+                f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; one link is one"
+            )
+        if (volumes[k] < 0) != cavity:
+            shells[k] = part[:, ::-1]
+            what = "a cavity was" if cavity else "the surface was"
+            repairs.append(f"{what} inside out and has been turned")
+    return np.concatenate(shells), repairs
+
+
+def _orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
+    """Make neighbours agree; shell number of each triangle, and how many turned."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    count = len(triangles)
+    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    owner = np.repeat(np.arange(count), 3)
+    order = np.lexsort(np.sort(directed, axis=1).T)
+    first, second = order[::2], order[1::2]  # closed: edges come in pairs
+    left, right = owner[first], owner[second]
+    same = directed[first, 0] == directed[second, 0]  # neighbours that disagree
+    ends = (np.r_[left, right], np.r_[right, left])
+    graph = coo_array((np.r_[same, same] + 1.0, ends), (count, count)).tocsr()
+    shells, shell = connected_components(graph, directed=False)
+    flip = np.zeros(count, dtype=bool)
+    for k in range(shells):
+        start = int(np.flatnonzero(shell == k)[0])
+        visit, parent = breadth_first_order(graph, start, directed=False)
+        disagree = np.zeros(count, dtype=bool)
+        link = np.asarray(graph[visit[1:], parent[visit[1:]]]).ravel()
+        disagree[visit[1:]] = link % 2 == 0
+        for i in visit[1:]:
+            flip[i] = flip[parent[i]] ^ disagree[i]
+        members = shell == k
+        if flip[members].sum() * 2 > members.sum():
+            flip[members] = ~flip[members]
+    turned = np.where(flip[:, None], triangles[:, ::-1], triangles)
+    return turned, shell, int(flip.sum())
+
+
+def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
+    """Whether a surface goes around a point (its solid angle is 4 pi)."""
+    a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    top = np.einsum("ij,ij->i", a, np.cross(b, c))
+    bottom = la * lb * lc + (
+        np.einsum("ij,ij->i", a, b) * lc
+        + np.einsum("ij,ij->i", b, c) * la
+        + np.einsum("ij,ij->i", c, a) * lb
+    )
+    return bool(abs(np.sum(2 * np.arctan2(top, bottom))) > 2 * np.pi)

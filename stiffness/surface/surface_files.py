@@ -1,0 +1,103 @@
+"""The kinds of file a surface comes in."""
+
+import io
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput
+
+_FACETS = 48  # of a full circle, in STEP
+
+
+def read_triangles(path: Path | str) -> tuple[NDArray, NDArray]:
+    """Points and triangles of a surface file, in the file's unit; STEP in metres.
+
+    Args:
+        path: an existing file of a known kind.
+
+    Returns:
+        (n, 3) points and (m, 3) indices of points.
+
+    Raises:
+        BadInput: the content is not what the name says, or the package that reads it
+            is not installed.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    read = {".msh": _msh, ".step": _step, ".stp": _step}.get(suffix, _with_vtk)
+    try:
+        points, faces = read(path)
+    except BadInput:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a foreign reader does
+        raise BadInput(f"{path}: not a readable {suffix[1:].upper()} file") from error
+    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+        raise BadInput(f"{path}: holds no triangles, or is not {suffix[1:].upper()}")
+    return np.array(points, dtype=float), faces.astype(np.int64)
+
+
+def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
+    """What VTK reads: STL, OBJ, PLY, VTK, VTP."""
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    vtkObject.GlobalWarningDisplayOff()
+    return _boundary(pyvista.read(path))
+
+
+def _boundary(mesh: Any) -> tuple[NDArray, NDArray]:
+    """Points and triangles of a VTK mesh, the boundary of its volume if it has one."""
+    import pyvista
+
+    if not isinstance(mesh, pyvista.PolyData):
+        mesh = mesh.extract_surface(algorithm="dataset_surface")
+    mesh = mesh.triangulate()
+    faces = mesh.regular_faces if mesh.n_cells else np.empty((0, 3))
+    return np.asarray(mesh.points), np.asarray(faces)
+
+
+def _msh(path: Path) -> tuple[NDArray, NDArray]:
+    """Gmsh's MSH 2.2 and 4.1: its surface elements, else the volume's boundary."""
+    import meshio
+    import pyvista
+
+    # meshio prints an empty line, and its errors before it leaves the program
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        mesh = meshio.read(path, "gmsh")
+    blocks = [b for b in mesh.cells if b.dim == 2] or [
+        b for b in mesh.cells if b.dim == 3
+    ]
+    if not blocks:
+        raise BadInput(f"{path}: holds neither triangles nor tetrahedra")
+    cells = [(b.type, b.data) for b in blocks]
+    return _boundary(pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
+
+
+def _step(path: Path) -> tuple[NDArray, NDArray]:
+    """STEP cut into fine triangles, in metres by the file's own unit."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        reason = "" if isinstance(error, ImportError) else f" ({error})"
+        raise BadInput(
+            f"{path}: STEP needs the package gmsh{reason}; install forcefit[gmsh], or "
+            "export the surface as STL"
+        ) from None
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
+        gmsh.open(str(path))
+        gmsh.model.mesh.generate(2)
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        corners = gmsh.model.mesh.getElementsByType(2)[1]
+    finally:
+        gmsh.finalize()
+    index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
+    index[tags.astype(np.int64)] = np.arange(len(tags))
+    return points.reshape(-1, 3), index[corners.astype(np.int64)].reshape(-1, 3)

@@ -1,0 +1,143 @@
+"""Draws of the errors under loads and weight: the same laws, and what follows."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.error_distributions import draw_generator, tolerance_sources
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.play import settle_play
+from forcefit.commands.statistics import app
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import random_robot
+
+LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]
+GRAVITY = [1.0, 2.0, -9.81]
+
+
+def some_errors(robot, count=8):
+    sources = tolerance_sources(robot, [4e-3] * 3 + [2e-4] * 3)
+    return sources.errors(sources.draw(0, count, seed=4))
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "five_bar", "3rrr", "hexapod", "arm6"])
+@pytest.mark.parametrize("gravity", [None, GRAVITY])
+def test_draws_under_load_agree_with_one_solve_at_a_time(name, gravity):
+    """Both certify 1e-8 of the energy and 1e-12 of that without play."""
+    robot = load_robot(name)
+    posture = place_robot(robot)
+    errors = some_errors(robot)
+    one = prepare_energies(posture, LOAD, gravity)
+    found = one.solve(errors)
+    wrenches = one.wrenches(found.multipliers)
+    for i, own in enumerate(errors):
+        erring = replace(posture, robot=robot.with_errors(own))
+        answer = solve_assembly(erring, LOAD, gravity=gravity)
+        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_play
+        assert found.energy[i] - found.bound[i] <= allowed
+        assert found.energy[i] == pytest.approx(answer.energy, rel=1e-6)
+        size = np.abs(answer.wrenches).max()
+        np.testing.assert_allclose(wrenches[i], answer.wrenches, atol=1e-4 * size)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_robots_agree_whatever_their_ranks(seed):
+    """Rigid rows, bounded joints and parts that stay open among them."""
+    robot = random_robot(np.random.default_rng(seed))
+    posture = home_posture(robot)
+    errors = np.random.default_rng(seed).normal(size=(3, len(robot.frames), 6)) * 1e-4
+    try:
+        one = prepare_energies(posture, LOAD)
+    except ValueError:
+        with pytest.raises(ValueError, match="motion"):
+            solve_assembly(posture, LOAD)
+        return
+    found = one.solve(errors)
+    for i, own in enumerate(errors):
+        try:
+            answer = solve_assembly(
+                replace(posture, robot=robot.with_errors(own)), LOAD
+            )
+        except Exception:
+            assert np.isnan(found.energy[i])
+            continue
+        assert found.energy[i] == pytest.approx(answer.energy, rel=1e-6, abs=1e-12)
+
+
+def cantilever():
+    """A steel bar of 1 m and 20 mm that hangs from nothing else."""
+    bar = BeamLink({"radius": 0.01}, 200e9, 0.3, theory="euler")
+    frames = (Frame("tip", translation=[1.0, 0, 0], link=bar),)
+    return home_posture(Robot("bar", "tip", frames))
+
+
+def test_a_cantilever_stores_f2_l3_over_6ei_whatever_its_errors():
+    """And its root carries F L: force and moment through the body, stress F L / W."""
+    posture, F = cantilever(), 100.0
+    sources = tolerance_sources(posture.robot, [1e-3] * 3 + [1e-4] * 3)
+    load = (0.0, 0.0, 0.0, 0.0, 0.0, -F)
+    data = run_draws(Experiment(posture, sources, margins=False, load=load), 20)
+    second = np.pi * 0.01**4 / 4
+    np.testing.assert_allclose(data["energy"], F**2 / (6 * 200e9 * second), rtol=1e-9)
+    np.testing.assert_allclose(data["force"], F, rtol=1e-9)
+    np.testing.assert_allclose(data["stress"], F * 0.01 / second, rtol=1e-2)
+    sag = data["platform_screw"].values[:, 5] - sources.draw(0, 20, 1)[:, 5]
+    np.testing.assert_allclose(sag, -F / (3 * 200e9 * second), rtol=1e-9)
+
+
+@pytest.mark.parametrize("play", ["uniform", "contact"])
+@pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -1], [0, 0, 0, 1, 0, 0]])
+def test_play_that_is_left_does_no_work_on_the_load(play, load):
+    """Else the least of energy minus work would have used it."""
+    robot = load_robot("3rrr")
+    one = prepare_energies(home_posture(robot), load)
+    found = one.solve(some_errors(robot) / 50)
+    generators = [draw_generator(1, d, 1) for d in range(8)]
+    settled, mixed = settle_play(one, found, play, generators)
+    assert mixed.all()
+    moved = settled - found.platform_screw
+    assert np.abs(moved).max() > 3e-5
+    assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()
+
+
+def test_a_load_on_a_free_motion_is_refused():
+    frames = (
+        Frame("pin", joint="revolute"),
+        Frame("tip", "pin", translation=[0.3, 0, 0]),
+    )
+    robot = Robot("swing", "tip", frames)
+    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
+    swing = Experiment(home_posture(robot), sources, load=(0, 0, 0, 0, 1.0, 0))
+    with pytest.raises(BadInput, match=r"^swing: .*motion"):
+        run_draws(swing, 4)
+
+
+def test_the_command_takes_load_and_gravity(tmp_path):
+    """A hundredfold load exceeds a limit on force that the errors alone do not."""
+    robot = cantilever().robot
+    write_robot(robot, tmp_path / "bar.toml")
+    (tmp_path / "errors.toml").write_text(
+        '[[errors]]\nframes = ["tip"]\nmost = [0, 0, 0, 1e-4, 1e-4, 1e-4]\n'
+    )
+    said = []
+    for load in ("fz=-1", "fz=-100"):
+        done = CliRunner().invoke(app, [
+            "statistics", str(tmp_path / "bar.toml"), "--errors",
+            str(tmp_path / "errors.toml"), "--draws", "50", "--load", load, "--limit",
+            "force=50", "--gravity", "z=-9.81", "--json", "-",
+        ])  # fmt: skip
+        assert done.exit_code == 0, done.output
+        said.append(json.loads(done.stdout))
+    assert [one["exceeds"]["force"]["probability"] for one in said] == [0.0, 1.0]
+    assert said[1]["load"] == [0, 0, 0, 0, 0, -100]
+    assert said[1]["gravity"] == [0, 0, -9.81]

@@ -1,0 +1,172 @@
+"""Batched bounds of (27) against one posture at a time, on many robots."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.test_pose_error import hinged_frame
+
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.batch.many_postures import minimise_energies
+from assembly.kinematics.posture import home_posture, place_many
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import BUILT_IN, load_robot
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
+
+PARTS = ("rotation_error", "translation_error")
+
+
+@pytest.fixture(scope="module")
+def grid():
+    """The paper's robot with the first draw, at 15 poses of its workspace."""
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    poses = np.full((15, 6), np.nan)
+    mesh = np.meshgrid(np.linspace(-0.3, 0.3, 5), np.linspace(-0.6, -0.2, 3))
+    poses[:, 0], poses[:, 2] = (axis.ravel() for axis in mesh)
+    postures = place_many(robot, poses)[0]
+    T = np.array([p.transforms for p in postures])
+    return robot, postures, T, np.array([p.mismatch for p in postures])
+
+
+def assert_overlap(batch, i, one, uncertain=2e-7):
+    """Both brackets hold the truth; the two solutions of (22) differ by the root of
+    their gaps, 1e-8 and less of the energy.
+    """
+    for name in PARTS:
+        low, high = getattr(batch, name)[i]
+        other = getattr(one, name)
+        assert high - low <= 1e-6
+        assert low <= other[1] + uncertain
+        assert high >= other[0] - uncertain
+        screw = getattr(batch, name.replace("error", "screw"))[i]
+        half = screw[:3] if name.startswith("r") else screw[3:]
+        assert np.linalg.norm(half) == pytest.approx(low, rel=1e-12, abs=1e-18)
+
+
+@pytest.mark.parametrize("reading", ["frozen", "free"])
+@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.2, 1.0])
+def test_batch_brackets_what_one_at_a_time_brackets(grid, reading, kappa):
+    robot, postures, T, off = grid
+    scaled = robot.with_errors(kappa * robot.errors)
+    batch = bound_pose_errors(scaled, T, reading, mismatch=off)
+    assert set(batch.status) == {"ok"}
+    assert batch.slower.sum() <= 1
+    for i in range(0, len(T), 4):
+        one = bound_pose_error(
+            solve_assembly(replace(postures[i], robot=scaled)), reading
+        )
+        assert_overlap(batch, i, one)
+
+
+def test_energies_at_hand_and_the_split_of_a_batch_change_no_bit(grid):
+    robot, _, T, off = grid
+    errors = 0.2 * robot.errors
+    energies = minimise_energies(robot, T, errors, off)
+    whole = bound_pose_errors(robot, T, "free", errors, off, energies)
+    for part in (slice(0, 1), slice(1, None)):
+        some = bound_pose_errors(robot, T[part], "free", errors, off[part])
+        for name in (*PARTS, "rotation_screw", "translation_screw", "supports"):
+            assert np.array_equal(getattr(some, name), getattr(whole, name)[part]), name
+
+
+def test_errors_of_their_own_another_point_and_tighter_tolerances(grid, rng):
+    robot, postures, T, off = grid
+    errors = rng.uniform(-0.3, 0.3, (3, 1, 1)) * robot.errors
+    options = {
+        "tolerance_rotation": 1e-8, "tolerance_translation": 1e-9,
+        "offset": [0.1, -0.05, 0.2],
+    }  # fmt: skip
+    batch = bound_pose_errors(robot, T[:3], "free", errors, off[:3], **options)
+    for i in range(3):
+        own = robot.with_errors(errors[i])
+        answer = solve_assembly(replace(postures[i], robot=own))
+        assert_overlap(batch, i, bound_pose_error(answer, "free", **options))
+    assert np.diff(batch.rotation_error).max() <= 1e-8
+    assert np.diff(batch.translation_error).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_built_in_robot(name):
+    robot = load_robot(name)
+    posture = home_posture(robot)
+    answer = solve_assembly(posture)
+    for reading in ("frozen", "free"):
+        batch = bound_pose_errors(
+            robot, posture.transforms[None], reading, mismatch=posture.mismatch
+        )
+        assert_overlap(batch, 0, bound_pose_error(answer, reading))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_robots(seed):
+    robot = random_robot(np.random.default_rng(seed))
+    posture = home_posture(robot)
+    answer = solve_assembly(posture)
+    for reading in ("frozen", "free"):
+        one = bound_pose_error(answer, reading)
+        batch = bound_pose_errors(
+            robot, posture.transforms[None], reading, mismatch=posture.mismatch
+        )
+        if np.isinf([one.rotation_error[0], one.translation_error[0]]).any():
+            assert batch.slower[0]
+            assert tuple(batch.rotation_error[0]) == one.rotation_error
+            assert tuple(batch.translation_error[0]) == one.translation_error
+        else:
+            assert_overlap(batch, 0, one)
+
+
+@pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
+@pytest.mark.parametrize("reading", ["frozen", "free"])
+def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
+    """The compiled road answers where no play comes near them, the other elsewhere."""
+    posture = home_posture(hinged_frame(spin))
+    one = bound_pose_error(solve_assembly(posture), reading)
+    batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
+    assert_overlap(batch, 0, one)
+    assert batch.slower[0] == (0.0 < spin < 1e-3)
+    loose = home_posture(hinged_frame(None))
+    most = bound_pose_errors(loose.robot, loose.transforms[None], reading)
+    less = batch.rotation_error[0, 1] < 0.99 * most.rotation_error[0, 0]
+    assert less == (spin < 1e-3)
+
+
+def test_the_budget_goes_one_at_a_time():
+    robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]))
+    posture = home_posture(robot)
+    batch = bound_pose_errors(
+        robot, posture.transforms[None], "budget", energy_budget=0.5
+    )
+    one = bound_pose_error(solve_assembly(posture), "budget", energy_budget=0.5)
+    assert batch.slower[0]
+    assert tuple(batch.translation_error[0]) == one.translation_error
+
+
+def test_a_platform_that_moves_freely_has_no_bound():
+    robot = Robot("door", "tip", (
+        Frame("hinge", joint="revolute"),
+        Frame("tip", "hinge", [0.5, 0, 0], clearance=Clearance(radial=1e-4)),
+    ))  # fmt: skip
+    T = home_posture(robot).transforms[None]
+    batch = bound_pose_errors(robot, T)
+    assert batch.slower[0]
+    assert np.isinf(batch.rotation_error[0]).all()
+
+
+def test_what_cannot_be_assembled_has_no_bounds():
+    rigid = (Frame("a", geometric_error=[0, 0, 0, 1e-3, 0, 0]), Frame("b"))
+    robot = Robot("open", "a", rigid, (("a", "b"),))
+    batch = bound_pose_errors(robot, home_posture(robot).transforms[None])
+    assert batch.status[0] == "cannot assemble"
+    assert "stays open" in batch.reason[0]
+    assert np.isnan(batch.rotation_error).all()
+
+
+def test_bad_arguments_are_named(grid):
+    robot, _, T, off = grid
+    with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
+        bound_pose_errors(robot, T, "loose")
+    energies = minimise_energies(robot, T[:2], mismatch=off[:2])
+    with pytest.raises(ValueError, match="energies of 2 points, expected 15"):
+        bound_pose_errors(robot, T, energies=energies)

@@ -1,0 +1,377 @@
+"""Batched energies against one at a time on every kind of robot, and their proof."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.kinematics.posture import Posture, home_posture, place_many
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.zone import zone_margin
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.robots import BUILT_IN
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    random_robot,
+)
+
+
+@pytest.fixture(scope="module")
+def grid():
+    """The paper's robot with the first draw, at 45 poses of its workspace."""
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    poses = np.full((45, 6), np.nan)
+    mesh = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.6, -0.2, 5))
+    poses[:, 0], poses[:, 2] = (axis.ravel() for axis in mesh)
+    postures = [p for p in place_many(robot, poses)[0] if p is not None]
+    assert len(postures) == 43
+    return robot, postures
+
+
+def stack(postures):
+    """Frames and closure errors of postures, as the batch takes them."""
+    return (
+        np.array([p.transforms for p in postures]),
+        np.array([p.mismatch for p in postures]),
+    )
+
+
+def assert_same(batch, i, one):
+    """Within what the two certificates allow: least energies lie in both intervals."""
+    assert one.unproved == ""
+    allowed = batch.gap[i] + one.duality_gap() + 1e-12 * one.energy_without_play
+    assert abs(batch.energy[i] - one.energy) <= allowed + 1e-30
+    assert batch.energy_without_play[i] == pytest.approx(
+        one.energy_without_play, rel=1e-7, abs=1e-30
+    )
+    assert batch.bound[i] <= one.energy * (1 + 1e-12) + 1e-30
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 0.2, 0.5, 1.0])
+def test_batch_equals_one_at_a_time_and_proves_every_point(grid, kappa):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = minimise_energies(robot, T, kappa * robot.errors, mismatch)
+    assert batch.certified.all()
+    assert batch.fallbacks() == {}
+    assert batch.closure_residual.max() < 1e-13
+    assert batch.clearance_excess.max() < 1e-14
+    scaled = robot.with_errors(kappa * robot.errors)
+    for i in range(0, len(postures), 6):
+        one = solve_assembly(replace(postures[i], robot=scaled))
+        assert_same(batch, i, one)
+        if kappa < 0.5:
+            continue  # play is left, and the platform's screw with it
+        # a gap moves the answer by its root: 1e-4 of it for 1e-8
+        size = np.abs(one.platform_screw).reshape(2, 3).max(axis=1).repeat(3)
+        off = np.abs(batch.platform_screw[i] - one.platform_screw)
+        assert np.all(off < 1e-4 * size)
+
+
+def test_all_play_used_up_leaves_no_choice_of_screw(grid):
+    """Where every clearance presses, the optimum is unique: 1e-8, not 1e-4."""
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = minimise_energies(robot, T, mismatch=mismatch)
+    newton = np.flatnonzero(batch.road == 0)
+    assert len(newton) > 5
+    for i in newton[:5]:
+        one = solve_assembly(postures[i])
+        size = np.abs(one.platform_screw).reshape(2, 3).max(axis=1).repeat(3)
+        off = np.abs(batch.platform_screw[i] - one.platform_screw)
+        assert np.all(off < 1e-6 * size)
+
+
+def test_multipliers_are_the_closure_wrenches_of_the_single_answer(grid):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = minimise_energies(robot, T, mismatch=mismatch)
+    for i in (0, 20):
+        one = solve_assembly(postures[i])
+        proved = replace(one, multipliers=batch.multipliers[i]).bound
+        assert proved == pytest.approx(batch.bound[i], rel=1e-9)
+        assert proved >= one.energy * (1 - 2e-8)
+
+
+def test_the_split_of_a_batch_changes_no_bit(grid):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    whole = minimise_energies(robot, T, 0.2 * robot.errors, mismatch)
+    for part in (slice(0, 1), slice(1, 8), slice(8, None)):
+        some = minimise_energies(robot, T[part], 0.2 * robot.errors, mismatch[part])
+        for name in ("energy", "bound", "platform_screw", "clearances", "multipliers"):
+            assert np.array_equal(getattr(some, name), getattr(whole, name)[part]), name
+
+
+def test_errors_of_their_own_for_every_point(grid, rng):
+    """Many draws at one pose: each is the answer of the robot with those errors."""
+    robot, postures = grid
+    factors = rng.uniform(-1, 1, (4, *robot.errors.shape))
+    errors = factors * robot.errors
+    T = np.broadcast_to(postures[3].transforms, (4, *postures[3].transforms.shape))
+    batch = minimise_energies(robot, T, errors)
+    assert batch.certified.all()
+    for i in range(4):
+        own = robot.with_errors(errors[i])
+        assert_same(batch, i, solve_assembly(replace(postures[3], robot=own)))
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+@pytest.mark.parametrize("size", [1e-5, 1e-3])
+def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
+    home = home_posture(BUILT_IN[name]())
+    robot = home.robot
+    T = np.broadcast_to(home.transforms, (3, *home.transforms.shape))
+    errors = size * rng.normal(size=(3, len(robot.frames), 6))
+    if name == "irsbot2":  # its proximal loops are rigid and perfect
+        errors[:, ~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
+    batch = minimise_energies(robot, T, errors, home.mismatch)
+    assert batch.certified.all()
+    assert batch.fallbacks() == {}
+    for i in range(3):
+        one = solve_assembly(replace(home, robot=robot.with_errors(errors[i])))
+        assert_same(batch, i, one)
+        if not len(batch.joints.group):
+            assert batch.platform_screw[i] == pytest.approx(one.platform_screw)
+
+
+def test_random_robots_give_the_single_answer_or_go_the_slower_road():
+    compiled = 0
+    for seed in range(120):
+        rng = np.random.default_rng(seed)
+        robot = random_robot(rng, legs=1 + seed % 3, joints=1 + seed // 3 % 3)
+        home = home_posture(robot)
+        batch = minimise_energies(robot, home.transforms[None], None, home.mismatch)
+        compiled += batch.road[0] < 2
+        if batch.status[0] != "ok":
+            assert batch.status[0] == "cannot assemble"
+            with pytest.raises(CannotAssemble) as error:
+                solve_assembly(home)
+            assert batch.reason[0] == str(error.value)
+            assert np.isnan(batch.energy[0])
+            assert not batch.certified[0]
+            continue
+        one = solve_assembly(home)
+        assert_same(batch, 0, one)
+        if batch.road[0] < 2:
+            assert batch.certified[0]
+            if not len(one.clearances):  # nothing left to choose
+                size = np.abs(one.platform_screw).max() + 1e-12
+                off = np.abs(batch.platform_screw[0] - one.platform_screw)
+                assert off.max() < 1e-9 * size
+    assert compiled > 40
+
+
+def test_free_motions_that_are_not_unique_are_the_least():
+    """Two pins on one axis share its turn: half each, like the single answer."""
+    gap = [1e-3, 0, 2e-3, 1e-4, 0, 0]
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(1e5 * np.eye(6))),
+        Frame("pin", "one", joint="revolute"),
+        Frame("mid", "pin"),
+        Frame("second", "mid", [0, 0, 0.1], joint="revolute"),
+        Frame("end", "second", [0, 0, -0.1]),
+        Frame("wall", translation=[0.5, 0, 0], geometric_error=gap),
+    )
+    robot = Robot("pins", "mid", frames, (("end", "wall"),))
+    home = home_posture(robot)
+    batch = minimise_energies(robot, home.transforms[None])
+    one = solve_assembly(home)
+    assert batch.road[0] < 2
+    assert batch.platform_screw[0] == pytest.approx(one.platform_screw, abs=1e-14)
+    # the pin below the platform turns half the 2e-3 rad about their common axis
+    assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_two_springs_in_series_by_hand():
+    """Energy g^2/2 k1 k2/(k1 + k2); with 1e-4 m of play only what it leaves counts."""
+    gap = np.array([0, 0, 0, 2e-4, 0, 0])
+    play = Clearance(radial=1e-4)
+    for clearance, left in ((None, 2e-4), (play, 1e-4)):
+        robot = coaxial_beams(gap, (1e6, 3e6), clearance=clearance)
+        batch = minimise_energies(robot, home_posture(robot).transforms[None])
+        assert batch.energy[0] == pytest.approx(0.75e6 * left**2 / 2, rel=1e-9)
+        assert batch.bound[0] == pytest.approx(batch.energy[0], rel=2e-8)
+
+
+def test_stiff_and_soft_springs_in_series_keep_the_stiff_one():
+    """1 and 1e-8 rad/(N m) about one axis, across it only the stiff: no sum of them."""
+    soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
+    gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(soft)),
+        Frame("end", "one", rotation=[0, 0, 0.3], link=MatrixLink(1e8 * np.eye(6))),
+        Frame("wall", translation=[0.5, 0, 0], rotation=[0, 0, 0.3],
+              geometric_error=gap),
+    )  # fmt: skip
+    robot = Robot("two", "end", frames, (("end", "wall"),))
+    batch = minimise_energies(robot, home_posture(robot).transforms[None])
+    turned = np.array([
+        gap[0] * np.cos(0.3) - gap[1] * np.sin(0.3),
+        gap[0] * np.sin(0.3) + gap[1] * np.cos(0.3),
+    ])
+    # by hand: 1 + 1e-8 about the soft axis, 2e-8 across
+    by_hand = turned[0] ** 2 / (1 + 1e-8) / 2 + turned[1] ** 2 / 2e-8 / 2
+    assert batch.energy[0] == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_what_the_compiled_road_does_not_cover_goes_the_slower_one():
+    rigid = coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0]), clearance=Clearance(1e-3))
+    frames = tuple(replace(f, link=None) for f in rigid.frames)
+    robot = replace(rigid, frames=frames)
+    T = home_posture(robot).transforms[None]
+    batch = minimise_energies(robot, T)
+    assert batch.fallbacks() == {"rigid rows": 1}
+    assert batch.energy[0] == 0.0
+    assert batch.certified[0]
+    too_far = robot.errors * 100
+    batch = minimise_energies(robot, T, too_far)
+    assert batch.status[0] == "cannot assemble"
+    assert "no play within its bounds" in batch.reason[0]
+
+
+def test_a_bound_on_a_joints_own_motion_goes_the_slower_road():
+    """A passive slider of +-1e-4 m and a gap of 3e-4: the spring takes the rest."""
+    frames = (
+        Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
+        Frame("slide", "link", joint="prismatic", clearance=Clearance(axial=1e-4)),
+        Frame("end", "slide"),
+        Frame("wall", translation=[0, 0, 0.5],
+              geometric_error=[0, 0, 0, 0, 0, 3e-4]),
+    )  # fmt: skip
+    robot = Robot("slider", "end", frames, (("end", "wall"),))
+    T = home_posture(robot).transforms[None]
+    batch = minimise_energies(robot, T)
+    assert batch.fallbacks() == {"bounded joint": 1}
+    assert batch.energy[0] == pytest.approx(1e6 * 2e-4**2 / 2, rel=1e-9)
+    assert batch.certified[0]
+    assert minimise_energies(robot, T, robot.errors / 4).fallbacks() == {}
+
+
+def test_the_certificate_refuses_a_spoilt_point(grid):
+    """Frames that are no frames: what the elimination makes of them is not believed."""
+    robot, postures = grid
+    T = postures[0].transforms[None].copy()
+    good = minimise_energies(robot, T)
+    worse = replace(good, energy=good.energy * (1 + 3e-8))
+    assert good.certified.all()
+    assert not worse.certified.any()
+    weaker = replace(good, bound=good.bound * (1 - 3e-8))
+    assert not weaker.certified.any()
+    unknown = replace(good, bound=good.bound * np.nan)
+    assert not unknown.certified.any()
+
+
+def test_a_spoilt_solver_is_caught_and_the_slower_road_taken(grid, monkeypatch):
+    """The kernel's own certificate: asked for more than is possible, it refuses."""
+    robot, postures = grid
+    from assembly.batch import compiled_energy as compiled_assembly
+
+    assemble_all = compiled_assembly.assemble_all
+
+    def spoilt(solvers, s, T, errors, mismatch, out):
+        assemble_all(solvers, s, T, errors, mismatch, out)
+        for i in range(len(T)):
+            out.energy[i] *= 1 + 1e-6
+            P = compiled_assembly.paths_of(T[i], s)
+            out.road[i] = compiled_assembly._certify(
+                i, s, P, errors[0], np.zeros(out.multipliers.shape[1]), 0, out
+            )
+
+    monkeypatch.setattr(compiled_assembly, "assemble_all", spoilt)
+    T, _ = stack(postures[:2])
+    batch = minimise_energies(robot, T)
+    assert batch.fallbacks() == {"uncertified": 2}
+    assert batch.certified.all()
+    one = solve_assembly(postures[0])
+    assert batch.energy[0] == one.energy
+
+
+@pytest.mark.parametrize(
+    ("shape", "errors", "message"),
+    [
+        ((2, 5, 4, 4), None, "transforms have shape"),
+        ((2, 6, 4, 4), (3, 6, 6), r"errors \(3, 6, 6\), expected"),
+        ((2, 6, 3, 4), None, "transforms have shape"),
+    ],
+)
+def test_wrong_shapes_are_refused(shape, errors, message):
+    robot = coaxial_beams(np.zeros(6))
+    given = None if errors is None else np.zeros(errors)
+    with pytest.raises(ValueError, match=message):
+        minimise_energies(robot, np.zeros(shape), given)
+
+
+def test_values_that_are_not_finite_are_refused():
+    robot = coaxial_beams(np.zeros(6))
+    T = home_posture(robot).transforms[None].copy()
+    with pytest.raises(ValueError, match="not all finite"):
+        minimise_energies(robot, T, np.full((6, 6), np.nan))
+    T[0, 0, 0, 3] = np.inf
+    with pytest.raises(ValueError, match="not all finite"):
+        minimise_energies(robot, T)
+
+
+def test_no_points_are_no_answers():
+    robot = coaxial_beams(np.zeros(6))
+    assert len(minimise_energies(robot, np.zeros((0, 6, 4, 4))).energy) == 0
+
+
+def test_postures_are_made_for_the_slower_road_only(grid):
+    """The batch needs frames, not coordinates: none are asked for."""
+    robot, postures = grid
+    bare = Posture(robot, np.full(42, np.nan), postures[0].transforms, 0.0)
+    assert solve_assembly(bare).energy == solve_assembly(postures[0]).energy
+
+
+def assert_same_margin(batch, i, zone):
+    """Both margins lie within 1e-8 of their common certified bounds."""
+    expected = np.inf if zone.margin is None else zone.margin
+    assert batch.margin[i] == pytest.approx(expected, rel=1e-7, abs=1e-10)
+    assert batch.bound[i] <= batch.margin[i] * (1 + 1e-11) + 1e-15
+    assert batch.bound[i] <= expected * (1 + 1e-9) + 1e-10
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_equal_one_at_a_time(grid, compliant):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = zone_margins(robot, T, compliant, mismatch)
+    assert not batch.slower.any()
+    for i in range(0, len(postures), 5):
+        assert_same_margin(batch, i, zone_margin(postures[i], compliant))
+    assert np.all(batch.bound >= batch.margin * (1 - 1e-8))
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rng):
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(80):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    compiled = 0
+    for home in homes:
+        errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
+        robot = home.robot.with_errors(errors)
+        batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
+        compiled += not batch.slower[0]
+        assert_same_margin(batch, 0, zone_margin(replace(home, robot=robot), compliant))
+    assert compiled > 15
+
+
+def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
+    """5e-5 m across, 2e-5 m of play: 2.5, by hand."""
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
+    batch = zone_margins(robot, home_posture(robot).transforms[None])
+    assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
+    assert not batch.slower[0]
+
+
+def test_a_margin_has_two_readings():
+    robot = coaxial_beams(np.zeros(6))
+    with pytest.raises(ValueError, match="compliant is 'soft'"):
+        zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")

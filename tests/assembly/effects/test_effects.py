@@ -1,0 +1,279 @@
+"""Every effect of the library against a closed form on an arm of one beam."""
+
+from dataclasses import replace
+from math import cos, exp, pi, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.kinematics.posture import place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import assemble_row, predict, read
+from assembly.measurement.settled_clearance import taken_up
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.robots import load_robot
+
+L, RADIUS, E, NU, RHO = 0.8, 0.015, 70e9, 0.33, 2700.0
+AREA, I = pi * RADIUS**2, pi * RADIUS**4 / 4
+K = 4e4  # N m/rad of the drive, where it is elastic
+G = 9.81
+
+
+def arm(stiffness=None, rigid=False, theory="euler"):
+    """A drive about z at the base, and a beam along x to the tip."""
+    beam = BeamLink({"radius": RADIUS}, E, NU, RHO, theory=theory)
+    K_B = None
+    if stiffness is not None:
+        K_B = np.diag([np.inf, np.inf, stiffness, np.inf, np.inf, np.inf])
+    return Robot(
+        "arm",
+        "tip",
+        (
+            Frame("drive", joint="revolute", actuated=True, joint_stiffness=K_B),
+            Frame(
+                "tip", "drive", np.array([L, 0.0, 0.0]), link=None if rigid else beam
+            ),
+        ),
+    )
+
+
+def here(robot, load=(0, 0, 0, 0, 0, 0), q=0.0, **given):
+    posture = place_robot(robot, joints={"drive": q})
+    return as_declared(posture, np.array(load, dtype=float), **given)
+
+
+def change(conditions, name, values):
+    """What an effect adds to the reading."""
+    with_effect = predict(apply_effects(conditions, {name: values}))
+    assert list(with_effect.reason) == [""] * len(conditions)
+    return (with_effect.deviation - predict(conditions).deviation)[0]
+
+
+def test_a_beam_sags_under_its_own_weight():
+    """q L^4 / 8 E I and q L^3 / 6 E I of a cantilever."""
+    q = RHO * AREA * G
+    seen = change(here(arm()), "self_weight", {"g.z": -G})
+    expected = [0, q * L**3 / (6 * E * I), 0, 0, 0, -q * L**4 / (8 * E * I)]
+    assert seen == pytest.approx(expected, rel=1e-12, abs=1e-18)
+
+
+def test_a_mass_at_the_tip_sags():
+    """m g L^3 / 3 E I, beside the beam's own."""
+    heavy = arm()
+    tip = replace(heavy.frames[1], mass=3.0)
+    heavy = replace(heavy, frames=(heavy.frames[0], tip))
+    both = change(here(heavy), "self_weight", {"g.y": -G})
+    own = change(here(arm()), "self_weight", {"g.y": -G})
+    assert (both - own)[4] == pytest.approx(-3.0 * G * L**3 / (3 * E * I), rel=1e-12)
+
+
+def test_a_beam_lengthens_with_temperature():
+    seen = change(
+        here(arm(), temperature=12.0, q=0.4), "thermal_expansion", {"tip": 23e-6}
+    )
+    dL = 23e-6 * 12.0 * L
+    assert seen == pytest.approx([0, 0, 0, dL * cos(0.4), dL * sin(0.4), 0], abs=1e-18)
+
+
+def test_an_elastic_drive_turns_by_moment_over_stiffness():
+    F = 30.0
+    seen = change(
+        here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": K}
+    )
+    assert seen == pytest.approx([0, 0, F * L / K, 0, F * L**2 / K, 0], rel=1e-6)
+
+
+def test_drive_springs_act_in_series():
+    F, soft, added = 30.0, 3e4, 5e4
+    seen = change(
+        here(arm(soft), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": added}
+    )
+    assert seen[2] == pytest.approx(F * L / added, rel=1e-9)
+
+
+def test_a_foundation_yields_to_the_force_and_its_moment_about_the_base():
+    F = 50.0
+    stiff = {"stiffness.ry": 2e5, "stiffness.tz": 1e6}
+    seen = change(here(arm(), (0, 0, 0, 0, 0, F)), "base_compliance", stiff)
+    turn = -F * L / 2e5  # a force up at the tip turns the base about -y
+    expected = [0, turn, 0, 0, 0, F / 1e6 - turn * L]
+    assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_an_encoder_offset_turns_the_arm():
+    seen = change(here(arm(), q=0.7), "encoder_offset", {"drive": 1e-5})
+    expected = [0, 0, 1e-5, -1e-5 * L * sin(0.7), 1e-5 * L * cos(0.7), 0]
+    assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
+
+
+def test_an_eccentric_encoder_errs_once_a_turn():
+    values = {"drive.amplitude": 2e-5, "drive.phase": 0.9}
+    for q in (-1.2, 0.0, 2.0):
+        seen = change(here(arm(), q=q), "encoder_eccentricity", values)
+        assert seen[2] == pytest.approx(2e-5 * sin(q + 0.9), rel=1e-9, abs=1e-18)
+
+
+def test_a_longer_link_is_longer():
+    seen = change(here(arm()), "link_length", {"tip": 1e-4})
+    assert seen == pytest.approx([0, 0, 0, 1e-4, 0, 0], abs=1e-18)
+
+
+def test_registration_turns_and_shifts_finitely():
+    """p' = R p + t for the device's frame, and the tool moves with the platform."""
+    b, t = 0.3, np.array([0.01, -0.02, 0.03])
+    values = {"base.rz": b, "base.tx": t[0], "base.ty": t[1], "base.tz": t[2]}
+    seen = change(here(arm(), q=0.5), "registration", values)
+    p = L * np.array([cos(0.5), sin(0.5), 0])
+    R = np.array([[cos(b), -sin(b), 0], [sin(b), cos(b), 0], [0, 0, 1]])
+    expected = [0, 0, b, *(R @ p + t - p)]
+    assert seen == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    tool = change(here(arm(), q=0.5), "registration", {"tool.tx": 1e-3})
+    assert tool[3:] == pytest.approx([1e-3 * cos(0.5), 1e-3 * sin(0.5), 0], abs=1e-15)
+
+
+def test_a_softer_modulus_bends_more():
+    F, factor = 20.0, 0.8
+    seen = change(here(arm(), (0, 0, 0, 0, F, 0)), "modulus_scale", {"tip": factor})
+    bent = F * L**3 / (3 * E * I)
+    assert seen[4] == pytest.approx(bent * (1 / factor - 1), rel=1e-6)
+
+
+def test_play_rests_where_the_load_pushes():
+    """A disc of radius c and a cone of angle t, in the direction of the load."""
+    values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
+    # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive
+    seen = change(
+        here(arm(rigid=True), (0, 0, 0, 0, 3.0, 4.0)), "joint_clearance", values
+    )
+    expected = [0, -3e-5, 0, 0, 2e-5, 1e-5 + 3e-5 * L]
+    assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_play_without_load_is_said_to_be_open():
+    values = {"joint_clearance": {"drive.radial": 2e-5}}
+    found = predict(apply_effects(here(arm(rigid=True)), values))
+    assert found.open.all()
+    assert found.deviation == pytest.approx(0.0, abs=1e-18)
+
+
+def test_friction_holds_an_elastic_drive_back():
+    for approach in (-1.0, 1.0):
+        seen = change(
+            here(arm(K), approach=approach), "friction_hysteresis", {"drive": 2.0}
+        )
+        assert seen[2] == pytest.approx(-2.0 * approach / K, rel=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0])
+def test_a_contact_deflects_by_its_law(exponent):
+    F, c = -25.0, 1e7
+    values = {"drive.coefficient": c, "drive.exponent": exponent}
+    seen = change(
+        here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "contact_stiffening", values
+    )
+    assert seen[2] == pytest.approx(-((abs(F) * L / c) ** (1 / exponent)), rel=1e-9)
+
+
+def test_the_load_is_not_the_one_recorded():
+    F = 20.0
+    values = {"factor": 1.1, "offset.fz": 5.0}
+    seen = change(here(arm(), (0, 0, 0, 0, F, 0)), "load_gain", values)
+    give = L**3 / (3 * E * I)
+    assert seen[4:] == pytest.approx([0.1 * F * give, 5.0 * give], rel=1e-4)
+
+
+def test_tension_stiffens_a_hinged_rod():
+    """k a = F L cos a - P L sin a for a rigid rod on a torsion spring."""
+    P, F = 4e4, 200.0
+    seen = change(
+        here(arm(K, rigid=True), (0, 0, 0, P, F, 0)), "geometric_stiffening", {}
+    )
+    a = brentq(lambda a: F * L * cos(a) - P * L * sin(a) - K * a, 0, 0.1, xtol=1e-15)
+    assert seen[2] == pytest.approx(a - F * L / K, rel=1e-9)
+
+
+def test_a_reading_drifts_and_settles():
+    values = {"amplitude.tx": 1e-5, "amplitude.ry": 2e-5, "time_constant": 100.0}
+    seen = change(here(arm(), time=50.0), "drift", values)
+    part = 1 - exp(-0.5)
+    assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
+
+
+def test_no_effect_is_left_without_a_closed_form():
+    """The list above is the library's: a new effect needs a test of its own."""
+    source = Path(__file__).read_text(encoding="utf-8")
+    assert [name for name in LIBRARY if f'"{name}"' not in source] == []
+
+
+# two roads: all rows at once against the cone solver, row by row
+
+
+CASES = {
+    "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
+    "self_weight": {"g.x": 1.0, "g.z": -G},
+    "contact_stiffening": {"leg2.drive.coefficient": 1e7, "leg2.drive.exponent": 1.5},
+    "base_compliance": {"stiffness.rx": 1e6, "stiffness.tz": 1e8},
+    "encoder_offset": {"leg3.drive": 1e-4},
+    "load_gain": {"factor": 1.2, "offset.fx": 3.0},
+}
+
+
+@pytest.fixture(scope="module")
+def parallel():
+    """A 3-RRR with elastic links, at two postures under different loads."""
+    robot = load_robot("3rrr")
+    beam = BeamLink({"radius": 0.012, "inner_radius": 0.008}, 70e9, 0.33, 2700.0)
+    links = {
+        f.name: beam
+        for f in robot.frames
+        if f.name.endswith(("elbow", "wrist")) and np.linalg.norm(f.translation) > 0
+    }
+    robot = robot.with_links(links)
+    rng = np.random.default_rng(3)
+    robot = robot.with_errors(1e-4 * rng.standard_normal(robot.errors.shape))
+    drives = [f.name for f in robot.frames if f.actuated]
+    placed = [
+        place_robot(robot, joints={n: robot.frame(n).position + d for n in drives})
+        for d in (0.0, 0.05)
+    ]
+    both = replace(
+        placed[0],
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )
+    return as_declared(both, rng.normal(0, 20, (2, 6)), point=[0.02, 0.0, 0.05])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_all_rows_at_once_agree_with_the_cone_solver(name, parallel):
+    names = {f.name for f in parallel.robot.frames}
+    values = {
+        k: v
+        for k, v in CASES[name].items()
+        if name not in {"drive_compliance", "contact_stiffening", "encoder_offset"}
+        or any(k.startswith(n) for n in names)
+    }
+    assert values
+    there = apply_effects(parallel, {name: values})
+    fast = predict(there).deviation
+    slow = read(
+        there, np.array([assemble_row(there, i).platform_screw for i in (0, 1)])
+    )
+    moved = np.abs(fast - predict(parallel).deviation).max()
+    assert moved > 1e-7
+    assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
+
+
+def test_play_in_an_open_chain_agrees_with_the_cone_solver():
+    robot = arm(K)
+    given = here(robot, (1.0, 2.0, 0.5, 3.0, -4.0, 5.0), q=0.3)
+    values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
+    there = apply_effects(given, {"joint_clearance": values})
+    slow = read(there, assemble_row(there, 0).platform_screw[None])
+    assert np.abs(predict(there).deviation - slow).max() < 1e-13
+    closed_form, open_ = taken_up(there)
+    assert not open_.any()
+    assert np.allclose(predict(closed_form).deviation, slow, atol=1e-13)

@@ -1,0 +1,248 @@
+"""Weights and loads on bodies with finite motions: closed forms, balance, limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from tests.test_exact import moved_unknowns, only
+
+from assembly.exact.dead_load import curvature_of, dead_loads, slopes_of, work_of
+from assembly.exact.exact import solve_exact
+from assembly.exact.placement import LINK
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.links import link_compliance
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.robots.irsbot2 import irsbot2
+from stiffness.screws import rotation_matrix, rotation_vector, screw_map
+from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
+from validation.multibody.simulation import simulate_assembly, without_clearance
+
+G = 9.81
+
+
+def heavy(robot, rng):
+    """The same robot with random masses, and beams with a density for its links."""
+    frames = []
+    for frame in robot.frames:
+        link = frame.link
+        if isinstance(link, MatrixLink | BeamLink) and frame.translation.any():
+            link = BeamLink({"radius": 0.02}, 7e8, 0.3, density=2000.0)
+        frames.append(replace(
+            frame, link=link, mass=rng.uniform(0.5, 2.0),
+            centre_of_mass=rng.normal(size=3) * 0.1,
+        ))  # fmt: skip
+    return replace(robot, frames=tuple(frames))
+
+
+def on_a_hinge(stiffness, *frames):
+    """Rigid bodies on an elastic hinge about z."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
+    return home_posture(Robot("arm", frames[-1].name, (hinge, *frames)))
+
+
+def some_loads(posture, rng):
+    count = len(posture.robot.frames)
+    return rng.normal(size=6), rng.normal(size=(count, 6)), rng.normal(size=3) * G
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_at_rest_the_loads_pull_as_in_the_linear_model(seed):
+    rng = np.random.default_rng(seed)
+    robot = heavy(random_robot(rng, legs=3), rng)
+    posture = home_posture(robot.with_errors(0 * robot.errors))
+    load, bodies, gravity = some_loads(posture, rng)
+    linear = solve_assembly(posture, load, bodies, gravity)
+    model = moved_unknowns(posture, rng, 0.0)[0]
+    loads = dead_loads(posture, load, bodies, gravity)
+    here = model.place(np.zeros(len(model.frame)))
+    forces = np.where(model.motion == LINK, *(
+        np.einsum(
+            "ij,ij->i", model.columns, forces.reshape(-1, 6)[model.frame]
+        ) for forces in (linear.forces.body, linear.forces.joint)
+    ))  # fmt: skip
+    assert work_of(here, loads) == pytest.approx(0.0, abs=1e-13)
+    assert np.abs(slopes_of(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_both_derivatives_of_the_work(seed):
+    """Far from rest, central differences of 1e-5."""
+    rng = np.random.default_rng(seed)
+    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
+    model, x, h = moved_unknowns(posture, rng, 0.1)
+    load, bodies, gravity = some_loads(posture, rng)
+    loads, step = dead_loads(posture, 0 * load, bodies, gravity), 1e-5
+    here, ahead, behind = (model.place(x + k * step * h) for k in (0, 1, -1))
+    slope = (work_of(ahead, loads) - work_of(behind, loads)) / (2 * step)
+    assert slopes_of(here, loads) @ h == pytest.approx(slope, rel=1e-7)
+    bend = (slopes_of(ahead, loads) - slopes_of(behind, loads)) / (2 * step)
+    found = curvature_of(here, np.zeros(len(here.residual)), loads)
+    assert np.abs(found @ h - bend).max() < 1e-7 * np.abs(bend).max()
+    assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()
+
+
+@pytest.mark.parametrize("stiffness", [3.0, 30.0])
+def test_a_mass_on_an_arm_hangs_where_its_hinge_lets_it(stiffness):
+    """k a + m g (x cos a - y sin a) = 0 for a mass at (x, y) from the hinge."""
+    arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0.2, 0])
+    x, y, weight = 0.5, 0.2, 2.0 * G
+
+    def balance(a):
+        return stiffness * a + weight * (x * np.cos(a) - y * np.sin(a))
+
+    angle = brentq(balance, -3.0, 0.0)
+    answer = solve_exact(on_a_hinge(stiffness, arm), gravity=[0, -G, 0])
+    assert abs(angle) > 0.2
+    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
+    fall = x * np.sin(angle) + y * np.cos(angle) - y
+    expected = stiffness * angle**2 / 2 + weight * fall
+    assert answer.potential == pytest.approx(expected, rel=1e-12)
+    assert answer.joint_wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
+
+
+def test_a_beams_weight_acts_at_its_middle():
+    """k a + W L/2 cos a = 0 for a beam that hardly bends."""
+    beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
+    posture = on_a_hinge(5.0, Frame("tip", "hinge", [0.6, 0, 0], link=beam))
+    weight = 8000.0 * np.pi * 0.02**2 * 0.6 * G
+    angle = brentq(lambda a: 5.0 * a + weight * 0.3 * np.cos(a), -2.0, 0.0)
+    answer = solve_exact(posture, gravity=[0, -G, 0])
+    assert abs(angle) > 1.0
+    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-8)
+
+
+def test_a_couple_is_two_dead_forces():
+    """k a = m cos a: the work of a couple m is m sin a."""
+    posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
+    angle = brentq(lambda a: 10.0 * a - 9.0 * np.cos(a), 0.0, 1.5)
+    bodies = np.zeros((2, 6))
+    bodies[1, 2] = 9.0
+    answer = solve_exact(posture, bodies=bodies)
+    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
+
+
+def test_a_force_on_the_platforms_body_is_the_platforms_load():
+    posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
+    force = [0, 0, 0, 3.0, -20.0, 0]
+    one = solve_exact(posture, force)
+    other = solve_exact(posture, bodies=[[0] * 6, force])
+    assert abs(one.joint_screws[0, 2]) > 0.5
+    for name in ("joint_screws", "wrenches", "joint_wrenches", "platform_screw"):
+        assert np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-9)
+    assert one.potential == pytest.approx(other.potential, rel=1e-12)
+
+
+def test_the_base_carries_all_weight_where_it_hangs():
+    """Forces and moments of a closed loop on its base, in the deformed posture."""
+    rng = np.random.default_rng(3)
+    robot = random_robot(rng, legs=3)
+    robot = replace(robot, frames=tuple(
+        replace(f, mass=rng.uniform(1, 5), centre_of_mass=rng.normal(size=3) * 0.2)
+        for f in robot.frames
+    ))  # fmt: skip
+    g = np.array([1.0, -2.0, -G])
+    answer = solve_exact(home_posture(robot), gravity=g)
+    total, balance = np.zeros(6), np.zeros(6)
+    for i, frame in enumerate(robot.frames):
+        p = (answer.placement.bodies[i] @ [*frame.centre_of_mass, 1.0])[:3]
+        total += frame.mass * np.concatenate([np.cross(p, g), g])
+        if robot.parents[i] < 0:
+            # the joint's wrench, and what pulls the body itself
+            T = answer.transforms[i]
+            w = (
+                screw_map(-T[:3, 3]).T
+                @ np.kron(np.eye(2), T[:3, :3])
+                @ (answer.wrenches[i])
+            )
+            balance += w
+    assert np.abs(answer.linear.platform_screw).max() > 1e-6
+    assert balance == pytest.approx(total, rel=1e-8, abs=1e-8 * np.abs(total).max())
+
+
+def test_the_linear_model_is_the_limit_of_small_weights():
+    """Linear minus exact falls with the square of the weight and the errors."""
+    robot = heavy(irsbot2_with(NUMBERS["cases"][0]), np.random.default_rng(1))
+    tight = (replace(frame, clearance=None) for frame in robot.frames)
+    robot, off = replace(robot, frames=tuple(tight)), []
+    for s in (0.02, 0.01):
+        small = place_robot(robot.with_errors(s * robot.errors), pose={"tz": -0.5})
+        exact = solve_exact(small, gravity=[0, 0, -s * G])
+        off.append(np.abs(exact.linearisation_error.translation).max())
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_turning_robot_and_gravity_together_turns_the_answer():
+    rng = np.random.default_rng(5)
+    robot = heavy(random_robot(rng, legs=2), rng)
+    R = rotation_matrix(rng.normal(size=3))
+    turned = []
+    for frame in robot.frames:
+        if frame.parent == "base":
+            both = R @ rotation_matrix(frame.rotation)
+            frame = replace(
+                frame, rotation=rotation_vector(both), translation=R @ frame.translation
+            )
+        turned.append(frame)
+    here = solve_exact(home_posture(robot), gravity=[0, 0, -G])
+    there = solve_exact(
+        home_posture(replace(robot, frames=tuple(turned))), gravity=R @ [0, 0, -G]
+    )
+    both = np.kron(np.eye(2), R)
+    assert there.potential == pytest.approx(here.potential, rel=1e-9)
+    assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)
+
+
+def test_the_paper_robot_under_its_weight_at_full_errors():
+    robot = irsbot2_with(NUMBERS["cases"][1])
+    robot = heavy(robot, np.random.default_rng(2))
+    answer = solve_exact(
+        place_robot(robot, pose={"tx": 0.1, "tz": -0.5}), gravity=[0, 0, -G]
+    )
+    assert answer.closure_residual() < 1e-12
+    assert answer.stationarity < 1e-7
+    assert answer.least_curvature > 0
+    plain = solve_exact(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
+    assert plain.loads.beyond_platform is False
+
+
+def test_a_start_under_other_loads_is_refused():
+    posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0], mass=1.0))
+    start = solve_assembly(posture, gravity=[0, -G, 0])
+    assert solve_exact(posture, start=start, gravity=[0, -G, 0]).energy > 0
+    with pytest.raises(ValueError, match="another posture or load"):
+        solve_exact(posture, start=start)
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
+def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
+    """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
+    too.  Poses agree as without weight, see ``test_exact``.  The energy alone is not
+    least under a load: it differs by the weight's work on what the poses differ.
+    """
+    robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
+    rng = np.random.default_rng(4)
+    robot = replace(robot, frames=tuple(
+        replace(f, mass=rng.uniform(1, 2), centre_of_mass=rng.normal(size=3) * 0.05)
+        for f in robot.frames
+    ))  # fmt: skip
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    answer = solve_exact(posture, gravity=gravity)
+    other = simulate_assembly(
+        posture, links="spring", stiffness=stiffness, gravity=gravity
+    )
+    light = solve_exact(posture)
+    sag = np.abs(answer.platform_screw - light.platform_screw)[3:].max()
+    difference = np.abs(other.platform_screw - answer.platform_screw)
+    assert sag > 1e-6
+    assert difference[:3].max() < 2e-7
+    assert difference[3:].max() < 1e-8
+    weight = sum(f.mass for f in robot.frames) * np.linalg.norm(gravity)
+    assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)

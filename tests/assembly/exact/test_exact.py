@@ -1,0 +1,607 @@
+"""Finite motions: derivatives, closed forms at large turns, laws, the simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq, root
+
+import assembly.exact.exact as exact
+from assembly.exact.descent import NotConverged
+from assembly.exact.exact import solve_exact
+from assembly.exact.placement import FiniteRobot
+from assembly.kinematics.posture import home_posture, place_many, place_robot
+from assembly.kinematics.se3 import (
+    bracket,
+    bracket_form,
+    exponential,
+    inverse,
+    left_jacobian,
+    logarithm,
+    second_form,
+)
+from assembly.linear.closure import closure_signs, virtual_joints
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.links import joint_compliances, link_compliance, link_compliances
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots.delta import delta
+from assembly.robots.hexapod import hexapod
+from assembly.solvers.conic import SolverFailed
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    random_robot,
+    small_clearance,
+)
+from validation.multibody.simulation import without_clearance
+
+CASES = {case["name"]: case for case in NUMBERS["cases"]}
+A, B, D = 0.3, 0.25, 0.4  # [m] sides of the triangle of two hinged bars
+ALPHA = np.arccos((A**2 + D**2 - B**2) / (2 * A * D))  # at the origin
+BETA = np.pi - np.arccos((B**2 + D**2 - A**2) / (2 * B * D))  # at (D, 0), from x
+K_ONE, K_TWO, K_BAR = 40.0, 70.0, 9e4  # [N m/rad], [N m/rad], [N/m]
+
+
+def only(row, value):
+    """K_B of a spring in one direction, rigid in the others."""
+    return np.diag([value if k == row else np.inf for k in range(6)])
+
+
+def two_bars(longer, clearance=None, stretch=False):
+    """Two bars on elastic hinges that meet in a pin; bar two is made longer."""
+    soft = only(3, K_BAR) if stretch else None
+    frames = (
+        Frame("one", rotation=[0, 0, ALPHA], joint="revolute",
+              joint_stiffness=only(2, K_ONE)),
+        Frame("pin", "one", [A, 0, 0], [0, 0, BETA - ALPHA], joint="revolute",
+              clearance=clearance),
+        Frame("end_one", "pin"),
+        Frame("two", translation=[D, 0, 0], rotation=[0, 0, BETA], joint="revolute",
+              joint_stiffness=only(2, K_TWO)),
+        Frame("bar", "two", [B, 0, 0], joint_stiffness=soft,
+              geometric_error=[0, 0, 0, longer, 0, 0]),
+        Frame("end_two", "bar"),
+    )  # fmt: skip
+    return home_posture(Robot("bars", "end_one", frames, (("end_one", "end_two"),)))
+
+
+def triangle(length):
+    """Turns of the two bars from home when bar two has a length: law of cosines."""
+    one = np.arccos((A**2 + D**2 - length**2) / (2 * A * D)) - ALPHA
+    two = np.pi - np.arccos((length**2 + D**2 - A**2) / (2 * length * D)) - BETA
+    return np.array([one, two])
+
+
+def pendulum(stiffness, length):
+    """A rigid bar upright along x on an elastic hinge."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
+    return home_posture(
+        Robot("bar", "tip", (hinge, Frame("tip", "hinge", [length, 0, 0])))
+    )
+
+
+def moved_unknowns(posture, rng, size):
+    """A finite robot with unknowns of a size in rad and reference lengths."""
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    per = np.sqrt(np.diag(model.metric))
+    return (
+        model,
+        rng.normal(size=len(per)) / per * size,
+        rng.normal(size=len(per)) / per,
+    )
+
+
+# Finite motions
+
+
+@pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
+def test_motions_are_exponentials_of_screws(rng, size):
+    """Against the matrix exponential; rounding only."""
+    s = size * rng.normal(size=6)
+    generator = np.zeros((4, 4))
+    x, y, z = s[:3]
+    generator[:3] = [[0, -z, y, s[3]], [z, 0, -x, s[4]], [-y, x, 0, s[5]]]
+    assert np.abs(exponential(s) - expm(generator)).max() < 1e-14
+    if np.linalg.norm(s[:3]) < np.pi:
+        assert np.abs(logarithm(exponential(s)) - s).max() < 1e-14 * max(1, 1 / size)
+    assert np.abs(exponential(s) @ inverse(exponential(s)) - np.eye(4)).max() < 1e-14
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.1, 1.0])
+def test_the_jacobian_is_the_mean_of_the_motions_met_on_the_way(rng, size):
+    """J = integral of Ad(exp(t s)), the series of ad^n / (n + 1)!."""
+    s = size * rng.normal(size=6)
+    J, term = np.eye(6), np.eye(6)
+    for n in range(1, 40):
+        term = term @ bracket(s) / (n + 1)
+        J = J + term
+    assert np.abs(left_jacobian(s) - J).max() < 1e-14
+
+
+@pytest.mark.parametrize(("size", "tolerance"), [(0.02, 1e-10), (0.3, 1e-5)])
+def test_second_derivative_of_the_exponential(rng, size, tolerance):
+    """By the product's own expansion: its series leaves out size^6 and more.
+
+    log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
+    """
+    s = size * np.ones(6) / np.sqrt(3)
+    w, h = rng.normal(size=(2, 6))
+    step = 2e-4
+
+    def work(sign):
+        return w @ logarithm(exponential(s + sign * step * h) @ inverse(exponential(s)))
+
+    expected = (work(1) + work(-1)) / step**2
+    rounding = 1e-16 / step**2
+    form = second_form(s, w)
+    assert np.abs(form - form.T).max() == 0.0
+    scale = np.linalg.norm(w) * np.linalg.norm(h) ** 2
+    assert abs(h @ form @ h - expected) < (tolerance + 10 * rounding + 1e-8) * scale
+
+
+def test_the_bracket_form_is_the_work_on_a_bracket(rng):
+    a, b, w = rng.normal(size=(3, 6))
+    assert a @ bracket_form(w) @ b == pytest.approx(w @ (bracket(a) @ b), rel=1e-13)
+
+
+# Closures of a robot
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_motion_the_closures_are_the_linear_ones(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=3)
+    posture = home_posture(robot.with_errors(0 * robot.errors))
+    lin = solve_assembly(posture).linearisation
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    here = model.place(np.zeros(len(model.frame)))
+    columns = np.hstack([model.joints.elastic, model.joints.cones, model.joints.free])
+    assert here.largest_gap < 1e-15
+    assert np.abs(here.rows - lin.rows @ columns).max() < 1e-14
+    assert np.abs(here.platform_rows - lin.platform @ columns).max() < 1e-14
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_first_derivatives_of_closures_and_platform(seed):
+    """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
+    rng = np.random.default_rng(seed)
+    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
+    here, step = model.place(x), 1e-5
+    ahead, behind = model.place(x + step * h), model.place(x - step * h)
+    difference = (ahead.residual - behind.residual) / (2 * step)
+    assert np.abs(here.rows @ h - difference).max() < 1e-7
+    difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
+    assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
+
+
+@pytest.mark.parametrize("load", [[0] * 6, [0, 0, 0, 1, -2, 3]])
+@pytest.mark.parametrize("seed", range(4))
+def test_second_derivatives_of_closures_and_platform(seed, load):
+    """Where the closures hold, against differences of the first derivatives."""
+    rng = np.random.default_rng(seed)
+    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.02)
+    T, (first, second) = model.place(x).transforms, model.closed_frames.T
+    vars(model)["shut"] = inverse(T[first]) @ T[second]  # close it where it stands
+    here, step, load = model.place(x), 1e-5, np.array(load, dtype=float)
+    multipliers = rng.normal(size=len(here.residual))
+
+    def slope(place):
+        return multipliers @ place.rows + load @ place.platform_rows
+
+    difference = slope(model.place(x + step * h)) - slope(model.place(x - step * h))
+    expected = difference / (2 * step)
+    found = here.curvature(multipliers, load) @ h
+    assert here.largest_gap < 1e-14
+    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+# Closed forms at large turns
+
+
+@pytest.mark.parametrize("longer", [1e-4, 0.05, 0.12])
+def test_two_bars_close_like_a_triangle(longer):
+    """The turns by the law of cosines; up to 0.4 rad."""
+    one, two = triangle(B + longer)
+    answer = solve_exact(two_bars(longer))
+    assert abs(one) > 0.2 or longer < 0.1
+    assert answer.joint_screws[0, 2] == pytest.approx(one, abs=1e-12)
+    assert answer.joint_screws[3, 2] == pytest.approx(two, abs=1e-12)
+    assert answer.clearance_screws[1, 2] == pytest.approx(two - one, abs=1e-12)
+    energy = K_ONE * one**2 / 2 + K_TWO * two**2 / 2
+    assert answer.energy == pytest.approx(energy, rel=1e-11)
+    turned = rotation_vector(rotation_matrix([0, 0, two]))
+    assert np.abs(answer.platform_screw[:3] - turned).max() < 1e-12
+
+
+def test_the_linearisation_error_is_linear_minus_exact():
+    """The linear model keeps the triangle's slopes at home; differences of 1e-6."""
+    longer, step = 0.06, 1e-6
+    slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
+    energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
+    turns = triangle(B + longer)
+    exactly = (np.array([K_ONE, K_TWO]) @ turns**2) / 2
+    error = solve_exact(two_bars(longer)).linearisation_error
+    assert error.energy == pytest.approx(energy - exactly, rel=1e-7)
+    assert error.relative_energy == pytest.approx(energy / exactly - 1, rel=1e-7)
+    assert error.rotation[2] == pytest.approx(slopes[1] * longer - turns[1], rel=1e-7)
+
+
+def bar_force(e, longer):
+    """dE/de of the stretched bar: turns of a triangle per length of a side."""
+    length, step = B + longer + e, 1e-6
+    slope = (triangle(length + step) - triangle(length - step)) / (2 * step)
+    return K_BAR * e + np.array([K_ONE, K_TWO]) * triangle(length) @ slope
+
+
+@pytest.mark.parametrize("longer", [0.05, 0.12])
+def test_a_stretching_bar_shares_the_energy(longer):
+    """One scalar equation; differences of 1e-6 leave 1e-10 of the force."""
+    e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
+    one, two = triangle(B + longer + e)
+    answer = solve_exact(two_bars(longer, stretch=True))
+    assert abs(e) > 1e-4
+    assert answer.joint_screws[4, 3] == pytest.approx(e, rel=1e-8)
+    assert answer.joint_screws[0, 2] == pytest.approx(one, rel=1e-8)
+    energy = (K_ONE * one**2 + K_TWO * two**2 + K_BAR * e**2) / 2
+    assert answer.energy == pytest.approx(energy, rel=1e-12)
+    assert answer.least_curvature > 0
+
+
+@pytest.mark.parametrize(("longer", "bound"), [(0.12, 0.1), (-0.1, 0.4)])
+def test_a_bound_on_a_passive_joint_is_met_exactly(longer, bound):
+    """The bar gives way until the pin turns no more than it may.
+
+    The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
+    met only by finite motions, 0.497 rad.
+    """
+    free = solve_exact(two_bars(longer, stretch=True))
+
+    def beyond(e):
+        one, two = triangle(B + longer + e)
+        return abs(two - one) - bound
+
+    e = brentq(beyond, *sorted([-longer, 0.0]), xtol=1e-15)
+    answer = solve_exact(two_bars(longer, Clearance(spin=bound), stretch=True))
+    assert abs(free.clearance_screws[1, 2]) > bound
+    assert (abs(free.linear.clearance_screws[1, 2]) > bound) == (longer > 0)
+    assert abs(answer.clearance_screws[1, 2]) == pytest.approx(bound, rel=1e-12)
+    assert answer.joint_screws[4, 3] == pytest.approx(e, rel=1e-9)
+    assert answer.clearance_excess() < 1e-12
+
+
+def pin_gap(one, two, longer):
+    """Vector from the end of bar two to that of bar one."""
+    first = A * np.array([np.cos(ALPHA + one), np.sin(ALPHA + one)])
+    second = (B + longer) * np.array([np.cos(BETA + two), np.sin(BETA + two)])
+    return first - second - [D, 0]
+
+
+@pytest.mark.parametrize("longer", [0.02, 0.06])
+def test_a_pin_with_play_presses_on_its_rim(longer):
+    """Least k turn^2 / 2 with the ends no farther apart than the play."""
+    play = 5e-3
+
+    def balance(z):
+        one, two, force = z
+        gap = pin_gap(one, two, longer) / play
+        across = np.array([-np.sin(ALPHA + one), np.cos(ALPHA + one)])
+        along = np.array([np.sin(BETA + two), -np.cos(BETA + two)])
+        return [
+            one + force * A * (gap @ across),
+            K_TWO / K_ONE * two + force * (B + longer) * (gap @ along),
+            gap @ gap - 1,
+        ]
+
+    found = root(balance, [*triangle(B + longer), 0.1], tol=1e-14)
+    one, two, force = found.x
+    answer = solve_exact(two_bars(longer, Clearance(radial=play)))
+    assert np.abs(found.fun).max() < 1e-12
+    assert force > 0
+    assert answer.joint_screws[0, 2] == pytest.approx(one, rel=1e-9)
+    assert answer.joint_screws[3, 2] == pytest.approx(two, rel=1e-9)
+    energy = (K_ONE * one**2 + K_TWO * two**2) / 2
+    assert answer.energy == pytest.approx(energy, rel=1e-11)
+    assert np.hypot(*answer.clearance_screws[1, 3:5]) == pytest.approx(play, rel=1e-12)
+
+
+def test_within_the_play_nothing_is_forced():
+    """4 mm too long, 5 mm of play: closed without energy."""
+    answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
+    assert answer.energy < 1e-12  # [J], of 0.04 J without play
+    assert answer.closure_residual() < 1e-12
+    assert answer.clearance_excess() == 0.0
+
+
+def test_closures_that_only_play_can_shut():
+    """Axes 0.1 rad apart are met by 0.1 rad of tilt, however far the bars turn."""
+    posture = two_bars(0.06, Clearance(tilt=0.2))
+    errors = posture.robot.errors.copy()
+    errors[4, 0] = 0.1  # about bar two, which no spring and no pin can undo
+    answer = solve_exact(replace(posture, robot=posture.robot.with_errors(errors)))
+    assert np.hypot(*answer.clearance_screws[1, :2]) == pytest.approx(0.1, rel=1e-12)
+    assert answer.joint_screws[0, 2] == pytest.approx(triangle(B + 0.06)[0], rel=1e-11)
+    assert answer.closure_residual() < 1e-12
+
+
+def test_a_load_passes_through_play_alone():
+    """Rigid: far may move by 0.2 mm, near then by 0.5 + 0.2 mm, 5 N go through far."""
+    frames = (
+        Frame("near", clearance=Clearance(axial=1e-3)),
+        Frame("tip", "near", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+        Frame("far", clearance=Clearance(axial=2e-4),
+              geometric_error=[0, 0, 0, 0, 0, 5e-4]),
+        Frame("end", "far", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+    )  # fmt: skip
+    posture = home_posture(Robot("slides", "tip", frames, (("tip", "end"),)))
+    answer = solve_exact(posture, [0, 0, 0, 0, 0, 5.0])
+    assert answer.platform_screw == pytest.approx([0, 0, 0, 0, 0, 7e-4], abs=1e-12)
+    assert answer.clearance_screws[[0, 2], 5] == pytest.approx([7e-4, 2e-4], rel=1e-9)
+    assert answer.potential == pytest.approx(-5 * 7e-4, rel=1e-9)
+    assert answer.closure_wrenches[0, 5] == pytest.approx(-5.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("force", "side"), [(30.0, 1.0), (10.0, -8.0), (0.0, 25.0)])
+def test_a_dead_load_bends_a_pendulum(force, side):
+    """k a = L (P sin a + F cos a); with k = 10 and P L = 15 it buckles to 1.5 rad."""
+    stiffness, length = 10.0, 0.5
+
+    def balance(a):
+        return stiffness * a - length * (force * np.sin(a) + side * np.cos(a))
+
+    angle = brentq(balance, *sorted([0.2 * np.sign(side), 2.5 * np.sign(side)]))
+    answer = solve_exact(pendulum(stiffness, length), [0, 0, 0, -force, side, 0])
+    assert abs(angle) > 0.3
+    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
+    work = -force * length * (np.cos(angle) - 1) + side * length * np.sin(angle)
+    assert answer.potential == pytest.approx(stiffness * angle**2 / 2 - work, rel=1e-12)
+    assert answer.wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
+    curvature = stiffness - length * (force * np.cos(angle) - side * np.sin(angle))
+    assert answer.least_curvature == pytest.approx(curvature, rel=1e-7)
+
+
+def test_a_moment_does_the_work_moment_times_angle():
+    """k a = M, by the definition of the moment's work, at 0.8 rad too."""
+    answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 8.0, 0, 0, 0])
+    assert answer.joint_screws[0, 2] == pytest.approx(0.8, rel=1e-12)
+    assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
+
+
+def test_an_unstable_equilibrium_is_recognised():
+    """Upright under P L = 15 N m with k = 10 N m/rad: curvature k - P L = -5."""
+    answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 0, -30.0, 0, 0])
+    assert answer.joint_screws[0, 2] == 0.0
+    assert answer.least_curvature == pytest.approx(-5.0, rel=1e-12)
+
+
+# Laws
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_linear_model_is_the_limit_of_small_errors(case):
+    """Differences of the pose fall as s^2, of the relative energy as s: halves of s."""
+    robot = without_clearance(irsbot2_with(CASES[case]))
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
+    turns, shifts, energies = [], [], []
+    for s in (1 / 32, 1 / 64, 1 / 128):
+        scaled = replace(posture, robot=robot.with_errors(s * robot.errors))
+        error = solve_exact(scaled).linearisation_error
+        turns.append(np.linalg.norm(error.rotation))
+        shifts.append(np.linalg.norm(error.translation))
+        energies.append(abs(error.relative_energy))
+    for values, slope in ((turns, 2), (shifts, 2), (energies, 1)):
+        found = np.log2(np.array(values[:-1]) / values[1:])
+        assert np.abs(found - slope).max() < 0.05
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
+def test_turning_the_whole_robot_changes_nothing(seed):
+    """Energy the same, the platform's shift turned along; rounding of the solver."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=3)
+    X = transform([1.0, -2.0, 0.5], rotation_matrix([0.4, -0.9, 1.3]))
+    frames = []
+    for frame, T in zip(robot.frames, robot.fixed_transforms, strict=True):
+        if frame.parent == "base":
+            turned = rotation_vector((X @ T)[:3, :3])
+            frame = replace(frame, translation=(X @ T)[:3, 3], rotation=turned)
+        frames.append(frame)
+    here = solve_exact(home_posture(robot))
+    there = solve_exact(home_posture(replace(robot, frames=tuple(frames))))
+    scale = here.linear.energy_without_play
+    assert abs(there.energy - here.energy) < 1e-11 * scale
+    screws = here.platform_screw.reshape(2, 3) @ X[:3, :3].T
+    size = np.abs(screws).max(axis=1, keepdims=True)
+    assert np.abs((there.platform_screw.reshape(2, 3) - screws) / size).max() < 1e-6
+
+
+def test_springs_carry_what_the_closures_transmit():
+    """K s is the wrench that works on the screw itself: K s = J(-s)^T w.
+
+    w is read where the spring ends; the tests' beams are turned by 0.2 rad there, the
+    robot's hinges by 2e-2, so J is not 1.
+    """
+    gap = [0.3, -0.2, 0.1, 0.02, 0.03, -0.01]
+    beams = solve_exact(home_posture(coaxial_beams(gap, (1e3, 4e3))))
+    paper = solve_exact(place_robot(irsbot2_with(CASES["signed"]), pose={"tz": -0.5}))
+    for answer, screws, compliances in (
+        (beams, beams.link_screws, link_compliances),
+        (paper, paper.joint_screws, joint_compliances),
+    ):
+        C = compliances(answer.posture.robot)
+        sprung = C.any(axis=(1, 2))
+        s, size = screws[sprung], np.sqrt(np.einsum("nii->ni", C[sprung]))
+        w = np.einsum("nji,nj->ni", left_jacobian(-s), answer.wrenches[sprung])
+        strain = np.einsum("nij,nj->ni", C[sprung], w)
+        error = np.abs(strain - s) / (size + (size == 0))
+        assert error.max() < 1e-9 * np.sqrt(2 * answer.energy)
+        assert np.abs(w - answer.wrenches[sprung]).max() > 1e-4 * np.abs(w).max()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
+def test_energy_falls_with_errors_as_the_wrenches_say(seed):
+    """dE / d(delta l) = -force: the first body longer, against solving anew."""
+    rng = np.random.default_rng(seed)
+    robot, step = random_robot(rng, legs=3), 1e-6
+    answer = solve_exact(home_posture(robot))
+    through = closure_signs(robot).T @ answer.closure_wrenches
+    expected = -through[0, 3:] @ robot.fixed_transforms[0, :3, :3]
+    energies = np.zeros((3, 2))
+    for k in range(3):
+        for side, sign in enumerate((1, -1)):
+            errors = robot.errors.copy()
+            errors[0, 3 + k] += sign * step
+            energies[k, side] = solve_exact(
+                home_posture(robot.with_errors(errors))
+            ).energy
+    found = (energies[:, 0] - energies[:, 1]) / (2 * step)
+    # a cone met or left on the way is the only kink; rounding is 1e-14 J / step
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(through[:, 3:]).max() + 1e-7
+
+
+def test_a_given_start_gives_the_same_answer():
+    posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tx": 0.1, "tz": -0.5})
+    start = solve_assembly(posture)
+    given, own = solve_exact(posture, start=start), solve_exact(posture)
+    assert given.linear is start
+    assert np.array_equal(given.platform_screw, own.platform_screw)
+
+
+def test_motions_without_energy_do_not_drift(rng):
+    """A hexapod is not overconstrained: its closures cost nothing, nothing pulls.
+
+    Its pins differ from the linear answer by second-order terms only: 100 times less
+    at a tenth of the errors, to the third order.
+    """
+    robot = hexapod()
+    errors = rng.uniform(-1, 1, robot.errors.shape)
+    differences = []
+    for s in (1e-4, 1e-5):
+        answer = solve_exact(home_posture(robot.with_errors(s * errors)))
+        linear = answer.linear.clearance_screws
+        differences.append(np.abs(answer.clearance_screws - linear).max())
+        assert answer.closure_residual() < 1e-12
+        assert answer.energy < 1e-20
+        assert answer.iterations <= 6
+    assert differences[0] / differences[1] == pytest.approx(100, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_slowly_curved_valleys_are_followed_to_their_end(seed):
+    """Rods of a Delta spin by radians under a load, for 1e-6 of the energy."""
+    rng = np.random.default_rng(seed)
+    robot = delta()
+    errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
+    posture = home_posture(robot.with_errors(errors))
+    answer = solve_exact(posture, [1, 2, 0, 20, -10, -30])
+    assert answer.stationarity < 1e-9
+    assert answer.least_curvature > 0
+    assert np.abs(answer.placement.own).max() > 0.1
+
+
+# What cannot be solved
+
+
+def test_rigid_parts_that_cannot_close_are_refused():
+    robot = coaxial_beams([0, 0, 0, 1e-3, 0, 0], clearance=small_clearance())
+    rigid = robot.with_links({"one": None, "two": None})
+    with pytest.raises(CannotAssemble):
+        solve_exact(home_posture(rigid))
+
+
+@pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
+def test_a_start_of_another_problem_is_refused(load):
+    posture = two_bars(0.01)
+    start = solve_assembly(posture if load else two_bars(0.02))
+    with pytest.raises(ValueError, match="start is the linear answer of another"):
+        solve_exact(posture, load, start)
+
+
+def test_too_few_steps_are_said_to_be_too_few(monkeypatch):
+    monkeypatch.setattr(exact, "_STEPS", 1)
+    posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
+    message = (
+        r"exact equilibrium of irsbot2: after 1 steps closures are open by \S+ and "
+        r"forces out of balance by \S+, relative"
+    )
+    with pytest.raises(NotConverged, match=message) as caught:
+        solve_exact(posture)
+    assert isinstance(caught.value, SolverFailed)
+    assert caught.value.problem == "exact equilibrium of irsbot2"
+
+
+# The paper's robot at its full errors
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_paper_robot_converges_at_full_errors(case):
+    """Easy points, flat valleys of play, the rim of the workspace."""
+    places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
+    poses = np.full((len(places), 6), np.nan)
+    poses[:, [0, 2]] = places
+    for posture in place_many(irsbot2_with(CASES[case]), poses)[0]:
+        answer = solve_exact(posture)
+        assert answer.closure_residual() < 1e-12
+        assert answer.stationarity < 1e-9
+        assert answer.clearance_excess() < 1e-12
+        assert answer.least_curvature > 0
+        shift = np.linalg.norm(answer.linearisation_error.translation)
+        assert 1e-6 < shift < 1e-3  # [m]; the paper's target is 20e-6
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize("place", [(0, -0.5), (-0.15, -0.6)])
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_agrees_at_full_errors(case, place):
+    """Without clearances, links as springs: 1e-8 m and 1e-9 of the energy.
+
+    The simulation applies K s half-way between a spring's ends, which is its energy's
+    gradient to s^2 / 24 only: 1e-5 of the wrench in hinges turned by 2e-2 rad, and up
+    to 1e-7 rad of the soft ones.
+    """
+    from validation.multibody.simulation import simulate_assembly
+
+    robot = without_clearance(irsbot2_with(CASES[case]))
+    posture = place_robot(robot, pose=dict(zip(("tx", "tz"), place, strict=True)))
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    answer = solve_exact(posture)
+    other = simulate_assembly(posture, links="spring", stiffness=stiffness)
+    assert answer.linearisation_error.energy != pytest.approx(0, abs=0.1)  # [J]
+    assert other.energy == pytest.approx(answer.energy, rel=1e-9)
+    difference = np.abs(other.platform_screw - answer.platform_screw)
+    assert difference[:3].max() < 2e-7
+    assert difference[3:].max() < 1e-8
+    assert np.abs(other.transforms - answer.transforms).max() < 2e-7
+    wrenches = other.closure_wrenches - answer.closure_wrenches
+    assert np.abs(wrenches).max() < 2e-5 * np.abs(answer.closure_wrenches).max()
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_agrees_with_clearances_at_full_errors(case):
+    """Its contacts yield by what twice their energy corrects to first order."""
+    from validation.multibody.simulation import simulate_assembly
+
+    robot = irsbot2_with(CASES[case])
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})
+    stiffness = {
+        frame.name: np.linalg.inv(link_compliance(frame))
+        for frame in robot.frames
+        if frame.link is not None
+    }
+    answer = solve_exact(posture)
+    other = simulate_assembly(
+        posture, links="spring", stiffness=stiffness, clearances=True
+    )
+    energy = other.energy + 2 * other.contact_energy
+    assert energy == pytest.approx(answer.energy, rel=5e-4)
+    difference = np.abs(other.platform_screw - answer.platform_screw)
+    assert difference[:3].max() < 1e-6
+    assert difference[3:].max() < 1e-8

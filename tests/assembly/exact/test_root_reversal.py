@@ -1,0 +1,157 @@
+"""A tree's root is a choice: the robot built from its platform is the same robot."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from stiffness.screws import rotation_matrix, rotation_vector, screw_map, transform
+
+
+@dataclass
+class Body:
+    """From one joint to the next: where to, its error and K at its end, and there."""
+
+    T: np.ndarray
+    error: np.ndarray
+    K: np.ndarray
+    joint: dict
+
+    def reversed(self, joint):
+        """The same body seen from its end, with the joint at its start."""
+        back = screw_map(self.T[:3, 3], self.T[:3, :3])
+        C = back @ np.linalg.inv(self.K) @ back.T
+        C = (C + C.T) / 2
+        return Body(np.linalg.inv(self.T), -back @ self.error, np.linalg.inv(C), joint)
+
+
+def random_legs(rng):
+    """Two legs of three bodies from the base to one platform, and the platform."""
+    legs, platform = [], transform([0.4, 0.1, 0.3], rotation_matrix([0.3, -0.2, 0.5]))
+    for _ in range(2):
+        leg, here = [], np.eye(4)
+        for _ in range(2):
+            T = transform(
+                rng.uniform(-0.3, 0.3, 3), rotation_matrix(rng.normal(size=3))
+            )
+            here = here @ T
+            leg.append((T, rng.choice(["pin", "hinge", "play"])))
+        leg.append((np.linalg.inv(here) @ platform, None))
+        legs.append([body(rng, T, kind) for T, kind in leg])
+    return legs, platform
+
+
+def body(rng, T, kind):
+    A = rng.normal(size=(6, 6)) * np.repeat([1.0, 0.2], 3)
+    K = 1e5 * (A.T @ A + 0.1 * np.diag(np.repeat([1.0, 0.04], 3)))
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-4, spin=5e-5)
+    joint = {
+        None: {},
+        "pin": {"joint": "revolute", "clearance": Clearance(radial=2e-5, tilt=1e-4)},
+        "hinge": {"joint": "revolute", "joint_stiffness": np.diag(
+            [1e4, 2e4, 3.0, 1e7, 1e7, 2e7])},
+        "play": {"clearance": play},
+    }[kind]  # fmt: skip
+    return Body(T, rng.normal(size=6) * np.repeat([1e-3, 2e-4], 3), K, joint)
+
+
+def robot_of(legs):
+    """The robot from its base; the first leg's end is the platform."""
+    frames, ends = [], []
+    for name, leg in zip("ab", legs, strict=True):
+        above = "base"
+        for i, one in enumerate(leg):
+            frames.append(Frame(
+                f"{name}{i}", above, one.T[:3, 3], rotation_vector(one.T[:3, :3]),
+                geometric_error=one.error, link=MatrixLink(one.K), **one.joint,
+            ))  # fmt: skip
+            above = f"{name}{i}"
+        ends.append(above)
+    return Robot("two_legs", ends[0], tuple(frames), (tuple(ends),))
+
+
+def from_the_platform(legs):
+    """Every leg backwards: bodies inverted, each joint now at its body's other end."""
+    return [
+        [
+            leg[k].reversed(leg[k - 1].joint if k else {})
+            for k in reversed(range(len(leg)))
+        ]
+        for leg in legs
+    ]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_robot_built_from_its_platform_is_the_same(seed):
+    legs, platform = random_legs(np.random.default_rng(seed))
+    one = solve_assembly(home_posture(robot_of(legs)))
+    other = solve_assembly(home_posture(robot_of(from_the_platform(legs))))
+    assert one.energy > 1e-6
+    assert other.energy == pytest.approx(one.energy, rel=1e-8)
+    assert other.energy_without_play == pytest.approx(one.energy_without_play, rel=1e-9)
+    # the old base's error seen from the platform is the platform's, turned round
+    R, p = platform[:3, :3], platform[:3, 3]
+    expected = -screw_map(R.T @ p, R.T) @ one.platform_screw
+    size = np.abs(expected).reshape(2, 3).max(axis=1).repeat(3)
+    assert np.all(np.abs(other.platform_screw - expected) < 1e-5 * size)
+    # what a body carries: its other end, and the other side exerts it
+    for name in "ab":
+        for k, this in enumerate(legs["ab".index(name)]):
+            here = one.wrenches[one.posture.robot.index(f"{name}{k}")]
+            there = other.wrenches[other.posture.robot.index(f"{name}{2 - k}")]
+            back = screw_map(this.T[:3, 3], this.T[:3, :3])
+            assert back.T @ there == pytest.approx(-here, rel=1e-4, abs=1e-4 * np.abs(
+                here).max())  # fmt: skip
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+@pytest.mark.parametrize("seed", range(6))
+def test_margins_do_not_depend_on_the_root(seed, compliant):
+    legs, _ = random_legs(np.random.default_rng(seed))
+    margins = [
+        zone_margin(home_posture(robot_of(these)), compliant).margin
+        for these in (legs, from_the_platform(legs))
+    ]
+    if margins[0] is None:
+        assert margins[1] is None
+    else:
+        assert margins[1] == pytest.approx(margins[0], rel=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rotation_errors_do_not_depend_on_the_root(seed):
+    legs, _ = random_legs(np.random.default_rng(seed))
+    brackets = []
+    for these in (legs, from_the_platform(legs)):
+        answer = solve_assembly(home_posture(robot_of(these)))
+        brackets.append(bound_pose_error(answer, "budget").rotation_error)
+    (low, high), (other_low, other_high) = brackets
+    assert low <= other_high + 1e-8
+    assert other_low <= high + 1e-8
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_finite_motions_depend_on_the_root_by_second_order_only(seed):
+    """An error before or after a turn is another error: it falls with its square."""
+    legs, _ = random_legs(np.random.default_rng(seed))
+    off = []
+    for s in (1.0, 0.5):
+        for leg in legs:
+            for one in leg:
+                one.error = one.error * s
+                one.joint = {
+                    k: v for k, v in one.joint.items() if k != "clearance"
+                }  # fmt: skip
+        energies = [
+            solve_exact(home_posture(robot_of(these))).energy
+            for these in (legs, from_the_platform(legs))
+        ]
+        off.append(abs(energies[1] / energies[0] - 1))
+    assert off[0] < 0.05
+    assert off[1] < 0.7 * off[0] + 1e-9

@@ -1,0 +1,113 @@
+"""Effects in robot files: written, read, refused, and at work in ``solve``."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from assembly.effects import LIBRARY
+from assembly.files.effect_file import parameter_names
+from assembly.files.robot_file import read_robot, write_robot
+from forcefit.inputs.table import BadInput
+
+L = 0.8
+ARM = f"""
+name = "arm"
+platform = "tool"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+joint_stiffness = [inf, inf, 4e4, inf, inf, inf]
+[[frame]]
+name = "tool"
+parent = "drive"
+translation = [{L}, 0, 0]
+link = {{ beam = {{ radius = 0.015 }}, young = 7e10, poisson = 0.3, density = 2700.0 }}
+"""
+
+
+def arm_with(tmp_path, *effects):
+    """A robot file of the arm, with lines of ``[[effect]]``."""
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM + "".join(f"[[effect]]\n{e}\n" for e in effects))
+    return path
+
+
+def test_every_effect_comes_back_from_a_file_as_it_was_written(tmp_path):
+    plain = read_robot(arm_with(tmp_path))
+    effects = {
+        name: {
+            key: 1.25 + 1e-17 * k + k
+            for k, key in enumerate(parameter_names(plain, name))
+        }
+        for name in LIBRARY
+    }
+    without_numbers = {"geometric_stiffening"}
+    assert {n for n, values in effects.items() if not values} == without_numbers
+    robot = replace(plain, effects=effects)
+    write_robot(robot, tmp_path / "again.toml")
+    assert read_robot(tmp_path / "again.toml").effects == effects
+
+
+REFUSED = {
+    'name = "self_wait"': ["self_wait", "self_weight"],
+    'name = "self_weight"\nparameters = { "g.w" = 1 }': ["g.w", "self_weight"],
+    'name = "encoder_offset"\nparameters = { tool = 1e-4 }': ["tool", "drive"],
+    'name = "encoder_offset"\nparameters = { drive = nan }': ["drive", "nan"],
+    'name = "encoder_offset"\nparameters = { drive = "0" }': ["drive"],
+    'name = "encoder_offset"\nsize = 1': ["size"],
+    'name = "drift"\n[[effect]]\nname = "drift"': ["drift", "twice"],
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_an_effect_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+    path = arm_with(tmp_path, case)
+    with pytest.raises(BadInput) as refused:
+        read_robot(path)
+    told = str(refused.value)
+    assert "\n" not in told
+    for word in ["arm.toml", *REFUSED[case]]:
+        assert word in told
+
+
+def solved(run, *words):
+    status, out, err = run("assembly", "solve", *words, "--json", "-")
+    assert status == 0, err
+    return json.loads(out)
+
+
+def test_effects_of_a_file_act_in_solve(tmp_path, run):
+    """F L / k of a second spring in series; alpha T L of a warm beam."""
+    plain = arm_with(tmp_path)
+    words = ("--load", "fy=10")
+    before = solved(run, plain, *words)["platform_screw"]
+    soft = 'name = "drive_compliance"\nparameters = { drive = 5e4 }'
+    warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
+    path = arm_with(tmp_path, soft, warm)
+    after = solved(run, path, *words, "--under", "temperature=6")["platform_screw"]
+    assert after[2] - before[2] == pytest.approx(10 * L / 5e4, rel=1e-9)
+    assert after[3] - before[3] == pytest.approx(2e-5 * 6 * L, rel=1e-9)
+
+
+def test_what_the_device_adds_is_the_reading_not_the_pose(tmp_path, run):
+    drift = 'name = "drift"\nparameters = { "amplitude.tz" = 1e-5, time_constant = 10 }'
+    path = arm_with(tmp_path, drift)
+    found = solved(run, path, "--under", "time=10")
+    assert found["platform_screw"][5] == pytest.approx(0.0, abs=1e-15)
+    assert found["reading"][5] == pytest.approx(1e-5 * (1 - 1 / 2.718281828459045))
+
+
+def test_an_effect_asks_for_what_it_depends_on(tmp_path, run):
+    warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
+    path = arm_with(tmp_path, warm)
+    status, out, err = run("assembly", "solve", path)
+    assert (status, out) == (2, "")
+    assert '"thermal_expansion" depends on temperature' in err
+    assert "--under temperature=NUMBER" in err
+    status, _, err = run("assembly", "solve", path, "--under", "temprature=6")
+    assert status == 2
+    assert "temprature" in err
+    assert "temperature" in err

@@ -1,0 +1,79 @@
+"""The body of possible errors: closed forms, and both sides of it."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.error_body import error_body, even_directions
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.report.plot import draw_assembly
+from assembly.robots.irsbot2 import irsbot2
+
+
+def reach_of(*plays):
+    frames, above = [], "base"
+    for i, play in enumerate(plays):
+        frames.append(Frame(f"j{i}", above, clearance=play))
+        above = f"j{i}"
+    robot = Robot("chain", "tip", (*frames, Frame("tip", above)))
+    return reachable_screws(solve_assembly(home_posture(robot)), "frozen")
+
+
+def test_play_of_a_joint_is_a_cylinder():
+    """Disc of 3e-5 and interval of 1e-5: heights r sin(polar) + h cos(polar)."""
+    body = error_body(reach_of(Clearance(radial=3e-5, axial=1e-5)), "translation", 150)
+    flat = np.hypot(body.directions[:, 0], body.directions[:, 1])
+    expected = 3e-5 * flat + 1e-5 * np.abs(body.directions[:, 2])
+    assert np.allclose(body.heights, expected, rtol=1e-8)
+    assert np.abs(body.points[:, 2]).max() == pytest.approx(1e-5, rel=1e-8)
+    assert body.contains([2e-5, 2e-5, 0.9e-5])
+    assert not body.contains([2.5e-5, 2.5e-5, 0])
+    assert len(body.faces) > 10
+    assert body.slack < 1e-12
+
+
+def test_a_flat_body_has_points_but_no_faces():
+    body = error_body(reach_of(Clearance(radial=3e-5)), "translation", 60)
+    assert len(body.faces) == 0
+    assert np.abs(body.points[:, 2]).max() < 1e-15
+    assert np.hypot(*body.points[:, :2].T).max() == pytest.approx(3e-5, rel=1e-8)
+
+
+def test_the_bodys_farthest_point_is_within_the_certified_bounds():
+    answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
+    body = error_body(reachable_screws(answer, "frozen"), "rotation", 100)
+    found = bound_pose_error(answer, "frozen")
+    farthest = np.linalg.norm(body.points, axis=1).max()
+    assert farthest <= found.rotation_error[1] + 1e-12
+    assert farthest > 0.9 * found.rotation_error[0]
+    assert body.contains(found.rotation_screw[:3])
+
+
+def test_what_has_no_body_is_refused():
+    free = Robot("door", "tip", (Frame("h", joint="revolute"), Frame("tip", "h")))
+    reach = reachable_screws(solve_assembly(home_posture(free)), "frozen")
+    with pytest.raises(ValueError, match="moves freely"):
+        error_body(reach, "rotation")
+    with pytest.raises(ValueError, match="part is 'both'"):
+        error_body(reach_of(Clearance(radial=1e-5)), "both")
+
+
+def test_directions_are_unit_vectors_spread_over_all_octants():
+    directions = even_directions(200)
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1, rtol=0, atol=1e-14)
+    octants = (directions > 0) @ [1, 2, 4]
+    assert np.bincount(octants).min() >= 20
+
+
+def test_the_picture_shows_the_body_and_says_its_size():
+    answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
+    plotter = draw_assembly(answer, errors="translation", reading="frozen")
+    said = plotter.actors["body"].GetText(0)
+    pixels = plotter.screenshot(return_img=True).astype(int)
+    plotter.close()
+    assert said.startswith("gold: translation errors possible (frozen), up to 0.38")
+    gold = (pixels[..., 0] > 150) & (pixels[..., 1] > 110) & (pixels[..., 2] < 110)
+    assert gold.sum() > 500

@@ -1,0 +1,169 @@
+"""Laws of the whole model: units, frames, where a loop is cut, reciprocity."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.robots.irsbot2 import irsbot2
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+from tests.robots_for_tests import planar_four_bar, random_robot
+
+ROD = BeamLink({"radius": 0.01}, 70e9, 0.33)
+
+
+def in_millimetres(robot, s=1000.0):
+    """The same robot with lengths in another unit: N stays N, m becomes s units."""
+    screw = np.array([1, 1, 1, s, s, s])
+
+    def stiffness(K):
+        # w = K x with moments s times larger, shifts s times larger
+        wrench = np.array([s, s, s, 1, 1, 1])
+        return K * np.outer(wrench, 1 / screw)
+
+    def turned(frame):
+        part = {}
+        if frame.link is not None:
+            part["link"] = MatrixLink(stiffness(frame.link.stiffness))
+        if frame.joint_stiffness is not None:
+            part["joint_stiffness"] = np.diag(
+                np.diag(frame.joint_stiffness) * [s, s, s, 1 / s, 1 / s, 1 / s]
+            )
+        if frame.clearance is not None:
+            c = frame.clearance
+            axial = None if c.axial is None else c.axial * s
+            part["clearance"] = Clearance(c.radial * s, axial, c.tilt, c.spin)
+        return replace(
+            frame, translation=frame.translation * s,
+            geometric_error=frame.geometric_error * screw, **part,
+        )  # fmt: skip
+
+    return replace(robot, frames=tuple(turned(f) for f in robot.frames))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_another_unit_of_length_changes_numbers_and_nothing_else(seed):
+    """Energy in N mm is 1000 times that in N m; margins and angles are the same."""
+    robot = random_robot(np.random.default_rng(seed), legs=2)
+    small = replace(robot, frames=tuple(
+        replace(f, joint_stiffness=None) for f in robot.frames
+    ))  # fmt: skip
+    one, other = home_posture(small), home_posture(in_millimetres(small))
+    try:
+        here = solve_assembly(one)
+    except Exception as error:  # refused in one unit, refused in the other
+        with pytest.raises(type(error)):
+            solve_assembly(other)
+        return
+    there = solve_assembly(other)
+    floor = 1e-9 * here.energy_without_play
+    assert there.energy / 1000 == pytest.approx(here.energy, rel=1e-7, abs=floor)
+    a, b = zone_margin(one).margin, zone_margin(other).margin
+    assert (a is None) == (b is None)
+    if a is not None:
+        assert b == pytest.approx(a, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_moving_the_whole_robot_moves_the_answer_with_it(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=2)
+    turn, shift = rng.uniform(-2, 2, 3), rng.uniform(-1, 1, 3)
+    root = Frame("root", translation=shift, rotation=turn)
+    frames = tuple(
+        replace(f, parent="root") if f.parent == "base" else f for f in robot.frames
+    )
+    moved = replace(robot, frames=(root, *frames))
+    try:
+        one = solve_assembly(home_posture(robot))
+    except Exception as error:
+        with pytest.raises(type(error)):
+            solve_assembly(home_posture(moved))
+        return
+    other = solve_assembly(home_posture(moved))
+    floor = 1e-9 * one.energy_without_play
+    assert other.energy == pytest.approx(one.energy, rel=1e-7, abs=floor)
+    one_error = bound_pose_error(one, "frozen")
+    other_error = bound_pose_error(other, "frozen")
+    for name in ("rotation_error", "translation_error"):
+        a, b = getattr(one_error, name), getattr(other_error, name)
+        assert a == b or (a[0] <= b[1] + 1e-9 and b[0] <= a[1] + 1e-9)
+    if one.energy > 1e-6 * one.energy_without_play:
+        R = rotation_matrix(turn)
+        back = np.concatenate([R.T @ other.platform_screw[:3],
+                               R.T @ other.platform_screw[3:]])  # fmt: skip
+        # the pose is unique only up to unloaded play: compare within its bounds
+        assert np.linalg.norm(back[:3]) <= one_error.rotation_error[1] + 1e-7
+
+
+def cut_at_the_crank(robot):
+    """The four-bar with its loop cut at the crank's end: the coupler runs backwards."""
+    frame = {f.name: f for f in robot.frames}
+    pin_b, rocker, end_b = frame["pin_b"], frame["rocker"], frame["end_b"]
+    length = float(pin_b.translation[0])
+    frames = (
+        frame["crank"],
+        Frame("crank_end", "crank", frame["pin_a"].translation,
+              frame["pin_a"].rotation,
+              geometric_error=frame["pin_a"].geometric_error),
+        rocker,
+        # the rocker's own body, then the pin that joins it to the coupler
+        replace(end_b, name="pin", joint="revolute"),
+        # the coupler from its far end to its near one, and the pin there
+        Frame("near", "pin", [-length, 0, 0], joint="revolute", link=pin_b.link),
+        Frame("near_end", "near"),
+    )  # fmt: skip
+    return Robot("cut", "crank_end", frames, (("crank_end", "near_end"),))
+
+
+def test_where_a_loop_is_cut_changes_nothing():
+    """Errors of crank and rocker across the plane bend the coupler, cut or reversed."""
+    errors = np.zeros((6, 6))
+    errors[1] = [1e-3, -2e-3, 0, 0, 0, 3e-4]
+    errors[5] = [-2e-3, 1e-3, 0, 0, 0, -1e-4]
+    robot = planar_four_bar(errors=errors)
+    frames = {f.name: f for f in robot.frames}
+    assert isinstance(frames["pin_b"].link, BeamLink)
+    one = solve_assembly(home_posture(robot))
+    other = solve_assembly(home_posture(cut_at_the_crank(robot)))
+    assert one.energy > 1e-3
+    assert other.energy == pytest.approx(one.energy, rel=1e-9)
+
+
+def test_reciprocity_two_loads_do_each_others_work(rng):
+    """Maxwell-Betti on the paper's closed loops without play: w1 . x2 = w2 . x1."""
+    robot = irsbot2()
+    tight = replace(robot, frames=tuple(
+        replace(f, clearance=None) for f in robot.frames
+    ))  # fmt: skip
+    posture = home_posture(tight)
+    for _ in range(5):
+        first, second = rng.normal(size=(2, 6)) * [1, 1, 1, 10, 10, 10]
+        one, other = (solve_assembly(posture, w) for w in (first, second))
+        work = float(second @ one.platform_screw)
+        assert float(first @ other.platform_screw) == pytest.approx(work, rel=1e-8)
+
+
+def test_a_rigid_serial_robot_stands_exactly_where_its_errors_put_it():
+    """Nothing can move, nothing is solved: the product of the transforms by hand."""
+    error = np.array([0.02, -0.01, 0.03, 1e-3, 2e-3, -3e-3])
+    frames = (
+        Frame("a", translation=[0.1, 0.2, 0.3], rotation=[0.3, 0.1, -0.2],
+              geometric_error=error),
+        Frame("b", "a", [0.4, 0, 0], [0, 0.7, 0], geometric_error=-error),
+    )  # fmt: skip
+    posture = home_posture(Robot("arm", "b", frames))
+    found = solve_exact(posture).platform_screw
+    small = [transform(s * error[3:], rotation_matrix(s * error[:3])) for s in (1, -1)]
+    a, b = posture.robot.fixed_transforms
+    actual = a @ small[0] @ b @ small[1]
+    nominal = posture.transforms[1]
+    turn = rotation_vector(actual[:3, :3] @ nominal[:3, :3].T)
+    expected = np.concatenate([turn, actual[:3, 3] - nominal[:3, 3]])
+    assert np.allclose(found, expected, rtol=0, atol=1e-14)

@@ -1,0 +1,122 @@
+"""Loads on bodies and weight, against beams worked by hand."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.load import forces_on
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from tests.robots_for_tests import planar_four_bar
+
+L, RADIUS, E, RHO, G = 0.8, 0.02, 70e9, 2700.0, 9.81
+AREA = np.pi * RADIUS**2
+EI = E * np.pi * RADIUS**4 / 4
+Q = RHO * AREA * G  # [N/m]
+
+
+def cantilever(cuts=1, theory="euler", turn=(0.0, 0.0, 0.0)):
+    """A beam along x in as many pieces as asked, base turned."""
+    link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO, theory=theory)
+    frames = [Frame("root", rotation=turn)]
+    for i in range(cuts):
+        above = f"p{i - 1}" if i else "root"
+        frames.append(Frame(f"p{i}", above, [L / cuts, 0, 0], link=link))
+    return Robot("cantilever", frames[-1].name, tuple(frames))
+
+
+@pytest.mark.parametrize("cuts", [1, 2, 5])
+def test_a_beam_sags_under_its_weight_as_in_the_textbook(cuts):
+    """Tip: q L^4 / 8 EI down, slope q L^3 / 6 EI, in any number of pieces."""
+    answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
+    expected = [0, Q * L**3 / (6 * EI), 0, 0, 0, -Q * L**4 / (8 * EI)]
+    assert np.allclose(answer.platform_screw, expected, rtol=1e-9, atol=1e-15)
+    assert answer.duality_gap() <= 1e-9 * answer.energy
+
+
+def test_shear_adds_half_the_weight_at_the_tip():
+    """Timoshenko: q L^2 / 2 k G A more, k = 6 (1 + nu) / (7 + 6 nu)."""
+    answer = solve_assembly(
+        home_posture(cantilever(theory="timoshenko")), gravity=[0, 0, -G]
+    )
+    shear = 6 * 1.3 / (7 + 6 * 0.3) * E / 2.6 * AREA
+    expected = -Q * L**4 / (8 * EI) - Q * L**2 / (2 * shear)
+    assert answer.platform_screw[5] == pytest.approx(expected, rel=1e-9)
+
+
+def test_turning_robot_and_gravity_together_turns_the_answer():
+    from stiffness.screws import rotation_matrix
+
+    turn = np.array([0.4, -0.9, 0.3])
+    R = rotation_matrix(turn)
+    one = solve_assembly(home_posture(cantilever()), gravity=[0, 0, -G])
+    other = solve_assembly(home_posture(cantilever(turn=turn)), gravity=R @ [0, 0, -G])
+    back = np.concatenate([R.T @ other.platform_screw[:3],
+                           R.T @ other.platform_screw[3:]])  # fmt: skip
+    assert np.allclose(back, one.platform_screw, rtol=1e-9, atol=1e-15)
+
+
+def test_a_mass_beside_the_frame_pulls_with_its_arm():
+    """2 kg 0.3 m beyond the tip of a rigid arm on a torsion spring about y."""
+    K = np.diag([np.inf] * 6).astype(float)
+    K[2, 2] = 500.0
+    frames = (
+        Frame("hinge", rotation=[-np.pi / 2, 0, 0], joint="revolute",
+              joint_stiffness=K),
+        Frame("arm", "hinge", [0.5, 0, 0], [np.pi / 2, 0, 0], mass=2.0,
+              centre_of_mass=[0.3, 0, 0]),
+    )  # fmt: skip
+    robot = Robot("arm", "arm", frames)
+    answer = solve_assembly(home_posture(robot), gravity=[0, 0, -G])
+    angle = 2.0 * G * 0.8 / 500.0  # moment 2 g (0.5 + 0.3), about +y
+    assert answer.platform_screw[1] == pytest.approx(angle, rel=1e-12)
+    assert answer.platform_screw[5] == pytest.approx(-0.5 * angle, rel=1e-12)
+    assert answer.joint_wrenches[0, 2] == pytest.approx(2 * G * 0.8, rel=1e-12)
+
+
+def test_a_load_on_a_body_does_not_pass_its_own_joint():
+    """The body's link feels it, the soft joint at its far end does not."""
+    K = 1e5 * np.eye(6)
+    frames = (
+        Frame("body", link=MatrixLink(K), joint="revolute", joint_stiffness=K),
+        Frame("tip", "body"),
+    )
+    robot = Robot("two", "tip", frames)
+    bodies = np.zeros((2, 6))
+    bodies[0, 3] = 50.0
+    answer = solve_assembly(home_posture(robot), bodies=bodies)
+    assert answer.link_screws[0, 3] == pytest.approx(5e-4)
+    assert np.abs(answer.joint_screws).max() == 0.0
+    assert answer.wrenches[0, 3] == pytest.approx(50.0)
+    assert answer.joint_wrenches[0, 3] == 0.0
+    on_platform = solve_assembly(home_posture(robot), load=[0, 0, 0, 50.0, 0, 0])
+    assert on_platform.joint_screws[0, 3] == pytest.approx(5e-4)
+
+
+def test_a_load_on_the_platforms_body_is_the_platforms_load():
+    posture = home_posture(planar_four_bar())
+    load = np.array([0.1, -0.2, 0.3, 4.0, 5.0, 6.0])
+    bodies = np.zeros((6, 6))
+    bodies[posture.robot.index("end_a")] = load
+    one, other = forces_on(posture, load), forces_on(posture, bodies=bodies)
+    assert np.allclose(one.body, other.body, rtol=0, atol=1e-14)
+    assert np.allclose(one.joint, other.joint, rtol=0, atol=1e-14)
+
+
+def test_reactions_of_a_closed_loop_carry_its_weight():
+    """Both chains of a loop hang from the base: what enters there is the weight."""
+    from dataclasses import replace
+
+    robot = planar_four_bar()
+    heavy = tuple(
+        replace(f, mass=1.5, centre_of_mass=[0.02, 0.01, 0.03])
+        if f.name in {"pin_b", "rocker", "crank"} else f
+        for f in robot.frames
+    )  # fmt: skip
+    answer = solve_assembly(
+        home_posture(replace(robot, frames=heavy)), gravity=[0, 0, -G]
+    )
+    roots = [i for i, p in enumerate(answer.posture.robot.parents) if p < 0]
+    T = answer.posture.transforms
+    total = sum(T[i, :3, :3] @ answer.wrenches[i, 3:] for i in roots)
+    assert np.allclose(total, [0, 0, -4.5 * G], rtol=1e-9, atol=1e-9)

@@ -1,0 +1,380 @@
+"""Bounds of (27): closed forms, the reference's brackets, and a second road."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import HalfspaceIntersection
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.closure import linearise
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.model.clearance import CONES, clearance_bounds
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots.irsbot2 import irsbot2
+from assembly.solvers.majorant import eigenvectors, largest_on_sphere
+from assembly.solvers.polytope import cut, empty_polytope, farthest_corner, start_box
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    planar_four_bar,
+    small_clearance,
+)
+
+CASES = [
+    pytest.param(case, point, id=f"{case['name']}-{point['x']}-{point['z']}")
+    for case in NUMBERS["cases"]
+    for point in case["points"]
+]
+
+
+def serial(*clearances, arm=0.3):
+    """Fixed joints with play, ``arm`` apart along x."""
+    frames, above = [], "base"
+    for i, play in enumerate(clearances):
+        shift = [arm * bool(i), 0, 0]
+        frames.append(Frame(f"j{i}", above, shift, clearance=play))
+        above = f"j{i}"
+    frames.append(Frame("tip", above, [arm, 0, 0]))
+    return Robot("serial", "tip", tuple(frames))
+
+
+def bounds(robot, reading="frozen", **options):
+    answer = solve_assembly(home_posture(robot))
+    tight = {"tolerance_rotation": 1e-9, "tolerance_translation": 1e-9}
+    return bound_pose_error(answer, reading, **tight | options)
+
+
+def assert_holds(bracket, value, tolerance):
+    """The bracket is as narrow as asked and holds the value."""
+    low, high = bracket
+    assert high - low <= tolerance
+    slip = 1e-9 * value
+    assert low <= value + slip
+    assert high >= value - slip
+
+
+def test_one_joint_gives_its_own_cones():
+    """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
+    the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
+    """
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
+    found = bounds(serial(play))
+    assert_holds(found.rotation_error, 5e-4, 1e-9)
+    # x: r cos a; y: r sin a + 0.3 spin; z: axial + 0.3 tilt
+    a = np.linspace(0, 2 * np.pi, 2_000_001)
+    sizes = np.hypot(2e-5 * np.cos(a), 2e-5 * np.sin(a) + 0.3 * 3e-4)
+    expected = np.hypot(sizes.max(), 1e-5 + 0.3 * 4e-4)
+    assert_holds(found.translation_error, expected, 1e-9)
+
+
+def test_play_of_parallel_joints_adds_up_along_a_serial_chain():
+    found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
+    assert_holds(found.translation_error, 3e-5, 1e-9)
+    assert_holds(found.rotation_error, 0.0, 1e-9)
+
+
+def test_any_point_of_the_platform_can_be_asked_about():
+    found = bounds(serial(Clearance(tilt=1e-3)), offset=[0.2, 0, 0])
+    assert_holds(found.translation_error, 0.5e-3, 1e-9)
+
+
+def test_a_platform_that_moves_freely_has_no_bound():
+    robot = Robot(
+        "door", "tip", (Frame("hinge", joint="revolute"), Frame("tip", "hinge"))
+    )
+    found = bounds(robot)
+    assert found.rotation_error == (np.inf, np.inf)
+    limited = Robot("door", "tip", (
+        Frame("hinge", joint="revolute", clearance=Clearance(spin=0.01)),
+        Frame("tip", "hinge", [0.5, 0, 0]),
+    ))  # fmt: skip
+    found = bounds(limited)
+    assert_holds(found.rotation_error, 0.01, 1e-9)
+    assert_holds(found.translation_error, 0.005, 1e-9)
+
+
+@pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
+def test_a_passive_joint_with_a_bound_turns_up_to_it(spin):
+    """An arm L on it: y: radial + L spin, z: axial + L tilt, both at once, by hand."""
+    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
+    hub = Frame("hub", joint="revolute", clearance=play)
+    found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
+    far = np.hypot(1e-5 + 0.2 * spin, 2e-5 + 0.2 * 3e-4)
+    assert_holds(found.translation_error, far, 1e-7 * spin + 1e-9)
+    assert_holds(found.rotation_error, np.hypot(spin, 3e-4), 1e-7 * spin + 1e-9)
+
+
+def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
+    """On the axis, h above the bearing: radial + h tilt, and axial; by hand.
+
+    Off the axis the point runs round without bound.
+    """
+    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
+    hub = Frame("hub", joint="revolute", clearance=play)
+    robot = Robot("spindle", "tool", (hub, Frame("tool", "hub", [0, 0, 0.4])))
+    found = bounds(robot)
+    assert found.rotation_error == (np.inf, np.inf)
+    assert_holds(found.translation_error, np.hypot(1e-5 + 0.4 * 3e-4, 2e-5), 1e-9)
+    found = bounds(robot, offset=[0, 1e-3, 0])
+    assert found.translation_error == (np.inf, np.inf)
+    slide = replace(hub, joint="prismatic", clearance=Clearance(tilt=3e-4))
+    found = bounds(replace(robot, frames=(slide, robot.frames[1])))
+    assert_holds(found.rotation_error, 3e-4, 1e-9)
+    assert found.translation_error == (np.inf, np.inf)
+
+
+def hinged_frame(spin):
+    """A four-bar with play in its pins, two of them bounded to +-spin."""
+    play = small_clearance(spin=spin)
+    robot = planar_four_bar()
+    limited = {"pin_a": play, "rocker": play, "pin_b": small_clearance()}
+    return replace(robot, frames=tuple(
+        replace(f, clearance=limited.get(f.name)) for f in robot.frames
+    ))  # fmt: skip
+
+
+def feasible(posture, cp):
+    """Screws of play within every bound that close the perfect robot, for cvxpy."""
+    robot, lin = posture.robot, linearise(posture)
+    c = cp.Variable((len(robot.frames), 6))
+    moved = 1e-4 * cp.reshape(c, (6 * len(robot.frames),), order="C")
+    within = [lin.rows @ moved * 1e4 == 0]
+    for j, row in enumerate(clearance_bounds(robot)):
+        for k, rows in enumerate(CONES):
+            if np.isfinite(row[k]):
+                part = cp.hstack([c[j, r] for r in rows])
+                within.append(cp.norm(part) <= row[k] * 1e4)
+    return lin.platform @ moved, within
+
+
+@pytest.mark.parametrize("spin", [1.0, 3e-4, 1e-4, 1e-5, 1e-8])
+def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng):
+    """Put back into the closures by cvxpy, which also finds the supports; its 1e-6."""
+    import cvxpy as cp
+
+    from assembly.linear.reference import OPTIMAL, _solve
+
+    posture = home_posture(hinged_frame(spin))
+    answer = solve_assembly(posture)
+    found = bound_pose_error(answer, tolerance_translation=1e-9)
+    x, within = feasible(posture, cp)
+    for screw in (found.rotation_screw, found.translation_screw):
+        off = cp.Problem(cp.Minimize(cp.sum_squares(1e4 * (x - screw))), within)
+        _solve(off, OPTIMAL)
+        assert off.value < 1e-10
+    reach = reachable_screws(answer, "frozen")
+    for direction in rng.normal(size=(4, 6)) * [0.1, 0.1, 0.1, 1, 1, 1]:
+        most = cp.Problem(cp.Maximize(1e4 * direction @ x), within)
+        _solve(most, OPTIMAL)
+        height = reach.support(direction).height
+        assert height == pytest.approx(most.value / 1e4, rel=1e-6, abs=1e-11)
+
+
+def test_the_largest_error_grows_with_the_bound_and_begins_where_it_is_zero():
+    spins = [0.0, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1.0]
+    found = [bounds(hinged_frame(spin)) for spin in spins]
+    for part in ("rotation_error", "translation_error"):
+        low, high = np.array([getattr(one, part) for one in found]).T
+        assert np.all(low[:-1] <= high[1:])
+        assert high[1] - low[0] <= 3e-9
+        assert low[-1] > 1.1 * high[0]
+        # a bound that no play comes near changes nothing
+        assert low[-1] == pytest.approx(low[-2], rel=1e-5)
+
+
+def test_planar_loop_by_vertex_enumeration():
+    """Two play joints along x and y meet a third: a polygon's farthest vertex.
+
+    Chain A can be at |x| <= 3, |y| <= 4 (units of 1e-5 m); chain B within |x| <= 5,
+    |y| <= 1: the platform's box is 3 x 1, its farthest corner sqrt(10).
+    """
+
+    def slider(name, above, turn, bound):
+        return Frame(name, above, rotation=turn, clearance=Clearance(axial=bound))
+
+    to_x, to_y = [0, np.pi / 2, 0], [-np.pi / 2, 0, 0]
+    frames = []
+    for leg, (x, y) in (("a", (3e-5, 4e-5)), ("b", (5e-5, 1e-5))):
+        frames += [
+            slider(f"{leg}x", "base", to_x, x),
+            Frame(f"{leg}m", f"{leg}x", rotation=[0, -np.pi / 2, 0]),
+            slider(f"{leg}y", f"{leg}m", to_y, y),
+            Frame(f"{leg}e", f"{leg}y", rotation=[np.pi / 2, 0, 0]),
+        ]
+    robot = Robot("table", "ae", tuple(frames), (("ae", "be"),))
+    found = bounds(robot)
+    assert_holds(found.translation_error, np.sqrt(10) * 1e-5, 1e-9)
+    assert np.abs(np.abs(found.translation_screw[3:5]) - [3e-5, 1e-5]).max() < 1e-9
+
+
+@pytest.mark.parametrize("eta", [0.05, 0.5])
+def test_budget_around_two_springs_is_a_ball_known_in_closed_form(eta):
+    """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
+    k1, k2, gap = 1e6, 3e6, 2e-4
+    robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
+    least = k1 * k2 / (k1 + k2) * gap**2 / 2
+    radius = np.sqrt(2 * eta * least / (k1 + k2))
+    found = bounds(robot, "budget", energy_budget=eta)
+    assert_holds(found.translation_error, gap * k2 / (k1 + k2) + radius, 1e-9)
+    assert_holds(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
+
+
+def test_frozen_deformations_leave_a_loaded_joint_no_play():
+    robot = coaxial_beams(
+        np.array([0, 0, 0, 3e-4, 0, 0]), clearance=Clearance(radial=1e-4, axial=2e-5)
+    )
+    answer = solve_assembly(home_posture(robot))
+    found = bounds(robot)
+    # the loaded disc is held; the unloaded interval along z plays, but the springs
+    # that would have to follow it are frozen
+    size = float(np.linalg.norm(answer.platform_screw[3:]))
+    assert_holds(found.translation_error, size, 1e-9)
+
+
+def test_reading_must_be_known_and_budget_needs_no_load():
+    answer = solve_assembly(
+        home_posture(coaxial_beams(np.zeros(6))), [1, 0, 0, 0, 0, 0]
+    )
+    with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
+        bound_pose_error(answer, "loose")
+    with pytest.raises(ValueError, match="budget reading needs no load"):
+        bound_pose_error(answer, "budget")
+
+
+@pytest.mark.parametrize(("case", "point"), CASES)
+@pytest.mark.parametrize(("key", "reading"), [("rigid", "frozen"), ("free", "free")])
+def test_brackets_meet_the_reference_brackets(case, point, key, reading):
+    """Both hold the truth, so they overlap; 1e-7 is what the reference's own
+    deformations leave uncertain where the energy is nearly zero.
+    """
+    pose = {"tx": point["x"], "tz": point["z"]}
+    for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):
+        answer = solve_assembly(place_robot(robot, pose=pose))
+        found = bound_pose_error(answer, reading)
+        for letter, bracket in (
+            ("R", found.rotation_error),
+            ("T", found.translation_error),
+        ):
+            low, high = point[f"{name}_{key}_{letter}"]
+            assert bracket[1] - bracket[0] <= 1e-6
+            assert bracket[0] <= high + 1e-7
+            assert bracket[1] >= low - 1e-7
+
+
+def test_clearances_alone_give_a_map_symmetric_in_x():
+    both = []
+    for x in (-0.25, 0.25):
+        answer = solve_assembly(place_robot(irsbot2(), pose={"tx": x, "tz": -0.4}))
+        both.append(bound_pose_error(answer, "frozen"))
+    for name in ("rotation_error", "translation_error"):
+        left, right = (getattr(b, name) for b in both)
+        assert left[0] <= right[1]
+        assert right[0] <= left[1]
+
+
+def test_attaining_screws_are_in_the_set_and_no_random_screw_beats_the_bound():
+    """A second road from inside: random support directions stay below the upper."""
+    answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
+    found = bound_pose_error(answer, "frozen")
+    reach = reachable_screws(answer, "frozen")
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        direction = np.concatenate([rng.normal(size=3), np.zeros(3)])
+        found_there = reach.support(direction)
+        assert direction @ found_there.screw <= found_there.height + 1e-15
+        assert np.linalg.norm(found_there.screw[:3]) <= found.rotation_error[1]
+    assert np.linalg.norm(found.rotation_screw[:3]) == pytest.approx(
+        found.rotation_error[0], rel=1e-12
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), cuts=st.integers(1, 30), thin=st.booleans())
+def test_polytope_corners_equal_qhulls(seed, cuts, thin):
+    rng = np.random.default_rng(seed)
+    size = np.array([1.0, 1.0, 1e-3 if thin else 1.0])
+    low, high = -size * rng.uniform(0.5, 1.5, 3), size * rng.uniform(0.5, 1.5, 3)
+    body = empty_polytope()
+    start_box(body, np.eye(3), low, high)
+    planes = [np.append(e, -h) for e, h in zip(np.eye(3), high, strict=True)]
+    planes += [np.append(-e, h) for e, h in zip(np.eye(3), low, strict=True)]
+    for _ in range(cuts):
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        height = rng.uniform(0.3, 1.2) * np.linalg.norm(size * normal)
+        assert cut(body, normal, height)
+        planes.append(np.append(normal, -height))
+    assert_same_corners(body, np.array(planes), rng)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-13, 1e-9, 1e-3])
+def test_polytope_survives_planes_through_its_corners_and_parallel_ones(tilt, rng):
+    """An octahedron cut out of a cube: every plane through three of its corners, and
+    again with a normal off by ``tilt``.
+    """
+    body = empty_polytope()
+    start_box(body, np.eye(3), -np.ones(3), np.ones(3))
+    planes = [np.append(s * e, -1.0) for e in np.eye(3) for s in (1, -1)]
+    for signs in itertools.product((-1.0, 1.0), repeat=3):
+        for off in (0.0, tilt):
+            normal = np.array(signs) + off * rng.normal(size=3)
+            length = np.linalg.norm(normal)
+            assert cut(body, normal / length, 1.0 / length)
+            planes.append(np.append(normal / length, -1.0 / length))
+    assert_same_corners(body, np.array(planes), rng, max(1e-9, 2 * tilt))
+
+
+def assert_same_corners(body, planes, rng, tolerance=1e-9):
+    """Farthest corner, and heights in many directions, as by Qhull."""
+    expected = HalfspaceIntersection(planes, np.zeros(3)).intersections
+    farthest = np.linalg.norm(expected, axis=1).max()
+    assert np.linalg.norm(farthest_corner(body)) == pytest.approx(
+        farthest, rel=tolerance
+    )
+    corners = body.corners[: body.used[0]]
+    for normal in itertools.chain(np.eye(3), rng.normal(size=(10, 3))):
+        heights = [float((p @ normal).max()) for p in (corners, expected)]
+        assert heights[0] == pytest.approx(heights[1], abs=tolerance)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 3), hard=st.booleans())
+def test_largest_value_of_a_quadratic_on_the_sphere(seed, rank, hard):
+    """Against a fine look at the sphere, improved by power iterations; the hard case
+    has no linear part along the largest eigenvector.
+    """
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, rank))
+    Q, g = A @ A.T, rng.normal(size=3) * 10.0 ** rng.integers(-6, 2)
+    values, vectors = np.linalg.eigh(Q)
+    if hard:
+        g -= vectors[:, 2] * (vectors[:, 2] @ g)
+    d = rng.normal(size=(3, 200))
+    for _ in range(3000):
+        # of a convex function the linear part's maximiser never goes down
+        d = Q @ d + g[:, None] + 1e-3 * values[2] * d
+        d /= np.linalg.norm(d, axis=0)
+    best = np.max(np.sum(d * (Q @ d), axis=0) / 2 + g @ d)
+    found = largest_on_sphere(Q, g)
+    assert found == pytest.approx(best, rel=1e-6)
+    assert found >= best * (1 - 1e-13)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), scale=st.integers(-20, 20))
+def test_eigenvectors_equal_lapacks(seed, scale):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, 3)) * 10.0 ** rng.integers(-8, 3, 3)
+    Q = (A + A.T) * 10.0**scale
+    values, vectors = eigenvectors(Q)
+    size = np.abs(Q).max()
+    assert np.allclose(np.sort(values), np.linalg.eigvalsh(Q), atol=1e-14 * size)
+    assert np.allclose(vectors.T @ vectors, np.eye(3), atol=1e-14)
+    assert np.allclose(Q @ vectors, vectors * values, rtol=0, atol=1e-14 * size)

@@ -1,0 +1,206 @@
+"""Distances to singularities, against closed forms of linkages."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import (
+    home_posture,
+    place_many,
+    place_many_joints,
+    place_robot,
+)
+from assembly.linear.singularity import find_singularities
+from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
+
+
+def at(robot, **options):
+    """Distances at one posture."""
+    return find_singularities(robot, place_robot(robot, **options).transforms[None])
+
+
+def five_bar_jacobian(T, robot):
+    """(2, 2) [m/rad] drives to tip: A v = B q', Gosselin and Angeles' two matrices.
+
+    The second arm keeps its length: d.v = d.(k x a) q', a the first arm, d the second.
+    """
+    A, B = np.zeros((2, 2)), np.zeros((2, 2))
+    tip = T[robot.index("left.tip"), :2, 3]
+    for row, side in enumerate(("left", "right")):
+        foot = T[robot.index(f"{side}.drive"), :2, 3]
+        elbow = T[robot.index(f"{side}.elbow"), :2, 3]
+        d, a = tip - elbow, elbow - foot
+        A[row], B[row, row] = d, d @ [-a[1], a[0]]
+    return A, B
+
+
+@pytest.fixture(scope="module")
+def five_bar():
+    robot = load_robot("five_bar")
+    rng = np.random.default_rng(1)
+    poses = np.full((40, 6), np.nan)
+    poses[:, 0], poses[:, 1] = (
+        rng.uniform(-0.05, 0.05, 40),
+        rng.uniform(0.08, 0.165, 40),
+    )
+    postures, _ = place_many(robot, poses)
+    return robot, np.array([p.transforms for p in postures if p is not None])
+
+
+def test_a_five_bar_has_the_singular_values_of_its_closed_form(five_bar):
+    """J = A^-1 B with the tip's turn beside its shift: tangents of the angles."""
+    robot, T = five_bar
+    found = find_singularities(robot, T)
+    assert len(T) >= 30
+    size = size_of(robot)
+    for i in range(len(T)):
+        A, B = five_bar_jacobian(T[i], robot)
+        J = np.linalg.solve(A, B)
+        # past the pin, the platform is the right second arm: it turns as well
+        tip, elbow, foot = (
+            T[i, robot.index(name), :2, 3]
+            for name in ("left.tip", "right.elbow", "right.drive")
+        )
+        d, a = tip - elbow, elbow - foot
+        relative = J - np.outer([-a[1], a[0]], [0.0, 1.0])
+        turn = (d[0] * relative[1] - d[1] * relative[0]) / (d @ d)
+        tangents = np.linalg.svd(np.vstack([turn, J / size]), compute_uv=False)
+        assert found.parallel[i] == pytest.approx(math.cos(math.atan(tangents[0])))
+        assert found.serial[i] == pytest.approx(math.sin(math.atan(tangents[-1])))
+        assert found.condition[i] == pytest.approx(tangents[0] / tangents[-1])
+
+
+def test_second_arms_in_line_are_a_parallel_singularity_and_it_is_named():
+    """det A = d_1 x d_2 = 0 where the elbows are 2 * 90 mm apart, the tip between them.
+
+    With equal drive angles either side of 90 degrees the elbows are 120 + 180 cos(t) mm
+    apart, t the left angle to the outside: cos(t) = 1/3 makes it 180 mm.
+    """
+    robot = load_robot("five_bar")
+    distances = []
+    for short in (0.1, 0.03, 0.01):
+        t = math.acos(1 / 3) + short
+        found = at(robot, joints={"left.drive": math.pi - t, "right.drive": t})
+        distances.append(found.parallel[0])
+        assert found.serial[0] > 0.01
+    # near it, the distance goes with the square root of the elbows' distance to it
+    slope = np.log(distances[0] / distances[2]) / np.log(10)
+    assert slope == pytest.approx(0.5, abs=0.1)
+    (name,) = found.names(robot, near=0.2)
+    assert name.startswith("parallel: ")
+    assert name.endswith(", platform TY")
+
+
+def test_arms_in_line_are_a_serial_singularity_and_its_drive_is_named():
+    """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
+
+    A length e short of that, the arms are bent by an angle that goes with sqrt(e).
+    """
+    robot = load_robot("five_bar")
+    found = []
+    for short in (1e-4, 1e-6):
+        out = 0.18 - short
+        pose = {"tx": -0.06 + out * math.cos(1.2), "ty": out * math.sin(1.2)}
+        found.append(at(robot, pose=pose))
+    assert found[0].serial[0] / found[1].serial[0] == pytest.approx(10, rel=0.05)
+    assert found[1].parallel[0] > 0.05
+    assert found[1].names(robot, near=0.02) == ["serial: left.drive"]
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.1, 2.5, 4.0])
+def test_a_four_bar_moves_its_point_as_its_closed_form_says(angle):
+    """Speed and turn of Hoeken's coupler by differences of its closed form."""
+    robot = load_robot("four_bar")
+    found = at(robot, joints={"crank": angle})
+
+    def point(t):
+        root = math.sqrt((5 + math.cos(t)) / (5 - 4 * math.cos(t)))
+        return 0.1 * np.array([
+            2 + 2 * root * math.sin(t),
+            2 * root * (2 - math.cos(t)),
+        ])
+
+    def coupler(t):  # from the crank's pin to the point: the coupler, twice
+        return math.atan2(
+            *(point(t) - 0.1 * np.array([math.cos(t), math.sin(t)]))[::-1]
+        )
+
+    h = 1e-5
+    speed = (point(angle + h) - point(angle - h)) / (2 * h)
+    turn = (coupler(angle + h) - coupler(angle - h)) / (2 * h)
+    tangent = math.hypot(turn, *(speed / size_of(robot)))
+    assert found.parallel[0] == pytest.approx(math.cos(math.atan(tangent)), rel=1e-8)
+    assert found.serial[0] == pytest.approx(math.sin(math.atan(tangent)), rel=1e-8)
+
+
+def test_an_orthoglide_is_isotropic_at_home():
+    """Chablat, Wenger (2003): its Jacobian is the unit matrix there, tan = 1."""
+    robot = load_robot("orthoglide")
+    found = find_singularities(robot, home_posture(robot).transforms[None])
+    assert found.condition[0] == pytest.approx(1.0, abs=1e-9)
+    assert found.serial[0] == pytest.approx(math.sqrt(0.5), abs=1e-9)
+
+
+def test_a_stretched_arm_is_serially_singular_and_has_no_closures():
+    """An arm's wrist with its fourth and sixth axes in line loses a freedom."""
+    robot = load_robot("arm6")
+    driven = [f.name for f in robot.frames if f.actuated]
+    goals = np.full((2, len(robot.frames)), np.nan)
+    rows = [robot.index(name) for name in driven]
+    home = home_posture(robot).coordinates[rows]
+    goals[:, rows] = home
+    goals[1, rows[4]] = 0.0
+    postures, _ = place_many_joints(robot, goals)
+    found = find_singularities(robot, np.array([p.transforms for p in postures]))
+    assert found.closure.tolist() == [1.0, 1.0]
+    assert found.serial[0] > 0.05
+    assert found.serial[1] < 1e-9
+    assert found.names(robot, 0.02)[0] == ""
+    assert found.names(robot, 0.02)[1].startswith("serial: ")
+
+
+def test_distances_do_not_depend_on_the_unit_of_length(five_bar):
+    """Every length times 1000 moves no angle: lengths count in the longest body."""
+    robot, T = five_bar
+    frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
+    large = T.copy()
+    large[..., :3, 3] *= 1000
+    one = find_singularities(robot, T)
+    other = find_singularities(replace(robot, frames=tuple(frames)), large)
+    for kind in ("serial", "parallel", "closure"):
+        assert getattr(other, kind) == pytest.approx(getattr(one, kind), rel=1e-9)
+
+
+def parallelogram(angle):
+    """Cranks of 0.1 m, ground and coupler of 0.3 m, at an angle to each other."""
+
+    def bar(name, parent, length, turn, **options):
+        return Frame(name, parent, [length, 0, 0], [0, 0, turn], **options)
+
+    pin = {"joint": "revolute"}
+    frames = (
+        bar("crank", "base", 0.0, angle, **pin, actuated=True),
+        bar("crank_pin", "crank", 0.1, -angle, **pin),
+        bar("coupler", "crank_pin", 0.3, 0.0),
+        bar("rocker", "base", 0.3, angle, **pin),
+        bar("rocker_pin", "rocker", 0.1, -angle, **pin),
+        bar("rocker_end", "rocker_pin", 0.0, 0.0),
+    )
+    return Robot("parallelogram", "coupler", frames, (("coupler", "rocker_end"),))
+
+
+def test_a_flat_parallelogram_is_a_closure_singularity_and_its_joint_is_named():
+    """All four axes meet one line: the distance falls in proportion to the angle."""
+    found = []
+    for angle in (0.1, 0.01):
+        robot = parallelogram(angle)
+        found.append(find_singularities(robot, home_posture(robot).transforms[None]))
+    assert found[0].closure / found[1].closure == pytest.approx(10.0, rel=0.02)
+    assert found[0].closure < 0.1
+    (name,) = found[1].names(robot, near=0.02)
+    assert name.startswith("closure: ")
+    assert name.removeprefix("closure: ") in {f.name for f in robot.frames}

@@ -1,0 +1,175 @@
+"""All rows at once against the cone solver, and what reciprocity asks of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.closure import virtual_joints
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.load import row_forces
+from assembly.linear.without_clearance import flexibility
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.measurement.settled_clearance import without_play
+from assembly.model.robot import Clearance
+from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
+
+seeds = st.integers(0, 2**32 - 1)
+STILL = np.zeros((1, 3))
+
+
+def at_home(robot):
+    """One posture, as a batch of one."""
+    here = home_posture(robot)
+    return replace(
+        here, coordinates=here.coordinates[None], transforms=here.transforms[None]
+    )
+
+
+def solved(robot, load, errors=None):
+    """The robot's only row."""
+    errors = robot.errors if errors is None else errors
+    postures = at_home(robot)
+    forces = row_forces(postures, np.array(load, dtype=float)[None], STILL)
+    return flexibility(postures).solve([0], errors.reshape(1, -1), forces)
+
+
+def farthest(found, expected):
+    """Largest difference, rotations and translations scaled by their own largest."""
+    parts = np.asarray(found).reshape(-1, 2, 3), np.asarray(expected).reshape(-1, 2, 3)
+    scale = np.abs(parts[1]).max(axis=(0, 2), keepdims=True) + 1e-300
+    return np.abs((parts[0] - parts[1]) / scale).max()
+
+
+def elastic_robot(seed, legs):
+    """Tight joints and a spring in every body: one equilibrium under any load."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs, link_share=1.0)
+    # not even bounds of sliding joints' own motion
+    tight = tuple(replace(f, clearance=None) for f in robot.frames)
+    return replace(robot, frames=tight), rng
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds, st.integers(2, 3))
+def test_a_loaded_robot_closes_as_the_cone_solver_closes_it(seed, legs):
+    """1e-6: what springs 1e6 apart leave of 1e-16 after two factorisations."""
+    robot, rng = elastic_robot(seed, legs)
+    load = rng.normal(size=6) * [5, 5, 5, 50, 50, 50]
+    fast = solved(robot, load)
+    assert fast.solved.all()
+    slow = solve_assembly(home_posture(robot), load)
+    assert farthest(fast.platform_screw[0], slow.platform_screw) < 1e-6
+    assert farthest(fast.joint_wrenches[0], slow.joint_wrenches) < 1e-6
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.integers(2, 3))
+def test_what_is_claimed_to_be_closed_has_the_least_energy(seed, legs):
+    """Rigid bodies among the elastic ones: w C w / 2 where the robot can be closed.
+
+    Where it cannot, or nearly cannot, nothing is claimed.
+    """
+    rng = np.random.default_rng(seed)
+    robot = without_play(random_robot(rng, legs, link_share=0.4))
+    fast = solved(robot, np.zeros(6))
+    try:
+        slow = solve_assembly(home_posture(robot))
+    except CannotAssemble:
+        assert not fast.solved.any()
+        return
+    if fast.solved.all():
+        w = fast.joint_wrenches.reshape(-1, 6)
+        C = flexibility(at_home(robot)).compliance
+        energy = np.einsum("ni,nij,nj->", w, C, w) / 2
+        assert energy == pytest.approx(slow.energy, rel=1e-6, abs=1e-15)
+
+
+def rigid_four_bar(error):
+    """A four-bar of rigid bars, the rocker's end off by an error."""
+    robot = planar_four_bar()
+    frames = [replace(f, link=None) for f in robot.frames]
+    frames[-1] = replace(frames[-1], geometric_error=error)
+    return replace(robot, frames=tuple(frames))
+
+
+def test_a_rigid_linkage_takes_up_errors_in_its_plane():
+    """Its closure has rank 3 of 6; in the plane that is enough.
+
+    The rocker longer by a: the pin of the coupler, which the locked crank holds, moves
+    by h along the coupler's normal, and h n . u = a along the rocker's u.
+    """
+    a = 1e-5
+    robot = rigid_four_bar([0, 0, 0, 0, 0, 0])
+    placed = home_posture(robot)
+    end = robot.index("end_b")
+    pin_a, pin_b = (
+        placed.transforms[robot.index(n)][:3, 3] for n in ("pin_a", "pin_b")
+    )
+    pivot = placed.transforms[robot.index("rocker")][:3, 3]
+    u = (pin_b - pivot) / np.linalg.norm(pin_b - pivot)
+    coupler = pin_b - pin_a
+    n = np.array([-coupler[1], coupler[0], 0]) / np.linalg.norm(coupler)
+    R = placed.transforms[end][:3, :3]
+    error = np.concatenate([np.zeros(3), R.T @ (a * u)])
+    found = solved(rigid_four_bar(error), np.zeros(6))
+    assert found.solved.all()
+    h = a / (n @ u)
+    assert found.platform_screw[0, 3:] == pytest.approx(h * n, abs=1e-12 * 1e3 * a)
+
+
+@pytest.mark.parametrize("row", [0, 1, 5])
+def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row):
+    """Nothing is claimed, and the row goes to the solver that says why."""
+    error = np.zeros(6)
+    error[row] = 1e-4
+    robot = rigid_four_bar(error)
+    assert not solved(robot, np.zeros(6)).solved.any()
+    with pytest.raises(CannotAssemble):
+        solve_assembly(home_posture(robot))
+    told = predict(as_declared(at_home(robot)))
+    assert np.isnan(told.deviation).all()
+    assert told.reason[0]
+
+
+def test_play_is_refused():
+    robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
+    assert virtual_joints(robot).cones.shape[1]
+    with pytest.raises(ValueError, match="has play, which is not linear"):
+        flexibility(at_home(robot))
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_a_load_meets_a_screw_as_the_screw_moves_the_load(seed):
+    """Betti and Maxwell: w . (platform per screw) = (what w sends through) . screw."""
+    robot, rng = elastic_robot(seed, 2)
+    load = rng.normal(size=6)
+    columns = rng.normal(size=(6 * len(robot.frames), 3))
+    carried = np.array([not f.name.endswith("tip") for f in robot.frames])
+    columns *= np.repeat(carried, 6)[:, None]
+    through = solved(robot, load, np.zeros((len(robot.frames), 6))).joint_wrenches[0]
+    moved = flexibility(at_home(robot)).platform_of(columns)[0]
+    scale = np.abs(through) @ np.abs(columns)
+    assert np.abs(load @ moved - through @ columns).max() < 1e-7 * scale.max()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_built_in_screws_push_back_with_the_energy_they_store(seed):
+    """A = A', x' A x <= 0, and -x' A x / 2 is the energy of the screws A is for."""
+    robot, rng = elastic_robot(seed, 2)
+    columns = 1e-4 * rng.normal(size=(6 * len(robot.frames), 2))
+    A = flexibility(at_home(robot)).self_stress(columns)[0]
+    assert np.abs(A - A.T).max() < 1e-8 * np.abs(A).max()
+    assert np.linalg.eigvalsh((A + A.T) / 2).max() < 1e-8 * np.abs(A).max()
+    x = rng.normal(size=2)
+    built_in = robot.with_errors((columns @ x).reshape(-1, 6))
+    energy = solve_assembly(home_posture(built_in)).energy
+    assert -x @ A @ x / 2 == pytest.approx(energy, rel=1e-6)
+    force = solved(built_in, np.zeros(6)).joint_wrenches[0] @ columns
+    assert force == pytest.approx(A @ x, abs=1e-7 * np.abs(A).max())

@@ -1,0 +1,125 @@
+"""The zone margin (21): closed forms, laws, and the printed problem in cvxpy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.reference import reference_margin
+from assembly.linear.zone import zone_margin
+from assembly.model.robot import Clearance, Frame, Robot
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    planar_four_bar,
+    random_robot,
+)
+
+PLAY = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3, spin=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("gap", "margin"),
+    [
+        ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # 5e-5 m across, 2e-5 m of play
+        ([0, 0, 0, 0, 0, -7e-6], 0.7),  # along
+        ([6e-4, 8e-4, 0, 0, 0, 0], 1.0),  # tilt
+        ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin, play on a fixed joint
+        ([0, 0, 0, 2e-5, 0, 2e-5], 2.0),  # the worst of several
+        ([0] * 6, 0.0),
+    ],
+)
+def test_margin_of_one_joint_is_gap_over_play(gap, margin):
+    robot = coaxial_beams(np.array(gap, dtype=float), clearance=PLAY)
+    zone = zone_margin(home_posture(robot))
+    assert zone.margin == pytest.approx(margin, rel=1e-9, abs=1e-12)
+    assert zone.bound == pytest.approx(margin, rel=1e-9, abs=1e-12)
+    assert zone.assemblable == (margin <= 1)
+
+
+def test_no_factor_helps_where_there_is_no_play():
+    robot = coaxial_beams(np.array([0, 0, 0, 0, 0, 1e-5]), clearance=Clearance(tilt=1))
+    zone = zone_margin(home_posture(robot))
+    assert (zone.margin, zone.bound, zone.assemblable) == (None, None, False)
+
+
+def test_passive_joints_take_up_what_they_can_for_nothing():
+    """A four-bar's pins take up errors in its plane; across, nothing does."""
+    errors = np.zeros((6, 6))
+    errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]
+    robot = planar_four_bar(errors=errors)
+    assert zone_margin(home_posture(robot)).margin == 0.0
+    errors[2, 5] = 1e-4
+    assert zone_margin(home_posture(robot.with_errors(errors))).margin is None
+
+
+def test_range_of_a_passive_joint_does_not_scale_with_the_margin():
+    """Slider of range 1e-4 and an axial play of 1e-5: (3e-4 - 1e-4) / 1e-5."""
+    frames = (
+        Frame("slide", joint="prismatic", clearance=Clearance(axial=1e-4)),
+        Frame("joint", "slide", clearance=Clearance(axial=1e-5)),
+        Frame("end", "joint"),
+        Frame("wall", geometric_error=[0, 0, 0, 0, 0, 3e-4]),
+    )
+    robot = Robot("slider", "end", frames, (("end", "wall"),))
+    assert zone_margin(home_posture(robot)).margin == pytest.approx(20.0, rel=1e-9)
+    wide = replace(frames[0], clearance=Clearance(axial=4e-4))
+    robot = replace(robot, frames=(wide, *frames[1:]))
+    assert zone_margin(home_posture(robot)).margin == pytest.approx(0.0, abs=1e-12)
+    tight = replace(frames[1], clearance=None)
+    robot = replace(robot, frames=(frames[0], tight, *frames[2:]))
+    assert zone_margin(home_posture(robot)).margin is None
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margin_is_proportional_to_the_errors(compliant):
+    case, pose = NUMBERS["cases"][0], {"tx": 0.2, "tz": -0.45}
+    one = zone_margin(place_robot(irsbot2_with(case), pose=pose), compliant)
+    tenth = zone_margin(place_robot(irsbot2_with(case, 0.1), pose=pose), compliant)
+    assert tenth.margin == pytest.approx(one.margin / 10, rel=1e-8)
+
+
+def test_scaling_the_clearances_by_the_margin_just_assembles():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    margin = zone_margin(home_posture(robot), "free").margin
+
+    def scaled(frame, factor):
+        if frame.clearance is None:
+            return frame
+        play = vars(frame.clearance)
+        larger = {k: v * factor for k, v in play.items() if k != "spin"}
+        return replace(frame, clearance=Clearance(**{**play, **larger}))
+
+    for factor, inside in ((margin * 1.0001, True), (margin * 0.9999, False)):
+        frames = tuple(scaled(f, factor) for f in robot.frames)
+        zone = zone_margin(home_posture(replace(robot, frames=frames)), "free")
+        assert zone.assemblable == inside
+
+
+def test_the_reading_of_compliant_joints_must_be_one_of_two():
+    with pytest.raises(ValueError, match="compliant is 'soft', expected 'rigid'"):
+        zone_margin(home_posture(planar_four_bar()), "soft")
+
+
+@settings(deadline=None, max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1), legs=st.integers(2, 3))
+def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
+    rng = np.random.default_rng(seed)
+    posture = home_posture(random_robot(rng, legs, 3))
+    for compliant in ("rigid", "free"):
+        zone = zone_margin(posture, compliant)
+        try:
+            expected = reference_margin(posture, compliant)
+        except RuntimeError:  # cvxpy gave up, as it does on some without an answer
+            assert zone.margin is None
+            continue
+        if expected is None:
+            assert zone.margin is None
+        else:
+            assert zone.margin == pytest.approx(expected, rel=1e-6, abs=1e-7)
+            assert zone.bound <= zone.margin * (1 + 1e-9) + 1e-12
+            assert zone.bound == pytest.approx(zone.margin, rel=1e-6, abs=1e-9)

@@ -1,0 +1,117 @@
+"""Many exact equilibria at once are those found one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from assembly.effects.places import drives
+from assembly.kinematics.posture import Posture, home_posture, place_many_joints
+from assembly.measurement.conditions import ContactLaw, as_declared
+from assembly.measurement.exact_rows import solve_rows
+from assembly.measurement.predict import assemble_row, predict, read
+from assembly.measurement.settled_clearance import without_play
+from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
+
+ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
+
+
+def situations(name, rng, laws=()):
+    """A tight robot with errors under loads and weight, at configurations of its own.
+
+    Errors of 0.2 mm and mrad, forces of some 100 N.
+    """
+    robot = without_play(load_robot(name))
+    home = np.array([f.position if f.actuated else np.nan for f in robot.frames])
+    wanted = home + ROBOTS[name] * rng.uniform(-1, 1, (3, len(home)))
+    postures, _ = place_many_joints(robot, wanted)
+    postures = [p for p in postures if p is not None] * 2
+    count = len(postures)
+    here = as_declared(
+        Posture(
+            robot, np.array([p.coordinates for p in postures]),
+            np.array([p.transforms for p in postures]), 1e-9,
+        ),
+        rng.uniform(-1, 1, (count, 6)) * np.repeat([5.0, 100.0], 3),
+        mismatch=[p.mismatch for p in postures],
+        point=[0.02, -0.01, 0.03],
+        gravity=[1.0, 2.0, -9.81],
+    )  # fmt: skip
+    errors = rng.uniform(-1, 1, here.errors.shape) * 2e-4
+    return replace(here, errors=errors, exact=True, laws=laws)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_together_as_one_by_one(name, rng):
+    """Both converge to 1e-12; nominal closures are rounded at 1e-12 at worst."""
+    here = situations(name, rng)
+    screws, found = solve_rows(here, np.zeros((len(here), 0)))
+    assert found.all()
+    for row in range(len(here)):
+        alone = assemble_row(here, row).platform_screw
+        np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
+    linear = predict(replace(here, exact=False)).deviation
+    assert np.abs(predict(here).deviation - linear).max() > 1e-7  # it matters here
+
+
+def test_a_contact_at_one_drive_settles_as_one_by_one(rng):
+    """One by one the secant settles to 1e-5 of the finite part, some 1e-10 here."""
+    first = drives(load_robot("arm6"))[0]
+    here = situations("arm6", rng, (ContactLaw(first, 2e6, 1.5),))
+    together = predict(here).deviation
+    for row in range(len(here)):
+        alone = assemble_row(here, row).platform_screw
+        turned = read_alone(here, row, alone)
+        np.testing.assert_allclose(together[row], turned, rtol=0, atol=1e-8)
+
+
+def read_alone(here, row, screw):
+    """What the device makes of one platform screw."""
+    return read(here.take([row]), screw[None])[0]
+
+
+BAR = Robot(
+    "bar", "tip",
+    (
+        Frame("drive", "base", joint="revolute", actuated=True),
+        Frame("tip", "drive", translation=[1.0, 0.0, 0.0]),
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("force", [5.0, 200.0, -200.0])
+def test_a_bar_on_a_contact_gives_by_its_law(force):
+    """c |a|^n sign(a) = F L cos a for the angle a: the arm shortens as it turns."""
+    c, n = 2e5, 1.5
+    load = [0, 0, 0, 0, force, 0]
+    here = as_declared(home_posture(BAR), load)
+    here = replace(here, laws=(ContactLaw("drive", c, n),), exact=True)
+    a = brentq(
+        lambda x: c * abs(x) ** n * np.sign(x) - force * np.cos(x),
+        -0.5,
+        0.5,
+        xtol=1e-15,
+    )
+    np.testing.assert_allclose(predict(here).deviation[0, 2], a, rtol=1e-10)
+
+
+def test_a_contact_without_load_stays_where_it_is():
+    """No load, no deflection: its secant, infinite there, must not matter."""
+    here = as_declared(home_posture(BAR), np.zeros(6))
+    here = replace(here, laws=(ContactLaw("drive", 2e5, 1.5),), exact=True)
+    np.testing.assert_array_equal(predict(here).deviation, 0.0)
+
+
+def test_rows_that_do_not_come_to_rest_claim_nothing():
+    """A spring so soft that the bar swings by radians is left to the exact solver."""
+    K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
+    frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])
+    robot = replace(BAR, frames=frames)
+    here = as_declared(home_posture(robot), [0, 0, 0, 0, 3.0, 0])
+    here = replace(here, exact=True)
+    _, found = solve_rows(here, np.zeros((1, 0)))
+    assert not found.any()
+    angle = predict(here).deviation[0, 2]
+    assert angle == pytest.approx(brentq(lambda x: x - 3 * np.cos(x), 0, 2), rel=1e-9)

@@ -1,0 +1,127 @@
+"""Mesh links put into place: rotations from mesh axes to frame axes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.model.mesh_link import mesh_link_stiffness, mesh_rotation
+from forcefit.inputs.table import BadInput
+from stiffness.link import scaled
+from stiffness.screws import rotation_vector, screw_map
+from stiffness.surface.beam_surfaces import shape_surface
+
+numbers = st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(
+    lambda v: np.linalg.norm(v) > 1e-3
+)
+
+
+@given(a=numbers, b=numbers)
+def test_the_rotation_lays_one_span_along_the_other_and_is_the_smallest(a, b):
+    a, b = np.array(a), np.array(b)
+    R = mesh_rotation(a, b)
+    assert np.allclose(R @ a / np.linalg.norm(a), b / np.linalg.norm(b), atol=1e-9)
+    assert np.allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    cosine = a @ b / np.linalg.norm(a) / np.linalg.norm(b)
+    angle = np.linalg.norm(rotation_vector(R))
+    assert np.cos(angle) == pytest.approx(np.clip(cosine, -1, 1), abs=1e-9)
+
+
+@pytest.mark.parametrize("b", [[0, 0, 2.0], [0, 0, -2.0]])
+def test_parallel_and_opposite_spans(b):
+    R = mesh_rotation(np.array([0, 0, 0.5]), np.array(b))
+    assert np.allclose(R @ [0, 0, 1], np.array(b) / 2, atol=1e-15)
+
+
+def test_up_fixes_the_roll():
+    """Mesh z along the frame's x, mesh x up along the frame's z: worked by hand."""
+    R = mesh_rotation(
+        np.array([0, 0, 1.0]), np.array([2.0, 0, 0]), (1, 0, 0), (0, 0, 1)
+    )
+    assert np.allclose(R, [[0, 0, 1], [0, 1, 0], [1, 0, 0]] @ np.diag([1, -1, 1]))
+    assert np.allclose(R @ [1, 0, 0], [0, 0, 1])
+    assert np.allclose(R @ [0, 0, 1], [1, 0, 0])
+
+
+# --- below a prismatic joint ---------------------------------------------------------
+
+RAM = """
+name = "ram"
+platform = "tool"
+[[frame]]
+name = "slide"
+parent = "base"
+joint = "prismatic"
+actuated = true
+position = {position}
+[[frame]]
+name = "tool"
+parent = "slide"
+{more}
+[frame.link]
+mesh = {{ surface = "bar.stl", base = "z=0", tip = "z=0.08" {axis} }}
+young = 6e10
+poisson = 0.3
+"""
+
+
+@pytest.fixture
+def ram(tmp_path, monkeypatch):
+    """A prismatic joint's robot file whose link is a square bar's surface."""
+    pyvista = pytest.importorskip("pyvista")
+    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
+    surface = pyvista.PolyData.from_regular_faces(bar.points, bar.triangles)
+    surface.save(tmp_path / "bar.stl")
+
+    def written(axis="", more="", position=0):
+        path = tmp_path / "ram.toml"
+        path.write_text(RAM.format(axis=axis, more=more, position=position))
+        return path
+
+    return written
+
+
+def test_a_mesh_with_an_axis_works_below_a_prismatic_joint_at_zero(ram):
+    """Along z as where a translation says so; along x the same K in turned axes."""
+    spelt = read_robot(ram(more="translation = [0, 0, 0.08]")).frame("tool")
+    K = mesh_link_stiffness(spelt).stiffness
+    along_z = read_robot(ram(", axis = [0, 0, 2]")).frame("tool")
+    assert np.abs(scaled(mesh_link_stiffness(along_z).stiffness - K, K)).max() < 1e-12
+    along_x = read_robot(ram(", axis = [1, 0, 0]")).frame("tool")
+    turn = screw_map(np.zeros(3), mesh_rotation(np.eye(3)[2], np.eye(3)[0]))
+    turned = mesh_link_stiffness(along_x).stiffness
+    assert np.abs(scaled(turned - turn @ K @ turn.T, turned)).max() < 1e-12
+    assert turned[3, 3] == pytest.approx(K[5, 5])
+
+
+def test_a_mesh_with_an_axis_may_slide_at_home_and_is_written_back(ram, tmp_path):
+    robot = read_robot(ram(", axis = [0, 0, 1]", position=0.05))
+    assert robot.frame("tool").link.axis == (0.0, 0.0, 1.0)
+    write_robot(robot, tmp_path / "again.toml")
+    again = read_robot(tmp_path / "again.toml").frame("tool").link
+    assert again == robot.frame("tool").link
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({}, 'link: found no distance from the parent; .*, or a mesh with "axis"'),
+        ({"more": "translation = [0, 0, 0.1]", "position": 0.1},
+         'home position is 0.1 m; expected 0 or an "axis"'),
+        ({"axis": ", axis = [0, 0, 0]"}, "mesh.axis: found .*, expected a direction"),
+        ({"axis": ", axis = [0, 0, 1], up = [1, 0, 0]", "more": "up = [0, 0, 3]"},
+         r'"tool".up: up = .* lies along the axis .*; expected another direction'),
+    ],
+)  # fmt: skip
+def test_a_mesh_of_no_direction_is_refused(ram, changes, message):
+    with pytest.raises(BadInput, match=message):
+        read_robot(ram(**changes))
+
+
+def test_an_up_along_the_mesh_is_refused(ram):
+    path = ram(", axis = [0, 0, 1], up = [0, 0, 1]", "up = [1, 0, 0]")
+    with pytest.raises(BadInput, match=r"link.mesh.up: up = .* lies along the axis"):
+        mesh_link_stiffness(read_robot(path).frame("tool"))

@@ -1,0 +1,130 @@
+"""What objects show of themselves: a few lines, with units, whatever their size."""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.linear.singularity import find_singularities
+from assembly.linear.zone import zone_margin
+from assembly.report.results import solution_of, solution_text
+from forcefit.inputs.display import brief, html_table, short_repr
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.sections import round_section
+from stiffness.link import LinkStiffness
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+from validation.campaign.campaign_file import read_campaign
+
+CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+LINES, CHARACTERS = 16, 1000
+
+
+@pytest.fixture(scope="module")
+def answer():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    return solve_assembly(place_robot(robot, pose={"tx": 0.1, "tz": -0.5}))
+
+
+@pytest.fixture(scope="module")
+def link():
+    C = beam_compliance(0.452, round_section(0.04, 0.3), 60e9, 0.3)
+    return LinkStiffness("Timoshenko beam", C, tip=[0.452, 0, 0], base=np.zeros(3))
+
+
+@pytest.fixture(scope="module")
+def shown(answer, link):
+    """One object of every kind that a user meets."""
+    posture = answer.posture
+    return [
+        posture.robot, posture.robot.frames[0], posture, answer, solve_exact(posture),
+        bound_pose_error(answer), zone_margin(posture),
+        reachable_screws(answer, "free"),
+        answer.linearisation, answer.joints, link,
+        find_singularities(posture.robot, posture.transforms[None]),
+        read_campaign(CAMPAIGNS / "self_weight"),
+    ]  # fmt: skip
+
+
+def test_every_object_is_a_few_lines_long(shown):
+    """A robot took 11 000 characters, a posture 20 000, an assembly 52 000."""
+    for thing in shown:
+        text = repr(thing)
+        assert len(text) <= CHARACTERS, type(thing)
+        assert len(text.splitlines()) <= LINES, type(thing)
+        assert text.startswith(type(thing).__name__)
+
+
+def test_a_notebook_gets_the_same_figures(shown):
+    for thing in shown:
+        if not hasattr(thing, "_repr_html_"):
+            continue
+        cells = re.findall(r"<td[^>]*>(.*?)</td>", thing._repr_html_())
+        assert len(cells) == len(repr(thing).splitlines()) - 1
+
+
+def test_an_assembly_shows_what_the_command_prints(answer):
+    printed = solution_text(solution_of(answer.posture))
+    for name in ("energy", "platform error"):
+        (said,) = re.findall(rf"^{name}: (.*)$", printed, flags=re.M)
+        assert f"{name:14}  {said}\n" in answer.summary()
+    assert answer.summary() == repr(answer)
+
+
+def test_the_largest_force_and_error_are_those_of_the_arrays(answer):
+    robot = answer.posture.robot
+    forces = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
+    where = robot.frames[forces.argmax()].name
+    assert f"{forces.max():.4g} N, in {where}" in repr(answer)
+    turns, shifts = 1e3 * robot.errors[:, :3], 1e3 * robot.errors[:, 3:]
+    turn, shift = (np.linalg.norm(e, axis=1).max() for e in (turns, shifts))
+    assert f"largest error  {turn:.4g} mrad, {shift:.4g} mm" in repr(robot)
+
+
+def test_names_from_files_are_escaped_in_notebooks(answer):
+    robot = replace(answer.posture.robot, name="<script>&")
+    table = robot._repr_html_()
+    assert "&lt;script&gt;&amp;" in table
+    assert "<script>" not in table
+
+
+@dataclass
+class Thing:
+    """With fields of all sorts."""
+
+    name: str
+    many: tuple
+    few: list
+    array: np.ndarray
+    small: np.ndarray
+    text: str
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def test_fields_are_shortened_when_nothing_else_is_said():
+    thing = Thing("a\nb", (0,) * 99, [1, 2], np.zeros((6, 6)), np.array([1e-12, 2.0]),
+                  "x" * 500)  # fmt: skip
+    assert repr(thing).splitlines() == [
+        "Thing a b",
+        "  many   tuple of 99",
+        "  few    [1, 2]",
+        "  array  float64 array (6, 6)",
+        "  small  [1e-12 2]",
+        "  text   " + "x" * 68 + " ...",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "None"), (0.1, "0.1"), ({}, "none"), ({"a": 1.0}, "{'a': 1.0}"),
+     ([[1], [2]], "list of 2"), (np.zeros((6, 0)), "float64 array (6, 0)")],
+)  # fmt: skip
+def test_any_value_has_a_short_line(value, text):
+    assert brief(value) == text

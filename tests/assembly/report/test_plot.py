@@ -1,0 +1,97 @@
+"""The picture of a robot: bodies meet where they should, and pixels are drawn."""
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.report.plot import displaced_bodies, robot_plotter
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+
+
+def _assembly():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    return solve_assembly(place_robot(robot, pose={"tx": 0.1, "tz": -0.5}))
+
+
+def test_displaced_chains_meet_at_every_closure():
+    """The tree walk is another road to eqs (16)-(20) than the closure's matrix."""
+    answer = _assembly()
+    robot = answer.posture.robot
+    screws = displaced_bodies(answer).end_screws
+    for a, b in robot.closures:
+        gap = screws[robot.index(a)] - screws[robot.index(b)]
+        assert np.abs(gap).max() < 1e-12
+    tip = screws[robot.index(robot.platform)]
+    assert np.abs(tip - answer.platform_screw).max() < 1e-13
+
+
+def test_the_picture_shows_links_bodies_and_the_exaggeration():
+    plotter = robot_plotter(_assembly(), exaggeration=20)
+    said = plotter.actors["caption"].GetText(2)
+    pixels = plotter.screenshot(return_img=True)
+    plotter.close()
+    assert said.startswith("displacements x 20;")
+    assert pixels.shape == (800, 1100, 3)
+    red = (pixels[..., 0] > 150) & (pixels[..., 1] < 80)
+    blue = (pixels[..., 2] > 110) & (pixels[..., 0] < 80)
+    assert red.sum() > 500
+    assert blue.sum() > 500
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "x.xyz"], 'x.xyz: found the ending ".xyz", expected a picture: .png'),
+        (["-o", "x.png", "--load", "fx=1", "--error-body", "translation", "--reading",
+          "budget"], "--reading: found budget with --load"),
+        (["-o", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
+    ],
+)  # fmt: skip
+def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
+    run, tmp_path, monkeypatch, words, message
+):
+    import assembly.linear.energy
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(assembly.linear.energy, "solve_assembly", None)
+    status, out, err = run("assembly", "show", "five_bar", *words)
+    assert (status, out) == (2, "")
+    assert err.startswith(f"forcefit: {message}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monkeypatch):
+    """The reading budget, the default without a load, is of unloaded robots."""
+    import assembly.report.plot
+
+    readings = []
+    reach = assembly.report.plot.reachable_screws
+
+    def noted(answer, reading):
+        readings.append(reading)
+        return reach(answer, reading)
+
+    monkeypatch.setattr(assembly.report.plot, "reachable_screws", noted)
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
+    words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
+             "translation", "-o", tmp_path / "x.jpg"]  # fmt: skip
+    for load in (["--load", "fx=10"], []):
+        assert run("assembly", "show", *words, *load) == (0, "", "")
+    assert readings == ["frozen", "budget"]
+    assert (tmp_path / "x.jpg").read_bytes().startswith(b"\xff\xd8\xff")
+
+
+def test_a_robot_that_does_not_go_together_is_not_drawn_and_says_so(run, tmp_path):
+    path = tmp_path / "stuck.toml"
+    path.write_text(
+        'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'
+        'name = "b"\nparent = "base"\ngeometric_error = [0, 0, 0, 1e-3, 0, 0]\n'
+        '[[closure]]\nframes = ["a", "b"]\n'
+    )
+    status, out, err = run("assembly", "show", path, "-o", tmp_path / "x.png")
+    assert (status, err) == (1, "")
+    assert out.startswith("cannot assemble: ")
+    assert [p.name for p in tmp_path.iterdir()] == ["stuck.toml"]

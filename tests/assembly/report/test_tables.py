@@ -1,0 +1,91 @@
+"""Answers as data sets and tables: the same numbers, labelled, with units."""
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.sweeps.quantities import Question, variables
+from stiffness.screws import SCREW, WRENCH
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+
+
+@pytest.fixture(scope="module")
+def answer():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    return solve_assembly(place_robot(robot, pose={"tx": 0.1, "tz": -0.5}))
+
+
+@pytest.fixture(scope="module")
+def batches(answer):
+    at = answer.posture.transforms[None].repeat(3, axis=0)
+    robot = answer.posture.robot
+    return (minimise_energies(robot, at), zone_margins(robot, at),
+            bound_pose_errors(robot, at))  # fmt: skip
+
+
+def test_an_assembly_is_a_data_set_over_frames(answer):
+    data = answer.to_xarray()
+    assert data.sizes == {"frame": 42, "screw": 6, "wrench_component": 6, "closure": 5}
+    assert float(data.energy) == answer.energy
+    robot = answer.posture.robot
+    here = data.sel(frame="leg1.link_a", wrench_component="FZ")
+    assert float(here.wrench) == answer.wrenches[robot.index("leg1.link_a"), 5]
+    assert float(data.tx) == pytest.approx(0.1)
+    assert data.platform_screw.sel(screw="TX") == answer.platform_screw[3]
+    np.testing.assert_array_equal(data.closure_wrench, answer.closure_wrenches)
+
+
+def test_its_screws_add_up_over_the_data_set(answer):
+    """Eq. (8) with labels: errors, play, links and joints make the platform's screw."""
+    data = answer.to_xarray()
+    total = (
+        data.geometric_error + data.clearance_screw + data.link_screw + data.joint_screw
+    )
+    screw = answer.linearisation.platform @ total.values.ravel()
+    np.testing.assert_allclose(screw, data.platform_screw, rtol=1e-12)
+
+
+def test_finite_motions_have_the_same_names(answer):
+    linear, exact = answer.to_xarray(), solve_exact(answer.posture).to_xarray()
+    assert {*linear.variables} == {*exact.variables}
+    assert float(exact.energy) < float(linear.energy)
+
+
+def test_every_variable_has_a_unit_and_a_meaning(answer, batches):
+    for data in (answer.to_xarray(), *(one.to_xarray() for one in batches)):
+        for name, variable in data.data_vars.items():
+            assert set(variable.attrs) == {"units", "long_name"}, name
+
+
+def test_units_and_dimensions_are_those_of_sweeps(answer, batches):
+    asked = variables(Question(answer.posture.robot, reading="frozen"))
+    seen = set()
+    for one in batches:
+        for name, variable in one.to_xarray().data_vars.items():
+            if name in asked:
+                seen.add(name)
+                assert variable.attrs["units"] == asked[name].unit, name
+                assert variable.dims == ("point", *asked[name].dims), name
+    assert seen >= {"energy", "margin", "platform_screw", "rotation_error"}
+
+
+def test_a_table_has_a_row_for_each_frame(answer):
+    table = answer.to_pandas()
+    assert list(table.index) == [f.name for f in answer.posture.robot.frames]
+    np.testing.assert_array_equal(table["wrench"][list(WRENCH)], answer.wrenches)
+    np.testing.assert_array_equal(table["link_screw"][list(SCREW)], answer.link_screws)
+    assert table.attrs["units"]["wrench"] == "N m, N"
+
+
+def test_a_table_has_a_row_for_each_point(batches):
+    energies, margins, errors = (one.to_pandas() for one in batches)
+    assert list(energies.index) == [0, 1, 2]
+    np.testing.assert_array_equal(energies["energy", ""], batches[0].energy)
+    np.testing.assert_array_equal(margins["margin", ""], batches[1].margin)
+    upper = errors["translation_error", "upper"]
+    np.testing.assert_array_equal(upper, batches[2].translation_error[:, 1])
+    assert set(errors["status", ""]) == {"ok"}

@@ -1,0 +1,210 @@
+"""Play sampled uniformly and at contact, against known volumes and rejection."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import place_robot
+from assembly.model.error_distributions import draw_generator, tolerance_sources
+from assembly.robots import load_robot
+from assembly.statistics.play import (
+    free_starts,
+    loaded_clearances,
+    play_rows,
+    settle_play,
+)
+from assembly.statistics.uniform_play import diagnose, settle_uniformly
+
+
+def generators(count, seed=3):
+    return [draw_generator(seed, draw, 9) for draw in range(count)]
+
+
+def walked(rows, starts, count=1500, start=None):
+    """Many points, by default from the middle; all must be mixed."""
+    starts = np.array(starts)
+    u = np.zeros((count, starts[-1])) if start is None else np.tile(start, (count, 1))
+    rows = np.array(rows, dtype=float).reshape(-1, starts[-1])
+    Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
+    to_screw = np.zeros((6, starts[-1]))
+    to_screw[:, : min(6, starts[-1])] = np.eye(6)[:, : starts[-1]]
+    for v, rng in zip(u, generators(count), strict=True):
+        assert settle_uniformly(Z, starts, to_screw, v, rng)
+    return u
+
+
+def test_in_a_disc_the_squared_radius_is_uniform():
+    u = walked([], [0, 2], start=[0.9, 0.0])
+    assert stats.kstest((u**2).sum(axis=1), "uniform").pvalue > 1e-3
+    assert stats.kstest(np.arctan2(*u.T) / (2 * np.pi) + 0.5, "uniform").pvalue > 1e-3
+
+
+def test_in_a_box_every_side_is_uniform():
+    u = walked([], [0, 1, 2, 3], start=[-0.99, 0.99, 0.0])
+    for side in u.T:
+        assert stats.kstest(side, stats.uniform(-1, 2).cdf).pvalue > 1e-3
+
+
+def test_a_cut_disc_agrees_with_rejection():
+    """Row u0 = u2 / 2 with |u2| <= 1 leaves the strip |u0| <= 1/2 of the unit disc."""
+    u = walked([[1, 0, -0.5]], [0, 2, 3])
+    assert np.abs(u[:, 0] - u[:, 2] / 2).max() < 1e-12
+    rng = np.random.default_rng(1)
+    tried = rng.uniform(-1, 1, size=(60_000, 2))
+    kept = tried[(np.hypot(*tried.T) <= 1) & (abs(tried[:, 0]) <= 0.5)]
+    # the strip's area is 2 (1/2 sqrt(3)/2 + asin(1/2)) = 1.913 of the square's 4
+    area = np.sqrt(3) / 2 + np.pi / 3
+    assert len(kept) / len(tried) == pytest.approx(area / 4, abs=0.01)
+    for own, other in zip(u.T, kept.T, strict=False):
+        assert stats.ks_2samp(own, other).pvalue > 1e-3
+
+
+def test_a_simplex_like_section_of_a_cube_has_its_known_mean():
+    """|u_i| <= 1 with u0 + u1 + u2 = 2.4: a triangle with centroid (0.8, 0.8, 0.8)."""
+    u = walked([[1, 1, 1]], [0, 1, 2, 3], start=[0.9, 0.9, 0.6])
+    np.testing.assert_allclose(u.sum(axis=1), 2.4, rtol=1e-12)
+    # barycentric coordinates of a uniform point: mean 1/3, variance 1/18
+    part = (1 - u) / 0.6
+    for one in part.T:
+        assert stats.kstest(one, stats.beta(1, 2).cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("thin", [1e-1, 1e-3, 1e-5])
+def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
+    """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
+    sides stay free.  A walk with steps alike in all directions would take 1 / thin^2 of
+    them.  The density of u0 is as the width of the cap, sqrt(1 - u0^2).
+    """
+    u = walked(
+        [[1, 0, -thin, 0, 0]], [0, 2, 3, 4, 5], start=[1 - thin / 2, 0, -0.5, 0.9, -0.9]
+    )
+    for side in u[:, 3:].T:
+        assert stats.kstest(side, stats.uniform(-1, 2).cdf).pvalue > 1e-3
+
+    # area of the cap beyond height x: acos(x) - x sqrt(1 - x^2)
+    def beyond(x):
+        x = np.clip(x, -1, 1)
+        return np.arccos(x) - x * np.sqrt(1 - x**2)
+
+    low = 1 - thin
+    assert u[:, 0].min() >= low * (1 - 1e-12)
+    share = 1 - beyond(u[:, 0]) / beyond(low)
+    assert stats.kstest(share, "uniform").pvalue > 1e-3
+
+
+def test_a_thin_segment_between_long_sides_is_uniform_along_all():
+    """u0 + u1 = 2 - 1e-4 leaves a segment; five sides of 2 stay beside it."""
+    rows = [[1, 1, 0, 0, 0, 0, 0]]
+    u = walked(rows, [0, 1, 2, 3, 4, 5, 6, 7], start=[1 - 5e-5] * 2 + [0.99] * 5)
+    assert stats.kstest((1 - u[:, 0]) / 1e-4, "uniform").pvalue > 1e-3
+    for side in u[:, 2:].T:
+        assert stats.kstest(side, stats.uniform(-1, 2).cdf).pvalue > 1e-3
+
+
+def test_the_diagnosis_knows_independent_draws_and_a_slow_walk():
+    """AR(1) of correlation r is worth (1 - r) / (1 + r) of its draws."""
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(4, 20_000))
+    r_hat, effective = diagnose(x)
+    assert r_hat == pytest.approx(1.0, abs=1e-3)
+    assert effective == pytest.approx(x.size, rel=0.1)
+    for t in range(1, x.shape[1]):
+        x[:, t] = 0.9 * x[:, t - 1] + np.sqrt(1 - 0.81) * x[:, t]
+    r_hat, effective = diagnose(x)
+    assert effective == pytest.approx(x.size * 0.1 / 1.9, rel=0.15)
+    # chains about 0 and 1: between them is as much as within, and more
+    assert diagnose(x + np.array([[0.0], [1], [0], [1]]))[0] > 1.1
+
+
+def test_a_walk_that_is_not_mixed_says_so():
+    """No inside at all; and no walk of its own, where none may be made longer."""
+    starts, rng = np.array([0, 1, 2]), generators(1)[0]
+    along = np.array([[1.0], [1.0]]) / np.sqrt(2)
+    corner, to_screw = np.array([1.0, -1.0]), np.eye(6)[:, :2].copy()
+    assert not settle_uniformly(along, starts, to_screw, corner, rng)
+    np.testing.assert_array_equal(corner, [1.0, -1.0])
+    middle = np.zeros(2)
+    assert not settle_uniformly(along, starts, to_screw, middle, rng, 0)
+    assert settle_uniformly(along, starts, to_screw, middle, rng)
+
+
+def near_the_edge(margin):
+    """The paper's robot with errors of which play takes up all but a little."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    rng = np.random.default_rng(1)
+    touched = np.array([f.link is not None for f in robot.frames])
+    errors = rng.normal(size=(len(robot.frames), 6)) * ([5e-3] * 3 + [2e-4] * 3)
+    errors *= touched[:, None]
+    errors *= margin / prepare_margins(posture, "rigid").solve(errors[None]).margin[0]
+    return prepare_energies(posture), errors
+
+
+@pytest.mark.parametrize("margin", [0.9, pytest.param(0.99, marks=pytest.mark.slow)])
+@pytest.mark.slow
+def test_near_the_edge_of_a_zone_longer_walks_change_no_distribution(margin):
+    """All mixed; and four mixed walks in a row end nowhere else."""
+    one, errors = near_the_edge(margin)
+    found = one.solve(np.repeat(errors[None], 200, axis=0))
+    some, mixed = settle_play(one, found, "uniform", generators(200, 3))
+    assert mixed.all()
+    more = [settle_longer(one, found, rng) for rng in generators(200, 4)]
+    for a, b in zip(some.T, np.array(more).T, strict=True):
+        assert stats.ks_2samp(a, b).pvalue > 1e-3
+
+
+def settle_longer(one, found, rng):
+    """Platform screw after four mixed walks, one from where the other ended."""
+    free = ~loaded_clearances(one, found)[0]
+    rows = play_rows(one, ~free)[:, free]
+    Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
+    to_screw = np.ascontiguousarray(one.screws[:, : len(free)][:, free])
+    u = found.clearances[0][free].copy()
+    for _ in range(4):
+        settle_uniformly(Z, free_starts(one, free), to_screw, u, rng)
+    return found.platform_screw[0] + to_screw @ (u - found.clearances[0][free])
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    robot = load_robot("irsbot2")
+    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
+    one = prepare_energies(place_robot(robot))
+    errors = sources.errors(sources.draw(0, 600, seed=2))
+    return one, one.solve(errors)
+
+
+@pytest.mark.parametrize("play", ["uniform", "contact"])
+def test_play_changes_neither_energy_nor_bounds(drawn, play):
+    """Screws moved by clearances that leave every spring as it was."""
+    one, found = drawn
+    loaded = loaded_clearances(one, found)
+    assert not loaded[found.energy < 1e-20].any()
+    assert loaded[found.energy > 1e-8].any()
+    settled, mixed = settle_play(one, found, play, generators(600))
+    assert mixed.all()
+    assert np.isfinite(settled).all()
+    assert np.abs(settled - found.platform_screw).max() > 1e-5
+
+
+@pytest.mark.slow
+def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
+    one, found = drawn
+    push = np.array([rng.normal(size=6) for rng in generators(600)])
+    size = size_of(one.posture.robot)
+    push[:, 3:] /= size
+    at_contact, anywhere = (
+        settle_play(one, found, play, generators(600))[0]
+        for play in ("contact", "uniform")
+    )
+    reach = (push * at_contact).sum(axis=1) - (push * anywhere).sum(axis=1)
+    assert reach.min() > -1e-9
+
+
+def test_an_unknown_way_is_refused(drawn):
+    one, found = drawn
+    with pytest.raises(ValueError, match="play is 'most'"):
+        settle_play(one, found, "most", generators(600))

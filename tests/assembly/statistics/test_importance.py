@@ -1,0 +1,197 @@
+"""Sobol's indices against the literature and against the closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance import (
+    linear_importance,
+    sobol_importance,
+    source_groups,
+)
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.play import PLAY
+from assembly.statistics.summary import summarise, summary_text
+
+
+def test_ishigamis_function_has_its_known_indices():
+    """a = 7, b = 0.1 (Saltelli et al. 2008, p. 196): worked from its variance parts."""
+
+    def ishigami(x):
+        value = np.sin(x[:, 0]) * (1 + 0.1 * x[:, 2] ** 4) + 7 * np.sin(x[:, 1]) ** 2
+        return np.stack([value, 3 * value + 1], axis=1)
+
+    def sample(stream, count):
+        rng = np.random.default_rng(stream)
+        return rng.uniform(-np.pi, np.pi, size=(count, 3))
+
+    groups = [(str(i), np.array([i])) for i in range(3)]
+    found = sobol_importance(ishigami, sample, groups, 20_000)
+    first, total = [0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]
+    for row in range(2):  # a scale and a shift change nothing
+        np.testing.assert_allclose(found.first[row, :, 0], first, atol=0.03)
+        np.testing.assert_allclose(found.total[row, :, 0], total, atol=0.03)
+    inside = (found.total[..., 1] <= total) & (total <= found.total[..., 2])
+    assert inside.mean() >= 0.5
+    # variance 1/2 + a^2/8 + b pi^4/5 + b^2 pi^8/18 = 13.845
+    assert found.variance[0] == pytest.approx(13.845, rel=0.03)
+
+
+def test_without_play_the_closed_form_holds():
+    """Then the platform's screw is linear in the errors."""
+    robot = load_robot("irsbot2")
+    robot = replace(
+        robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
+    )
+    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
+    one = prepare_energies(place_robot(robot))
+    groups = source_groups(sources, "kind")
+    columns = 6 * sources.frame + sources.component
+    expected = linear_importance(one.screws[:, columns], sources, groups)
+    np.testing.assert_allclose(expected.sum(axis=1), 1.0, rtol=1e-12)
+    found = sobol_importance(
+        lambda values: one.solve(sources.errors(values)).platform_screw,
+        lambda stream, k: sources.draw(0, k, 1, stream), groups, 4000,
+    )  # fmt: skip
+    # 1 / sqrt(4000) is 0.016, and four of these
+    np.testing.assert_allclose(found.first[..., 0], expected, atol=0.065)
+    np.testing.assert_allclose(found.total[..., 0], expected, atol=0.065)
+    slopes = one.screws[:, columns]
+    spread = (slopes**2 * sources.variance).sum(axis=1)
+    np.testing.assert_allclose(found.variance, spread, rtol=0.1)
+
+
+def test_a_result_that_does_not_vary_has_no_indices():
+    found = sobol_importance(
+        lambda x: np.ones((len(x), 1)),
+        lambda stream, k: np.random.default_rng(stream).random((k, 2)),
+        [("a", np.array([0])), ("b", np.array([1]))], 100,
+    )  # fmt: skip
+    assert np.isnan(found.first).all()
+
+
+def failing(x, share):
+    """A sum; no answer where the last number, which it does not use, is small."""
+    value = 2 * x[:, 0] + x[:, 1]
+    return np.where(x[:, 2] < share, np.nan, value)[:, None]
+
+
+def three(stream, k):
+    return np.random.default_rng(stream).random((k, 3))
+
+
+THREE = [(str(i), np.array([i])) for i in range(3)]
+
+
+def test_a_few_draws_that_fail_are_left_out_and_counted():
+    """4 a + b: shares 4/5 and 1/5; a draw of A, B or the mixed one fails."""
+    found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
+    np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
+    np.testing.assert_allclose(found.total[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
+    # A and B fail apart; mixing the third number takes it from B, which is one of them
+    np.testing.assert_allclose(found.failed[0], 1 - 0.99**2, atol=0.006)
+    assert np.isfinite(found.variance).all()
+
+
+def test_where_many_draws_fail_there_are_no_indices_and_a_reason():
+    found = sobol_importance(lambda x: failing(x, 0.3), three, THREE, 500)
+    assert np.isnan(found.first).all()
+    assert np.isnan(found.total).all()
+    assert (found.failed > 0.4).all()
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """Two springs 9e6 and 1e6 N/m hold a platform: it follows errors by 0.9 and 0.1."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * 9e6)),
+        Frame("mount", translation=[1.0, 0, 0]),
+        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * 1e6)),
+    )
+    robot = Robot("parallel", "one", frames, (("one", "two"),))
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-5, 0, 0], ("one", "two"))
+    return Experiment(home_posture(robot), sources)
+
+
+def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
+    """0.9 and 0.1 um; parts of 1e-5 / sqrt(3) times these."""
+    data = run_draws(stiff, 50, importance=(3000, "source"))
+    said = summarise(data)
+    report = said["importance"]["platform"]
+    for name, gain in (("one.TX", 0.9), ("two.TX", 0.1)):
+        assert report[name]["error_unit"] == "m"
+        assert report[name]["translation_gain"] == pytest.approx(gain, rel=0.05)
+        part = gain * 1e-5 / np.sqrt(3)
+        assert report[name]["translation_part"] == pytest.approx(part, rel=0.05)
+    lines = summary_text(said).splitlines()
+    first = next(i for i, line in enumerate(lines) if "for each um" in line)
+    name, _, gain = lines[first + 1].split()[:3]
+    assert (name, lines[first + 2].split()[0]) == ("one.TX", "two.TX")
+    assert float(gain) == pytest.approx(0.9, rel=0.05)
+
+
+def test_random_play_is_not_taken_for_importance():
+    """A free disc of 0.1 mm of play at a driven arm's pin; the tip follows its error.
+
+    One um for each um whatever is assumed of play, which alone moves it by up to 100.
+    """
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=1e-4)),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
+    for play in PLAY:
+        experiment = Experiment(home_posture(robot), sources, play=play, margins=False)
+        said = summarise(run_draws(experiment, 20, importance=(500, "source")))
+        found = said["importance"]["platform"]["tip.TX"]
+        assert found["translation_gain"] == pytest.approx(1.0, rel=0.1)
+        expected = "worst" if play == "worst" else "least"
+        assert said["importance"]["play"] == expected
+
+
+def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):
+    """Rigid parts that meet within 0.1 mm of play: errors of 0.3 mm often do not."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], clearance=Clearance(radial=1e-4)),
+        Frame("two", translation=[0.5, 0, 0]),
+    )
+    robot = Robot("rigid", "one", frames, (("one", "two"),))
+    sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
+    data = run_draws(Experiment(home_posture(robot), sources), 200,
+                     importance=(100, "source"))  # fmt: skip
+    said = summarise(data)
+    one = said["importance"]["quantities"]["translation"]
+    assert one["largest_share_left_out"] > 0.3
+    assert "the errors of the others are not independent" in one["reason"]
+    assert one["reason"] in summary_text(said)
+    assert 0 < said["assembled"] < 200
+    text = summary_text(said)
+    assert f"of the {said['assembled']} of 200 draws that assemble" in text
+    # the margin is |e1 - e2| / play for every draw, those that do not assemble too
+    values = sources.draw(0, 200, 1)
+    margin = np.abs(values[:, 0] - values[:, 1]) / 1e-4
+    for key in ("margin", "margin_free"):
+        found = said["quantities"][key]
+        assert (found["assembled"], found["of"]) == (said["assembled"], 200)
+        middle = found["all_draws"]["quantiles"]["0.5"]["value"]
+        assert middle == pytest.approx(np.median(margin), rel=1e-6)
+        assert found["quantiles"]["0.5"]["value"] < 1 < middle
+        assert f"{key} of all 200 draws: median {middle:.4g}" in text
+
+
+def test_groups_by_kind_join_the_legs():
+    robot = load_robot("irsbot2")
+    sources = tolerance_sources(robot, [1e-3, 0, 0, 1e-4, 0, 0])
+    names = [name for name, _ in source_groups(sources, "kind")]
+    assert names == ["link_a.RX", "link_a.TX", "link_b.RX", "link_b.TX"]
+    assert [len(c) for _, c in source_groups(sources, "frame")] == [2] * 4
+    with pytest.raises(ValueError, match="by is 'leg'"):
+        source_groups(sources, "leg")

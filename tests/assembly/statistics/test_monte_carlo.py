@@ -1,0 +1,275 @@
+"""Runs of draws: whole, cut, resumed, by threads; and the commands around them."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.link_stress import peak_stresses
+from assembly.robots import load_robot
+from assembly.statistics import monte_carlo
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.plot import (
+    allocation_figure,
+    histogram_figure,
+    tornado_figure,
+)
+from assembly.statistics.quantities import parse_limit
+from assembly.statistics.summary import summarise
+from assembly.sweeps.sweep import journal_path
+from forcefit.inputs.table import BadInput
+
+ERRORS = """
+[[errors]]
+frames = ["link_a", "link_b"]
+most = [4e-3, 4e-3, 4e-3, 2e-4, 2e-4, 2e-4]
+"""
+PLAN = """
+[limits]
+margin_free = 1.0
+[[tolerance]]
+name = "length"
+frames = ["link_a", "link_b"]
+components = ["TX"]
+[[tolerance]]
+name = "twist"
+frames = ["link_a", "link_b"]
+components = ["RX"]
+"""
+
+
+@pytest.fixture(scope="module")
+def experiment():
+    robot = load_robot("irsbot2")
+    sources = tolerance_sources(robot, [4e-3] * 3 + [2e-4] * 3)
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    return Experiment(posture, sources, seed=5)
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    monkeypatch.setattr(monte_carlo, "BLOCK", 64)
+
+
+def test_a_draw_is_what_one_solve_says(experiment):
+    data = run_draws(experiment, 5)
+    robot, sources = experiment.posture.robot, experiment.sources
+    values = sources.draw(0, 5, experiment.seed)
+    for i, errors in enumerate(sources.errors(values)):
+        posture = replace(experiment.posture, robot=robot.with_errors(errors))
+        answer = solve_assembly(posture)
+        one = data.isel(draw=i)
+        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_play
+        assert float(one["energy"]) == pytest.approx(answer.energy, abs=allowed)
+        if answer.energy > 1e-6 * answer.energy_without_play:
+            sizes = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
+            assert float(one["force"]) == pytest.approx(sizes.max(), rel=1e-3)
+            stress = peak_stresses(robot, answer.wrenches)
+            np.testing.assert_allclose(one["stress"], stress, rtol=1e-2)
+
+
+def test_a_run_that_was_killed_goes_on_and_ends_the_same(
+    experiment, small_blocks, tmp_path
+):
+    whole = run_draws(experiment, 300)
+    path = tmp_path / "draws.nc"
+
+    class Killed(Exception):
+        pass
+
+    def kill(done, total):
+        if done > 130:
+            raise Killed
+
+    with pytest.raises(Killed):
+        run_draws(experiment, 300, path, progress=kill)
+    assert not path.exists()
+    kept = journal_path(path).stat().st_size
+    seen = []
+    run_draws(experiment, 300, path, workers=2, progress=lambda d, n: seen.append(d))
+    assert seen[0] >= 130
+    assert kept > 0
+    assert not journal_path(path).exists()
+    with xarray.open_dataset(path, engine="h5netcdf") as found:
+        for name in whole:
+            np.testing.assert_array_equal(found[name], whole[name])
+
+
+def test_a_kill_while_importance_is_found_loses_no_draw(
+    experiment, small_blocks, tmp_path
+):
+    """The whole file, importance too, ends in the same bytes."""
+    groups = (16, "kind")
+    path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
+    run_draws(experiment, 100, whole, importance=groups)
+    total = []
+
+    def kill(done, all_):
+        total.append(all_)
+        if done > 200:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        run_draws(experiment, 100, path, progress=kill, importance=groups)
+    assert total[0] > 200
+    assert not path.exists()
+    seen = []
+    run_draws(experiment, 100, path, progress=lambda d, n: seen.append(d),
+              importance=groups)  # fmt: skip
+    assert seen[0] > 200
+    assert path.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["statistics", "tolerances"])
+def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path):
+    """SIGKILL at growing times; what was computed is never computed again."""
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "plan.toml").write_text(
+        'yield = 0.9\ndraws = 200\n' + PLAN.replace(
+            "margin_free = 1.0", "margin_free = 2.0\ntranslation = 8e-4"
+        )
+    )  # fmt: skip
+    arguments = {
+        "statistics": ["--errors", "errors.toml", "--draws", "6000", "--importance",
+                       "64"],
+        "tolerances": ["--grid", "tx=0:0.1:0.1,tz=-0.5", "--plan", "plan.toml",
+                       "--fresh", "100"],
+    }[command]  # fmt: skip
+    base = ["assembly", command, "irsbot2", *arguments]
+    done = run(*base, "-o", "whole.nc", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
+    for wait in range(4, 90, 6):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "forcefit", *base, "-o", "killed.nc"],
+            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            assert process.wait(wait) == 0
+            break
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if path.exists():  # killed once it was written, perhaps
+            break
+    assert path.read_bytes() == whole
+
+
+def test_another_seed_does_not_go_on_from_this_ones_journal(
+    experiment, small_blocks, tmp_path
+):
+    path = tmp_path / "draws.nc"
+
+    def kill(done, total):
+        if done:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        run_draws(experiment, 300, path, progress=kill)
+    other = Experiment(experiment.posture, experiment.sources, seed=6)
+    with pytest.raises(BadInput, match="seed"):
+        run_draws(other, 300, path)
+
+
+def test_yields_and_limits_add_up(experiment):
+    data = run_draws(experiment, 400)
+    said = summarise(data, {"energy": 0.05, "rotation": 3e-3}, strength=1e6)
+    met = (
+        (data["energy"] <= 0.05) & (data["rotation"] <= 3e-3)
+        & (data["stress"].max("link") <= 1e6)
+    )  # fmt: skip
+    assert said["within_limits"]["probability"] == float(met.mean())
+    free = said["assembles"]["rigid_compliant_free"]["probability"]
+    # where it goes together by play alone it does so without energy
+    assert float((data["energy"] <= 1e-12).mean()) <= free
+    assert said["assembles"]["forced"]["probability"] == 1.0
+    with pytest.raises(BadInput, match="limit torque"):
+        summarise(data, {"torque": 1.0})
+
+
+@pytest.mark.parametrize("text", ["energy", "energy=-1", "enrgy=2", "energy=nan"])
+def test_limits_that_are_none_are_refused(text):
+    with pytest.raises(BadInput, match="--limit"):
+        parse_limit(text)
+
+
+def run(*arguments, folder):
+    return subprocess.run(
+        [sys.executable, "-m", "forcefit", *map(str, arguments)],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_the_commands_from_files_to_figures(tmp_path):
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "plan.toml").write_text(PLAN)
+    done = run(
+        "assembly", "statistics", "irsbot2", "--errors", "errors.toml", "--pose",
+        "tx=0.1,tz=-0.5", "--draws", 200, "--limit", "energy=0.1", "--yield-strength",
+        "2e8", "--importance", 16, "-o", "d.nc", "--json", "-", folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert said["draws"] == 200
+    assert 0 < said["within_limits"]["probability"] < 1
+    assert len(said["safety"]) == 4
+    assert said["play"] == said["quantities"]["translation"]["play"] == "worst"
+    assert "link_a.TX" in said["importance"]["platform"]
+    done = run(
+        "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
+        "--plan", "plan.toml", "--fresh", 50, "-o", "t.nc", "--json", "t.json",
+        folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "t.json").read_text())["allocation"]
+    assert found["worst"]["margin_free"]["proven"] == pytest.approx(1, rel=1e-3)
+    with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
+        figure = histogram_figure(data)
+        assert len(figure.axes) == 8
+        assert "pose errors: play worst: play anywhere" in figure.get_suptitle()
+        assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
+        assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
+        assert len(tornado_figure(data).axes) == 6
+    with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
+        allocation_figure(data)
+        with pytest.raises(ValueError, match="need a data set of draws"):
+            histogram_figure(data)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--errors", "none.toml"], "none.toml: cannot be read"),
+        (["--errors", "errors.toml", "--play", "mots"], "--play"),
+        (["--errors", "errors.toml", "--seed", "9" * 40], "--seed"),
+        (["--errors", "errors.toml", "--limit", "enrgy=3"], 'quantity "enrgy"'),
+        (["--errors", "errors.toml", "--limit", "margin=1", "--no-margins"],
+         "the margins were left out"),
+        (["--errors", "errors.toml", "-o", "no/d.nc"], "no folder"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line_and_exit_2(arguments, message, tmp_path):
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    done = run("assembly", "statistics", "irsbot2", *arguments, folder=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert [p.name for p in Path(tmp_path).iterdir()] == ["errors.toml"]
+
+
+def test_the_robots_own_errors_are_judged(tmp_path):
+    done = run(
+        "assembly", "tolerances", "four_bar", "--grid", "tx=0.2", folder=tmp_path
+    )
+    assert done.returncode == 2
+    assert "no errors to judge" in done.stderr

@@ -1,0 +1,156 @@
+"""Slopes from multipliers, against finite differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.zone import zone_margin
+from assembly.model.error_distributions import tolerance_sources
+from assembly.robots import load_robot
+from assembly.statistics.responses import respond
+from assembly.statistics.sensitivity import (
+    energy_slopes,
+    margin_slopes,
+    solution_slopes,
+)
+from tests.robots_for_tests import random_robot
+
+POSES = [{"tx": 0.1, "tz": -0.5}, {"tx": -0.23, "tz": -0.41}, {"tx": 0.3, "tz": -0.55}]
+
+
+def with_errors(posture, errors):
+    return replace(posture, robot=posture.robot.with_errors(errors))
+
+
+def some_errors(robot, rng):
+    touched = np.array([f.link is not None for f in robot.frames])
+    sizes = np.array([5e-3] * 3 + [2e-4] * 3)
+    return rng.normal(size=(len(robot.frames), 6)) * sizes * touched[:, None]
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_energy_slopes_of_the_papers_robot(pose, rng):
+    """Every delta l by itself; central differences of 1e-4 of the errors' size."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=pose)
+    errors = some_errors(robot, rng)
+    slopes = energy_slopes(solve_assembly(with_errors(posture, errors)))
+    scale = np.array([5e-3] * 3 + [2e-4] * 3)
+    largest = np.abs(slopes * scale).max()
+    for row in np.flatnonzero(errors.any(axis=1)):
+        for c in range(6):
+            step = np.zeros_like(errors)
+            step[row, c] = 1e-3 * scale[c]
+            above, below = (
+                solve_assembly(with_errors(posture, errors + s)).energy
+                for s in (step, -step)
+            )
+            found = (above - below) / 2e-3
+            assert found == pytest.approx(slopes[row, c] * scale[c], abs=1e-4 * largest)
+
+
+@pytest.mark.parametrize("pose", POSES)
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margin_slopes_of_the_papers_robot(pose, compliant, rng):
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=pose)
+    errors = some_errors(robot, rng)
+    found = margin_slopes(with_errors(posture, errors), compliant)
+    for _ in range(8):
+        step = 1e-4 * some_errors(robot, rng)
+        above, below = (
+            zone_margin(with_errors(posture, errors + s), compliant).margin
+            for s in (step, -step)
+        )
+        along = float((found.slopes * step).sum())
+        assert (above - below) / 2 == pytest.approx(along, rel=2e-3, abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_slopes_of_random_robots(seed):
+    """Any frame may have errors: steps along random directions."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    posture = place_robot(robot)
+    errors = robot.errors
+    step = 1e-4 * rng.normal(size=errors.shape) * np.abs(errors).max()
+    try:
+        slopes = energy_slopes(solve_assembly(posture))
+        above, below = (
+            solve_assembly(with_errors(posture, errors + s)).energy
+            for s in (step, -step)
+        )
+    except CannotAssemble:
+        pytest.skip("this robot does not close at any energy")
+    along = float((slopes * step).sum())
+    scale = float((np.abs(slopes) * np.abs(step)).sum())
+    assert (above - below) / 2 == pytest.approx(along, rel=1e-4, abs=1e-4 * scale)
+
+
+def test_errors_that_nothing_decides_have_no_slopes():
+    robot = load_robot("hexapod")  # mobile in every direction: margin 0, slopes 0
+    found = margin_slopes(place_robot(robot))
+    assert found.margin == 0.0
+    assert not found.slopes.any()
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_wrenches_of_random_robots_have_slopes(seed):
+    """A random sum of all wrenches, along a random direction of all errors."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    ready, errors = prepare_energies(place_robot(robot)), robot.errors
+    weights = rng.normal(size=errors.shape) * np.array([10.0] * 3 + [1.0] * 3)
+    step = 1e-5 * rng.normal(size=errors.shape) * np.abs(errors)
+    found = ready.solve(errors[None])
+    if found.slower.any():
+        pytest.skip("it does not close, or a passive joint is at the end of its motion")
+    slopes = solution_slopes(ready, found, weights[None], np.zeros((1, 6)))[0]
+    both = ready.solve(np.array([errors + step, errors - step]))
+    above, below = (ready.wrenches(both.multipliers) * weights).sum(axis=(1, 2))
+    scale = float((np.abs(slopes) * np.abs(step)).sum())
+    # gaps of 1e-10 leave wrenches 1e-5 off, nearly alike on both sides
+    assert (above - below) / 2 == pytest.approx(
+        float((slopes * step).sum()), abs=1e-3 * scale
+    )
+
+
+@pytest.mark.parametrize(
+    "key", ["force", "moment", "stress", "rotation", "translation"]
+)
+@pytest.mark.parametrize("pose", POSES)
+def test_limited_quantities_of_the_papers_robot_have_slopes(pose, key, rng):
+    """Along random directions, at errors so large that no play is left undecided."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=pose)
+    frames = tuple(f.name for f in robot.frames if f.link is not None)
+    sources = tolerance_sources(robot, [5e-3] * 3 + [2e-4] * 3, frames)
+    ready = prepare_energies(posture)
+    values = rng.normal(size=(1, len(sources))) * sources.scale
+    slopes = respond(ready, sources, values, key)[1][0]
+    for _ in range(4):
+        step = 1e-4 * rng.normal(size=len(sources)) * sources.scale
+        above, below = (
+            respond(ready, sources, values + s, key)[0][0] for s in (step, -step)
+        )
+        scale = float(np.linalg.norm(slopes * step))
+        assert (above - below) / 2 == pytest.approx(slopes @ step, abs=5e-3 * scale)
+
+
+def test_inside_a_zone_no_error_has_a_slope(rng):
+    """Play takes up everything: no wrench, and none after small changes either."""
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, pose=POSES[0])
+    ready = prepare_energies(posture)
+    found = ready.solve(0.02 * some_errors(robot, rng)[None])
+    assert found.energy[0] < 1e-20
+    slopes = solution_slopes(
+        ready, found, np.ones((1, len(robot.frames), 6)), np.zeros((1, 6))
+    )
+    scale = np.abs(ready.wrenches(ready.closing.sum(axis=1)[None])).max()
+    outside = 0.02 * np.array([5e-3] * 3 + [2e-4] * 3)
+    assert np.abs(slopes * outside).max() < 1e-9 * scale

@@ -1,0 +1,183 @@
+"""The worst play: closed forms, other readings of play, slopes against differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment, precision_for
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.play import PLAY
+from assembly.statistics.responses import respond
+from assembly.statistics.summary import summarise, summary_text
+
+ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
+POSE = {"tx": 0.1, "tz": -0.5}
+
+
+def chain(radial=RADIAL, tilt=0.0):
+    """One driven joint with play, and an arm of 0.4 m across its axis."""
+    play = Clearance(radial=radial, tilt=tilt)
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=play),
+        Frame("tip", "pin", [ARM, 0, 0]),
+    )
+    return Robot("arm", "tip", frames)
+
+
+def tip_errors(robot, size):
+    return tolerance_sources(robot, [0, 0, 0, size, size, size], ("tip",))
+
+
+def papers(share, **options):
+    """The paper's robot with errors of its links, a share of a few mrad."""
+    robot = load_robot("irsbot2")
+    sources = tolerance_sources(robot, [share * 4e-3] * 3 + [share * 2e-4] * 3)
+    return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
+
+
+def test_one_disc_of_play_adds_its_radius_along_the_error():
+    """The tip is off by e and a disc about it: hypot(|e_xy| + radius, e_z) at most."""
+    robot = chain()
+    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
+                            precision=(1e-9, 1e-9))  # fmt: skip
+    values = experiment.sources.draw(0, 50, seed=1)
+    rows = experiment.answer(values, range(50))
+    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
+    assert (rows["translation_lower"] <= worst * (1 + 1e-12)).all()
+    assert (rows["translation"] >= worst * (1 - 1e-12)).all()
+    np.testing.assert_allclose(rows["translation"], worst, atol=1.1e-9)
+    assert not rows["rotation"].any()
+
+
+def test_tilt_swings_the_tip_on_its_arm():
+    """Tilt b about y moves a tip at distance L along x by L b; no radial play."""
+    robot = chain(0.0, TILT)
+    experiment = Experiment(home_posture(robot), tip_errors(robot, 0.0))
+    rows = experiment.answer(np.zeros((1, 0)), range(1))
+    assert rows["rotation"][0] == pytest.approx(TILT, abs=1e-6)
+    assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize("play", ["least", "uniform", "contact"])
+def test_no_other_play_is_worse_in_any_draw(share, play):
+    """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
+    worst, other = papers(share), papers(share, play=play)
+    values = worst.sources.draw(0, 60, seed=1)
+    bound, found = (e.answer(values, range(60)) for e in (worst, other))
+    for name in ("rotation", "translation"):
+        assert (bound[name] >= found[name] - 1e-9).all()
+        assert (bound[f"{name}_lower"] <= bound[name]).all()
+    if share < 0.1 and play == "uniform":
+        assert np.median(bound["translation"] / found["translation"]) > 2
+
+
+def test_more_play_is_never_better_where_play_alone_suffices():
+    """Sets of play that close without energy are nested; brackets are 1e-6 wide."""
+    robot, before = load_robot("irsbot2"), None
+    sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
+    values = sources.draw(0, 40, seed=3)
+    for factor in (1.0, 1.1, 1.5):
+        looser = replace(robot, frames=tuple(
+            replace(f, clearance=None if f.clearance is None else Clearance(**{
+                k: factor * getattr(f.clearance, k) for k in ("radial", "axial", "tilt")
+            }, spin=f.clearance.spin))
+            for f in robot.frames
+        ))  # fmt: skip
+        posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
+        experiment = Experiment(posture, own, margins=False)
+        rows = experiment.answer(values, range(40))
+        assert rows["energy"].max() < 1e-20
+        if before is not None:
+            for name in ("rotation", "translation"):
+                assert (rows[name] >= before[f"{name}_lower"]).all()
+                assert np.median(rows[name] / before[name]) > 1.05
+        before = rows
+
+
+def replace_robot(sources, robot):
+    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
+              "signed")  # fmt: skip
+    return type(sources)(robot, *(getattr(sources, a) for a in arrays))
+
+
+def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
+    """Parts so good that play alone suffices: 0.1 mm is met at rest only."""
+    limits, share = {"translation": 1e-4}, {}
+    for play in PLAY:
+        data = run_draws(papers(0.025, play=play, precision=precision_for(limits)), 120)
+        said = summarise(data, limits)
+        share[play] = said["within_limits"]["probability"]
+        assert said["within_limits"]["play"] == said["exceeds"]["translation"]["play"]
+        assert f"yield [play {play}], all limits met" in summary_text(said)
+        assert said["play_means"] in data["translation"].attrs["long_name"]
+    assert share["least"] > 0.99
+    assert share["worst"] == 0.0
+    assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
+
+
+def test_draws_between_the_bounds_are_counted_as_undecided():
+    """Rough bounds: each draw is surely within, surely not, or said to be open."""
+    robot = chain()
+    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
+                            margins=False, precision=(1e-6, 3e-5))  # fmt: skip
+    data, limit = run_draws(experiment, 400), 3e-4
+    said = summarise(data, {"translation": limit})
+    found, over = said["within_limits"], said["exceeds"]["translation"]
+    values = experiment.sources.draw(0, 400, 1)
+    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
+    truth = float((worst <= limit).mean())
+    assert 0 < found["undecided"] < 200
+    assert found["probability"] <= truth <= 1 - over["probability"]
+    both = found["probability"] + over["probability"] + found["undecided"] / 400
+    assert both == pytest.approx(1.0)
+    assert found["lower"] < truth < found["upper"]
+    assert f"{found['undecided']} draws undecided" in summary_text(said)
+
+
+def test_a_load_that_takes_up_all_play_leaves_nothing_to_the_worst():
+    """A weight pushes the pin to one side of its disc: sideways it may not move."""
+    robot = chain()
+    sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
+    values = sources.draw(0, 10, seed=1)
+    rows = Experiment(home_posture(robot), sources, load=load, margins=False).answer(
+        values, range(10)
+    )
+    rest = np.linalg.norm(values + [RADIAL, 0, 0], axis=1)
+    np.testing.assert_allclose(rows["translation"], rest, atol=1e-9)
+    np.testing.assert_allclose(rows["translation_lower"], rest, atol=1e-9)
+
+
+@pytest.mark.parametrize("key", ["rotation", "translation"])
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.6])
+def test_the_largest_pose_error_has_slopes(key, share, rng):
+    """Along random directions, inside the zone and outside it.
+
+    Where the farthest point jumps to another corner there is a kink: 3 of 4 steps
+    must agree, all within a tenth.
+    """
+    experiment = papers(share)
+    sources, ready = experiment.sources, experiment.energies
+    values = rng.uniform(-1, 1, size=(1, len(sources))) * sources.scale
+    slopes = respond(ready, sources, values, key)[1][0]
+    assert slopes.any()
+    off = []
+    for _ in range(4):
+        step = 1e-3 * rng.normal(size=len(sources)) * sources.scale
+        above, below = (
+            respond(ready, sources, values + s, key)[0][0] for s in (step, -step)
+        )
+        scale = float(np.linalg.norm(slopes * step))
+        off.append(abs((above - below) / 2 - slopes @ step) / scale)
+    assert np.sort(off)[2] < 0.02
+    assert max(off) < 0.1
+
+
+def test_an_unknown_play_is_refused():
+    with pytest.raises(ValueError, match="play is 'most', expected one of"):
+        papers(0.1, play="most")

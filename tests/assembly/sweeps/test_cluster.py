@@ -1,0 +1,192 @@
+"""A sweep on many processes gives the numbers of one, also when a worker dies."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from assembly.model.error_distributions import tolerance_sources
+from assembly.robots import load_robot
+from assembly.sweeps.cluster import cluster_solver, solve_task
+from assembly.sweeps.identity import question_hash
+from assembly.sweeps.plan import Sweep
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.sweep import run_sweep
+from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.inputs.table import BadInput
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+
+def drawn_sweep(grid):
+    """The five-bar robot with three draws of errors at each posture."""
+    robot = load_robot("five_bar")
+    targets = grid_targets(parse_grid(grid, robot))
+    sources = tolerance_sources(robot, np.array([1e-2] * 3 + [1e-3] * 3))
+    question = Question(robot, None, (), targets.names, sources, 7)
+    return Sweep(question, targets, (), 3, block_size=32)
+
+
+def test_a_task_is_its_blocks():
+    """What a worker does, without one."""
+    import pickle
+
+    sweep = drawn_sweep("tx=0:0.02:0.01,ty=0.12:0.14:0.01")
+    question = pickle.dumps(sweep.question), question_hash(sweep.question)
+    seconds, found = solve_task(*question, [(0, sweep.points(0))])
+    assert seconds > 0
+    assert found[0][0] == 0
+    assert np.isfinite(found[0][1].records["energy"]).all()
+
+
+def test_a_worker_with_another_question_refuses_it():
+    """As when a mesh differs there: its content is in the hash."""
+    import pickle
+
+    question = drawn_sweep("tx=0,ty=0.13").question
+    with pytest.raises(BadInput, match="a worker reads another robot"):
+        solve_task(pickle.dumps(question), "0" * 64, [])
+
+
+def test_workers_with_other_sources_are_refused():
+    from assembly.sweeps import cluster
+
+    class Client:
+        def wait_for_workers(self, *_, **__):
+            pass
+
+        def run(self, program):
+            assert program() == cluster._program()
+            return {
+                "tcp://h:1": program().replace("program_sha256 ", "program_sha256 0")
+            }
+
+    with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
+        cluster._check_workers(Client())
+
+
+def test_draws_do_not_depend_on_who_makes_them():
+    """Draw 2 of posture 5 is draw 2 of posture 0, in whatever block it falls."""
+    from assembly.sweeps.points import solve_points
+
+    sweep = drawn_sweep("tx=0,ty=0.13")
+    many = drawn_sweep("tx=-0.02:0.02:0.01,ty=0.13")
+    one = solve_points(sweep.question, sweep.points(0)).records
+    all_ = solve_points(many.question, many.points(0)).records
+    assert (all_["energy"][6:9] == one["energy"]).all()  # tx = 0 is the third posture
+    assert len(set(one["energy"].tolist())) == 3
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_bad_input(tmp_path):
+    sweep = drawn_sweep("tx=0,ty=0.13")
+    for address in ("tcp://127.0.0.1:9", "nonsense:/"):
+        with pytest.raises(BadInput, match="--scheduler .* cannot be reached"):
+            run_sweep(sweep, tmp_path / "x.nc", solve=cluster_solver(scheduler=address))
+
+
+class Cluster:
+    """A scheduler and workers, each an OS process on the loopback device."""
+
+    def __init__(self, folder, workers):
+        self.folder = folder
+        self.processes = []
+        self.start("scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
+        self.address = self.wait_for(r"Scheduler at: *(tcp://\S+)")
+        for _ in range(workers):
+            self.start("worker", self.address, "--nthreads", "1", "--no-nanny",
+                       "--no-dashboard")  # fmt: skip
+
+    def start(self, *words):
+        with (self.folder / "log").open("a") as log:
+            command = [sys.executable, "-m", "distributed.cli.dask_" + words[0]]
+            env = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+            self.processes.append(subprocess.Popen(
+                [*command, *words[1:]], stderr=log, stdout=log, cwd=self.folder, env=env
+            ))  # fmt: skip
+
+    def wait_for(self, pattern):
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            found = re.search(pattern, (self.folder / "log").read_text())
+            if found:
+                return found[1]
+            time.sleep(0.1)
+        raise AssertionError((self.folder / "log").read_text())
+
+    def stop(self):
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    (tmp_path / "cluster").mkdir()
+    running = Cluster(tmp_path / "cluster", workers=2)
+    yield running
+    running.stop()
+
+
+@pytest.mark.slow
+def test_a_worker_killed_halfway_loses_nothing(cluster, tmp_path):
+    """A scheduler and two workers as processes; one worker gets SIGKILL."""
+    sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
+    run_sweep(sweep, tmp_path / "one.nc")
+    killed = []
+
+    def kill(done, total):
+        if done > total / 4 and not killed:
+            victim = cluster.processes[-1]
+            os.kill(victim.pid, signal.SIGKILL)
+            killed.append(done)
+
+    run_sweep(
+        sweep, tmp_path / "many.nc", kill, cluster_solver(scheduler=cluster.address)
+    )
+    assert killed
+    assert killed[0] < sweep.size / 2
+    assert cluster.processes[-1].wait(timeout=10) == -signal.SIGKILL
+    one, many = ((tmp_path / f"{name}.nc").read_bytes() for name in ("one", "many"))
+    assert one == many
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_is_one_message_and_the_sweep_goes_on(cluster, tmp_path):
+    sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
+    kept = []
+
+    def kill(done, _):
+        kept.append(done)
+        if done > 100:
+            cluster.processes[0].kill()
+
+    with pytest.raises(BadInput, match="connection to the scheduler was lost"):
+        run_sweep(
+            sweep, tmp_path / "map.nc", kill, cluster_solver(scheduler=cluster.address)
+        )
+    resumed = []
+    run_sweep(sweep, tmp_path / "map.nc", lambda done, _: resumed.append(done))
+    assert resumed[0] == kept[-1]
+    assert resumed[-1] == sweep.size
+
+
+@pytest.mark.slow
+def test_workers_on_this_machine_give_the_same_bytes(tmp_path):
+    command = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar",
+               "--grid", "tx=-0.04:0.04:0.004,ty=0.10:0.15:0.01"]  # fmt: skip
+    for name, words in (("one", []), ("two", ["--workers", "2"])):
+        done = subprocess.run(
+            [*command, "-o", tmp_path / f"{name}.nc", *words], check=False,
+            capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        assert done.stdout.startswith("ok: ")
+    one, two = ((tmp_path / f"{name}.nc").read_bytes() for name in ("one", "two"))
+    assert one == two

@@ -1,0 +1,119 @@
+"""Sweeps of robots under load and with effects: each point as one posture gives it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.test_effect_file import L, arm_with
+
+from assembly.effects.acting import act
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.robots import load_robot
+from assembly.sweeps.plan import Sweep
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.sweep import sweep_in_memory
+from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+
+G = 9.81
+GRID = "tx=-0.1:0.1:0.2,tz=-0.45"
+EFFECTS = {
+    "encoder_eccentricity": {"leg1.drive.amplitude": 2e-4, "leg1.drive.phase": 0.5},
+    "drive_compliance": {"leg2.drive": 4e4},
+    "base_compliance": {"stiffness.rz": 5e4, "stiffness.tx": 4e6},
+    "thermal_expansion": {"leg1.link_a": 2e-5},
+}
+
+
+def swept(robot, grid, **given):
+    axes = parse_grid(grid)
+    question = Question(robot, components=tuple(axes), **given)
+    return sweep_in_memory(Sweep(question, grid_targets(axes)))
+
+
+def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
+    """M / k with M = F L cos q of a load, and m g L cos q / 2 of the beam's weight."""
+    path = arm_with(tmp_path)
+    grid = "q.drive=0:1.2:0.4"
+    asked = ask_sweep(str(path), grid=grid, reading="none", load=[0, 0, 0, 0, 10, 0],
+                      gravity=[0, -G, 0], wrench=["drive"])  # fmt: skip
+    data = sweep_in_memory(asked)
+    q = data["q.drive"].values
+    assert q.shape == (4,)
+    weight = 2700 * np.pi * 0.015**2 * L * G
+    M = (10 - weight / 2) * L * np.cos(q)
+    joint = solve_assembly(
+        place_robot(asked.question.robot, joints={"drive": 0.4}),
+        [0, 0, 0, 0, 10, 0], gravity=[0, -G, 0],
+    )  # fmt: skip
+    # the bar bends too: what is above the drive's own turn is the bar's
+    assert data.platform_screw.values[1] == pytest.approx(joint.platform_screw)
+    assert joint.joint_screws[0][2] == pytest.approx(M[1] / 4e4, rel=1e-9)
+    assert data.wrench.values[:, 0, 2] == pytest.approx(M, rel=1e-9)
+    assert data.duality_gap.values == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("load", [None, [5.0, 0, 0, 100.0, -40.0, -200.0]])
+def test_points_with_effects_are_those_of_one_posture(load):
+    robot = replace(irsbot2_with(NUMBERS["cases"][0]), effects=EFFECTS)
+    data = swept(robot, GRID, under={"temperature": 8.0}, linearisation=True,
+                 wrenches=("leg1.link_a",), load=load or (0.0,) * 6)  # fmt: skip
+    for tx in (-0.1, 0.1):
+        there = data.sel(tx=tx, tz=-0.45, method="nearest")
+        posture = place_robot(robot, pose={"tx": tx, "tz": -0.45})
+        acting = act(posture, load, covariates={"temperature": 8.0})
+        one = solve_assembly(acting.posture, acting.load)
+        assert there.status == "ok"
+        assert float(there.energy) == pytest.approx(one.energy, rel=1e-6)
+        row = acting.posture.robot.index("leg1.link_a")
+        assert there.wrench.values[0] == pytest.approx(
+            one.wrenches[row], rel=1e-3, abs=1e-3 * np.abs(one.wrenches).max()
+        )
+        # screws are as flat as certified energies: sqrt(1e-8) of what closing takes
+        size = np.abs(one.platform_screw).max()
+        assert there.platform_screw.values == pytest.approx(
+            one.platform_screw, abs=1e-3 * size
+        )
+        plain = solve_assembly(replace(posture, robot=replace(robot, effects={})))
+        assert abs(one.energy / plain.energy - 1) > 0.05
+
+
+def test_what_a_device_reads_stands_beside_the_pose():
+    """A device shifted by b reads b less nothing: R = 1, so b more."""
+    shift = {"base.tx": 3e-5, "base.tz": -1e-5}
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    data = swept(replace(robot, effects={"registration": shift}), GRID)
+    added = (data["reading"] - data.platform_screw).values
+    expected = np.zeros_like(added)
+    expected[..., 3], expected[..., 5] = 3e-5, -1e-5
+    assert added == pytest.approx(expected, abs=1e-15)
+    assert "reading" not in swept(robot, GRID)
+
+
+def test_a_load_that_nothing_resists_is_a_status():
+    """No drive holds: the robot moves as it is pushed."""
+    robot = load_robot("five_bar")
+    frames = tuple(
+        replace(f, actuated=False, joint_stiffness=None) if f.actuated else f
+        for f in robot.frames
+    )
+    falls = replace(robot, frames=frames)
+    data = swept(falls, "tx=0:0.02:0.02,ty=0.13", load=(0, 0, 0, 100, 0, 0))
+    assert set(data.status.values.astype(str).ravel()) == {"no equilibrium"}
+    assert "no joint or spring resists" in str(data.reason.values.ravel()[0])
+
+
+def test_bounds_of_a_loaded_robot_and_missing_covariates_are_refused(tmp_path):
+    with pytest.raises(BadInput, match="--reading none"):
+        ask_sweep("irsbot2", grid=GRID, load=[0, 0, 0, 0, 0, 1.0])
+    warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
+    path = str(arm_with(tmp_path, warm))
+    with pytest.raises(BadInput, match="--under temperature=NUMBER"):
+        ask_sweep(path, grid="q.drive=0:1:0.5")
+    asked = ask_sweep(path, grid="q.drive=0:1:0.5", under={"temperature": 0.0})
+    assert "--under temperature=0" in asked.command
+    other = ask_sweep(path, grid="q.drive=0:1:0.5", under={"temperature": 3.0})
+    assert asked.identity != other.identity

@@ -1,0 +1,50 @@
+"""The examples that sweep: they run, and say what they should."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+pytestmark = pytest.mark.slow
+
+
+def run(name, *words):
+    """Standard output of an example."""
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / name, *map(str, words)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_papers_figure_is_drawn_in_both_conventions(tmp_path):
+    """A coarse grid, part of the fine one: energies within the reference's."""
+    said = run("paper_figure5.py", "--step", "0.2", "-o", tmp_path)
+    assert said.count("go together by play with compliant joints free") == 2
+    for signs in ("literal", "signed"):
+        assert (tmp_path / f"figure5_{signs}.png").read_bytes().startswith(b"\x89PNG")
+    least, _, most = re.findall(r"energy \[J\] +(\S+) / (\S+) / (\S+)", said)[0]
+    assert 1.1e-3 <= float(least) < float(most) <= 14.7
+
+
+def test_less_play_makes_a_hexapod_more_accurate(tmp_path):
+    said = run("hexapod_accuracy.py", "--draws", 2, "--step", 0.1, "-o",
+               tmp_path / "hexapod.nc")  # fmt: skip
+    play, error = (
+        [float(n) for n in re.findall(p, said)]
+        for p in (
+            r"with (\S+) um of play",
+            r"translation 90 % below .* (\S+) um at the worst",
+        )
+    )
+    alone = [float(n) for n in re.findall(r"by play alone (\S+) um", said)]
+    assert sorted(play) == [4.0, 8.0]
+    large, small = play.index(8.0), play.index(4.0)
+    assert error[small] < error[large]
+    assert alone[small] < alone[large]
+    # cardans keep their 5 um: less than in proportion to the balls' own play
+    assert alone[small] > 0.5 * alone[large]

@@ -1,0 +1,344 @@
+"""A sweep killed anywhere goes on, loses nothing and ends in the same bytes."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.robots import load_robot
+from assembly.sweeps.dataset import slabs
+from assembly.sweeps.journal import open_journal
+from assembly.sweeps.plan import Sweep
+from assembly.sweeps.quantities import Question, record_type
+from assembly.sweeps.sweep import journal_path, run_sweep, solve_here, sweep_in_memory
+from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.inputs.table import BadInput
+
+ROOT = Path(__file__).parents[3]
+
+
+def small_sweep(grid="tx=-0.04:0.04:0.02,ty=0.10:0.14:0.02", **options):
+    """15 postures of the five-bar robot, some out of reach, in blocks of 4."""
+    robot = load_robot("five_bar")
+    targets = grid_targets(parse_grid(grid, robot))
+    question = Question(robot, None, (), targets.names, **options)
+    return Sweep(question, targets, block_size=4)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The sweep, its file's bytes, and its journal's just before the end."""
+    sweep, path = small_sweep(), tmp_path_factory.mktemp("whole") / "map.nc"
+    kept = {}
+
+    def keep(done, _):
+        kept[done] = journal_path(path).read_bytes()
+
+    run_sweep(sweep, path, keep)
+    assert not journal_path(path).exists()
+    return sweep, path.read_bytes(), kept
+
+
+def kept_blocks(sweep, path):
+    """The blocks of which a journal says that they are finished."""
+    kind = record_type(sweep.question)
+    with open_journal(path, sweep.identity, kind) as journal:
+        return sorted(journal.places)
+
+
+def go_on(sweep, folder, journal):
+    """Finish a sweep from the bytes of a journal; its file's, and the points solved."""
+    path, solved = folder / "map.nc", []
+    journal_path(path).write_bytes(journal)
+
+    def solve(sweep, blocks):
+        solved.extend(blocks)
+        return solve_here(sweep, solved)
+
+    run_sweep(sweep, path, solve=solve)
+    return path.read_bytes(), solved
+
+
+def test_a_journal_holds_each_block_as_soon_as_it_is_finished(whole, tmp_path):
+    sweep, _, kept = whole
+    assert list(kept) == [0, 4, 8, 12, 15]
+    for blocks, journal in enumerate(kept.values()):
+        path = tmp_path / "map.nc.journal"
+        path.write_bytes(journal)
+        assert kept_blocks(sweep, path) == list(range(blocks))
+
+
+def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
+    """Every byte of the file is a place where a power failure may cut it."""
+    sweep, _, kept = whole
+    sizes = [len(journal) for journal in kept.values()]
+    journal, path = kept[15], tmp_path / "map.nc.journal"
+    first_line = journal.index(b"\n") + 1
+    for cut in [*range(0, first_line, 7), *range(first_line, len(journal) + 1, 3)]:
+        path.write_bytes(journal[:cut])
+        whole_blocks = sum(size <= cut for size in sizes[1:])
+        assert kept_blocks(sweep, path) == list(range(whole_blocks))
+        assert path.stat().st_size == max(s for s in sizes if s <= max(cut, sizes[0]))
+
+
+@pytest.mark.parametrize("done", [0, 4, 12, 15])
+def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path, done):
+    sweep, expected, kept = whole
+    torn = kept[done] + (kept[15][len(kept[done]) :][:50] if done < 15 else b"")
+    found, solved = go_on(sweep, tmp_path, torn)
+    assert found == expected
+    assert solved == list(range(-(-done // 4), 4))
+
+
+def test_a_damaged_record_is_solved_again(whole, tmp_path):
+    sweep, expected, kept = whole
+    spoilt = bytearray(kept[15])
+    spoilt[len(kept[8]) + 100] ^= 1
+    found, solved = go_on(sweep, tmp_path, bytes(spoilt))
+    assert (found, solved) == (expected, [2])
+
+
+def test_whatever_bit_of_a_journal_is_flipped_only_its_record_is_solved_again(
+    whole, tmp_path
+):
+    """The first line and the records' numbers and lengths are covered too."""
+    sweep, expected, kept = whole
+    journal, first_line = kept[15], kept[15].index(b"\n") + 1
+    ends = [len(content) for content in kept.values()]
+    path = tmp_path / "map.nc.journal"
+    heads = [place for end in ends[:-1] for place in range(end, end + 40)]
+    for place in [*range(0, first_line, 5), *heads, *range(first_line, ends[-1], 97)]:
+        spoilt = bytearray(journal)
+        spoilt[place] ^= 1 << (place % 8)
+        path.write_bytes(spoilt)
+        left = [b for b in range(4) if not ends[b] <= place < ends[b + 1]]
+        assert kept_blocks(sweep, path) == left
+        assert path.read_bytes()[:first_line] == journal[:first_line]
+    assert go_on(sweep, tmp_path, bytes(spoilt)) == (expected, [3])
+
+
+def test_a_record_of_another_sweep_is_not_believed(whole, tmp_path):
+    sweep, expected, kept = whole
+    other, path = small_sweep(near=0.5), tmp_path / "other.nc"
+    run_sweep(other, path, lambda *_: kept.update(other=read_if(journal_path(path))))
+    theirs = kept["other"][kept["other"].index(b"\n") + 1 :]
+    assert go_on(sweep, tmp_path, kept[4] + theirs) == (expected, [1, 2, 3])
+
+
+def read_if(path):
+    return path.read_bytes() if path.exists() else b""
+
+
+def test_a_block_changed_while_the_sweep_ran_is_one_message(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+
+    def spoil(done, total):
+        if done == total:
+            content = bytearray(journal_path(path).read_bytes())
+            content[-3] ^= 8
+            journal_path(path).write_bytes(content)
+
+    with pytest.raises(BadInput, match="block 3 was changed while the sweep ran"):
+        run_sweep(sweep, path, spoil)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
+    run_sweep(sweep, path)
+    assert path.read_bytes() == expected
+
+
+def test_two_runs_into_one_file_at_once_the_second_is_refused(whole, tmp_path):
+    """The second begins while the first is at work, and disturbs nothing."""
+    sweep, expected, _ = whole
+    path, said = tmp_path / "map.nc", []
+
+    def begin_again(done, _):
+        if done == 8:
+            with pytest.raises(BadInput) as error:
+                run_sweep(sweep, path)
+            said.append(str(error.value))
+
+    run_sweep(sweep, path, begin_again)
+    assert said[0].startswith(f"{path}.journal: another run holds this journal; ")
+    assert path.read_bytes() == expected
+    assert not journal_path(path).exists()
+
+
+def test_a_killed_run_holds_no_journal(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+    child = os.fork()
+    if not child:
+        run_sweep(sweep, path, lambda done, _: done < 8 or os.kill(os.getpid(), 9))
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    assert kept_blocks(sweep, journal_path(path)) == [0, 1]
+    run_sweep(sweep, path)
+    assert path.read_bytes() == expected
+
+
+def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
+    """The version is the same; a line of the sources is not."""
+    from assembly.sweeps import identity
+
+    sweep, _, kept = whole
+    copy = tmp_path / "sources" / "assembly"
+    shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
+    monkeypatch.setattr(identity.assembly, "__file__", str(copy / "__init__.py"))
+    identity.program_hash.cache_clear()
+    assert small_sweep().identity == sweep.identity  # wherever the sources lie
+    with (copy / "zone.py").open("a") as file:
+        file.write("# one line more\n")
+    identity.program_hash.cache_clear()
+    path = journal_path(tmp_path / "map.nc")
+    path.write_bytes(kept[8])
+    with pytest.raises(BadInput, match="found program_sha256 '.*expected program_sha"):
+        run_sweep(small_sweep(), tmp_path / "map.nc")
+    identity.program_hash.cache_clear()
+    assert path.read_bytes() == kept[8]
+
+
+@pytest.mark.parametrize(
+    "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
+               {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
+)  # fmt: skip
+def test_whatever_is_asked_is_in_the_questions_hash(change):
+    from dataclasses import replace
+
+    from assembly.sweeps.identity import question_hash
+
+    asked = small_sweep().question
+    assert question_hash(asked) == question_hash(small_sweep().question)
+    assert question_hash(replace(asked, **change)) != question_hash(asked)
+
+
+def test_designs_of_other_numbers_have_other_hashes(tmp_path):
+    from assembly.sweeps.identity import question_hash
+    from assembly.sweeps.parameters import load_design
+
+    design = load_design("five_bar")
+    path = next(p for p in design.paths if p.endswith("link.young"))
+    other = type(design)(design.changed({path: 1e11}), design.file, design.name)
+    moved = type(design)(design.content, "elsewhere.toml", design.name)
+    assert question_hash(design) == question_hash(moved) != question_hash(other)
+
+
+def test_blocks_may_come_in_any_order(whole, tmp_path):
+    sweep, expected, _ = whole
+    path = tmp_path / "map.nc"
+    run_sweep(sweep, path, solve=lambda s, b: solve_here(s, [2, 0, 3, 1]))
+    assert path.read_bytes() == expected
+
+
+def test_the_file_is_what_memory_holds(whole, tmp_path):
+    import xarray
+
+    sweep, content, _ = whole
+    (tmp_path / "map.nc").write_bytes(content)
+    with xarray.open_dataset(tmp_path / "map.nc") as data:
+        xarray.testing.assert_equal(data, sweep_in_memory(sweep))
+        assert data.attrs["robot_sha256"] == sweep.provenance["robot_sha256"]
+        assert data.margin.attrs["units"] == "1"
+        assert data.singular_distance.dims == ("tx", "ty", "kind")
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (small_sweep("tx=-0.04:0.04:0.02,ty=0.10:0.14:0.04"),
+         "found points 'tx 5 x ty 3', values_sha256 '"),
+        (small_sweep(reading="free"), "found reading 'none', asked 'margin"),
+        (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
+    ],
+)  # fmt: skip
+def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
+    _, _, kept = whole
+    path = journal_path(tmp_path / "map.nc")
+    path.write_bytes(kept[8])
+    with pytest.raises(BadInput) as error:
+        run_sweep(other, tmp_path / "map.nc")
+    assert str(error.value).startswith(f"{path}: journal of another sweep: found ")
+    assert message in str(error.value)
+    assert path.read_bytes() == kept[8]
+
+
+@pytest.mark.parametrize("shape", [(7,), (3, 4), (2, 3, 4), (2, 1, 5, 3), (4, 1, 1)])
+def test_slabs_hold_consecutive_points_in_their_order(shape):
+    """All stretches of all lengths: the boxes, read one after the other, are them."""
+    numbers = np.arange(int(np.prod(shape))).reshape(shape)
+    for first in range(numbers.size):
+        for last in range(first + 1, numbers.size + 1):
+            boxes = list(slabs(shape, first, last))
+            found = np.concatenate([numbers[box].ravel() for box in boxes])
+            assert found.tolist() == list(range(first, last))
+            assert len(boxes) <= 2 * len(shape) - 1
+
+
+def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
+    path = journal_path(tmp_path / "map.nc")
+    path.write_text("notes\n")
+    with pytest.raises(BadInput, match="found no journal of a sweep; expected one"):
+        run_sweep(small_sweep(), tmp_path / "map.nc")
+    assert path.read_text() == "notes\n"
+
+
+def test_block_size_changes_no_number():
+    """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
+    from dataclasses import replace
+
+    options = {"reading": "frozen", "wrenches": ("left.elbow",), "play_alone": True}
+    small = small_sweep(**options)
+    one = sweep_in_memory(small)
+    other = sweep_in_memory(replace(small, block_size=15))
+    assert one.identical(other)
+    assert np.isfinite(one.rotation_error_play).any()
+
+
+@pytest.mark.slow
+def test_commands_stopped_at_random_moments_lose_nothing():
+    """The benchmark does hundreds; here some."""
+    kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
+    run = [*kills, "--seed", "5"]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
+           "tx=-0.045:0.045:0.0005,ty=0.10:0.15:0.0005"]  # fmt: skip
+
+
+def start_command(folder, *words):
+    """The command in a process group of its own, stopped once its journal has grown."""
+    path = folder / "map.nc"
+    with subprocess.Popen(
+        [*COMMAND, "-o", path, *words], stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    ) as process:  # fmt: skip
+        journal = journal_path(path)
+        end = time.monotonic() + 120
+        while not journal.exists() or journal.stat().st_size < 20_000:
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        yield process
+        yield process.wait(timeout=60), process.stderr.read()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [[], ["--workers", "1"]])
+def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(tmp_path, words):
+    run = start_command(tmp_path, *words)
+    os.killpg(next(run).pid, signal.SIGINT)
+    status, said = next(run)
+    assert status == 130
+    assert "points are kept in" in said
+    assert "Traceback" not in said
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
+    subprocess.run([*COMMAND, "-o", tmp_path / "map.nc"], check=True)
+    once = tmp_path / "once.nc"
+    subprocess.run([*COMMAND, "-o", once], check=True)
+    assert (tmp_path / "map.nc").read_bytes() == once.read_bytes()

@@ -1,0 +1,135 @@
+"""Numbers of a robot file by their path."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.robots import BUILT_IN, load_robot
+from assembly.sweeps.parameters import design_of, load_design, unit_of
+from assembly.sweeps.sweep import robot_hash
+from forcefit.inputs.table import BadInput
+
+
+@pytest.fixture(scope="module")
+def design():
+    return load_design("irsbot2")
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_design_without_changes_is_the_robot(name):
+    assert robot_hash(load_design(name).robot({})) == robot_hash(load_robot(name))
+
+
+def test_a_path_changes_that_number_and_nothing_else(design):
+    path = "leg1.link_a.link.beam.radius"
+    changed, robot = design.robot({path: 0.031}), load_robot("irsbot2")
+    link = robot.frame("leg1.link_a").link
+    expected = replace(link, section={"radius": 0.031})
+    assert robot_hash(changed) == robot_hash(
+        robot.with_links({"leg1.link_a": expected})
+    )
+
+
+def test_a_name_without_a_leg_changes_every_leg(design):
+    robot = design.robot({"link_b.link.young": 7e10})
+    assert [robot.frame(f"leg{i}.link_b").link.young for i in (1, 2)] == [7e10, 7e10]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "read"),
+    [
+        ("leg1.link_a.geometric_error.tx", 1e-4,
+         lambda r: r.frame("leg1.link_a").geometric_error[3]),
+        ("leg1.link_a.geometric_error.rz", 1e-4,
+         lambda r: r.frame("leg1.link_a").geometric_error[2]),
+        ("leg2.link_a.clearance.tilt", 1e-3,
+         lambda r: r.frame("leg2.link_a").clearance.tilt),
+        ("leg1.elbow_a_first.joint_stiffness.rz", 2.5,
+         lambda r: r.frame("leg1.elbow_a_first").joint_stiffness[2, 2]),
+        ("leg1.tip.mass", 0.3, lambda r: r.frame("leg1.tip").mass),
+        ("leg1.tip.centre_of_mass.y", 0.01,
+         lambda r: r.frame("leg1.tip").centre_of_mass[1]),
+    ],
+)  # fmt: skip
+def test_every_kind_of_number_has_a_path(design, path, value, read):
+    assert read(design.robot({path: value})) == value
+
+
+def test_both_places_of_a_symmetric_matrix_change_together():
+    from assembly.model.robot import MatrixLink
+
+    robot = load_robot("four_bar")
+    K = np.diag([1e3, 1e3, 1e3, 1e6, 1e6, 1e6])
+    design = design_of(robot.with_links({"middle": MatrixLink(K)}))
+    K = (
+        design
+        .robot({"middle.link.stiffness.rx.ty": 5.0})
+        .frame("middle")
+        .link.stiffness
+    )
+    assert K[0, 4] == K[4, 0] == 5.0
+
+
+def test_numbers_that_only_the_file_has_can_be_changed(tmp_path):
+    """``dh`` is read into a translation and a rotation; the file still says d."""
+    text = """
+platform = "tip"
+[[frame]]
+name = "arm"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "tip"
+parent = "arm"
+dh = { theta = 0.0, d = 0.2, a = 0.1, alpha = 0.0 }
+"""
+    (tmp_path / "r.toml").write_text(text)
+    design = load_design(tmp_path / "r.toml")
+    assert design.robot({"tip.dh.d": 0.3}).frame("tip").translation[2] == 0.3
+    with pytest.raises(BadInput, match='no number "tip.translation.x"'):
+        design.robot({"tip.translation.x": 0.3})
+
+
+def test_a_number_that_is_written_in_a_file_is_found_there(tmp_path):
+    write_robot(load_robot("five_bar"), tmp_path / "r.toml")
+    path = "left.elbow.link.beam.height"
+    file = load_design(tmp_path / "r.toml").robot({path: 0.02})
+    assert robot_hash(file) == robot_hash(load_design("five_bar").robot({path: 0.02}))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"leg1.link_a.link.beam.raduis": 1.0},
+         'irsbot2: no number "leg1.link_a.link.beam.raduis"; did you mean '
+         '"leg1.link_a.link.beam.radius"?'),
+        ({"leg1.link_a.parent": 1.0}, 'irsbot2: no number "leg1.link_a.parent"'),
+        ({"link_a.link.beam.radius": -1.0},
+         'irsbot2: frame "leg1.link_a".link.beam.radius: found -1.0, expected a finite '
+         "number > 0"),
+    ],
+)  # fmt: skip
+def test_a_wrong_path_or_number_is_one_message(design, values, message):
+    with pytest.raises(BadInput) as error:
+        design.robot(values)
+    assert str(error.value).startswith(message)
+
+
+def test_numbers_that_break_the_closures_are_refused(design):
+    """A frame of the parallelogram 1 mm off its home: nothing closes it."""
+    values = {"leg1.elbow_a.translation.y": 0.2}
+    design.check(values)  # a robot file could say it
+    with pytest.raises(BadInput, match="does not hold in the home"):
+        design.robot(values)
+
+
+def test_units_follow_the_name():
+    assert unit_of("a.link.beam.radius") == "m"
+    assert unit_of("a.link.young") == "Pa"
+    assert unit_of("a.geometric_error.rx") == "rad"
+    assert unit_of("a.geometric_error.tx") == "m"
+    assert unit_of("a.clearance.tilt") == "rad"
+    assert unit_of("a.joint_stiffness.rx") == "SI"

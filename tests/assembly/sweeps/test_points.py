@@ -1,0 +1,240 @@
+"""What a sweep finds at its points is what one posture at a time gives."""
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.model.error_distributions import read_sources
+from assembly.robots import load_robot
+from assembly.sweeps.maps import figure_of
+from assembly.sweeps.parameters import load_design
+from assembly.sweeps.plan import Sweep
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.request import ask_sweep, summary_of
+from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
+from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+
+GRID = "tx=-0.2:0.2:0.2,tz=-0.5:-0.4:0.1"
+ERRORS = """
+[[errors]]
+frames = ["elbow", "arm"]
+most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
+"""
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return irsbot2_with(NUMBERS["cases"][0])
+
+
+@pytest.fixture(scope="module")
+def data(robot):
+    """Everything that can be asked for, at six postures."""
+    axes = parse_grid(GRID)
+    question = Question(
+        robot, None, (), tuple(axes), reading="free", play_alone=True,
+        wrenches=("leg1.link_a", "leg2.elbow_b_first"), linearisation=True,
+    )  # fmt: skip
+    return sweep_in_memory(Sweep(question, grid_targets(axes)))
+
+
+def test_wrenches_are_those_of_one_posture(robot, data):
+    """Both come from multipliers certified to 1e-8 of the energy: 1e-4 of a wrench."""
+    answer = solve_assembly(place_robot(robot, pose={"tx": 0.2, "tz": -0.4}))
+    found = data.wrench.sel(tx=0.2, tz=-0.4, method="nearest")
+    assert found.dims == ("frame", "wrench_component")
+    for name in data.frame.values:
+        expected = answer.wrenches[robot.index(str(name))].reshape(2, 3)
+        difference = found.sel(frame=name).values.reshape(2, 3) - expected
+        assert np.linalg.norm(difference, axis=1) == pytest.approx(
+            0.0, abs=1e-6 * np.abs(expected).max()
+        )
+
+
+def test_bounds_and_finite_motions_are_those_of_one_posture(robot, data):
+    posture = place_robot(robot, pose={"tx": 0.2, "tz": -0.4})
+    there = data.sel(tx=0.2, tz=-0.4, method="nearest")
+    bounds = bound_pose_error(solve_assembly(posture), "free")
+    assert there.rotation_error.values == pytest.approx(bounds.rotation_error, abs=2e-6)
+    gap = solve_exact(posture).linearisation_error
+    size = np.linalg.norm(gap.translation)
+    assert float(there.linearisation_translation) == pytest.approx(size, rel=1e-6)
+    assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
+
+
+def test_play_alone_is_symmetric_where_the_robot_is(data):
+    """Without errors x and -x are one: within the bounds' own gap of 1e-6."""
+    for name in ("rotation_error_play", "translation_error_play"):
+        values = data[name].sel(bound="upper").values
+        assert values == pytest.approx(values[::-1], abs=2e-6)
+        assert values == pytest.approx(data[name].sel(bound="lower").values, abs=2e-6)
+    assert (data.rotation_error_play < data.rotation_error).all()
+
+
+def test_a_design_that_varies_is_that_robot_bit_for_bit():
+    path = "link_a.link.beam.radius"
+    asked = ask_sweep("irsbot2", grid=GRID, vary=[f"{path}=0.03,0.05"], reading="none")
+    data = sweep_in_memory(asked)
+    assert data.energy.dims == (path, "tx", "tz")
+    assert data[path].attrs["units"] == "m"
+    one = sweep_poses(load_design("irsbot2").robot({path: 0.05}), parse_grid(GRID))
+    there = data.sel({path: 0.05}, method="nearest")
+    for name in ("margin", "energy", "platform_screw", "singular_distance"):
+        assert np.array_equal(there[name], one[name], equal_nan=True), name
+
+
+def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
+    path = tmp_path / "errors.toml"
+    path.write_text(ERRORS)
+    asked = ask_sweep(
+        "five_bar", grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11
+    )
+    data = sweep_in_memory(asked)
+    assert data.energy.dims == ("tx", "ty", "draw")
+    robot = load_robot("five_bar")
+    sources = read_sources(path, robot)
+    errors = sources.errors(sources.draw(0, 3, 11))
+    for i in range(3):
+        one = sweep_poses(
+            robot.with_errors(errors[i]), parse_grid("tx=0:0.02:0.02,ty=0.14"),
+            reading="frozen",
+        )  # fmt: skip
+        there = data.isel(draw=i)
+        for name in ("margin", "margin_free", "energy", "rotation_error"):
+            assert np.array_equal(there[name], one[name], equal_nan=True), name
+
+
+def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
+    write_robot(robot, tmp_path / "robot.toml")
+    grid = sweep_poses(robot, parse_grid(GRID))
+    x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
+    rows = [
+        f"{a!r},{b!r}"
+        for a, b in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)
+    ]
+    (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
+    asked = ask_sweep(
+        str(tmp_path / "robot.toml"), poses=tmp_path / "path.csv", reading="none"
+    )
+    found = sweep_in_memory(asked)
+    assert found.energy.dims == ("posture",)
+    assert found.tz.dims == ("posture",)
+    assert np.array_equal(found.energy.values, grid.energy.values.ravel())
+    assert len(figure_of(found).axes) == 6
+
+
+def test_joint_coordinates_lead_to_the_pose_they_command():
+    robot = load_robot("five_bar")
+    posture = place_robot(robot, pose={"tx": 0.03, "ty": 0.13})
+    drives = {
+        f"q.{side}.drive": np.array([posture.coordinates[robot.index(f"{side}.drive")]])
+        for side in ("left", "right")
+    }
+    errors = np.zeros((9, 6))
+    errors[robot.index("left.elbow"), 3] = 1e-5
+    robot = robot.with_errors(errors)
+    found = sweep_poses(robot, drives)
+    expected = sweep_poses(robot, parse_grid("tx=0.03,ty=0.13"))
+    assert found.energy.values.ravel() == pytest.approx(
+        expected.energy.values.ravel(), rel=1e-6
+    )
+    assert found["q.left.drive"].attrs["units"] == "rad"
+
+
+def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
+    path = "leg1.elbow_a.translation.y"
+    y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])
+    asked = ask_sweep(
+        "irsbot2", grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"],
+        reading="none",
+    )  # fmt: skip
+    data = sweep_in_memory(asked).squeeze()
+    assert data.status.values.tolist() == [["ok", "ok"], ["invalid robot"] * 2]
+    assert "does not hold in the home pose" in data.reason.values[1, 0]
+    assert np.isnan(data.energy.values[1]).all()
+    assert summary_of(data)["status"] == {"invalid robot": 2, "ok": 2}
+
+
+def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
+    """The third of five postures raises in the middle of its block."""
+    from assembly.sweeps import points
+
+    solve, axes = points.minimise_energies, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
+    expected = sweep_poses(robot, axes)
+    bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
+
+    def breaks(robot, T, errors, off):
+        at = T[:, robot.index(robot.platform), :3, 3]
+        if np.any(np.linalg.norm(at - bad, axis=1) < 1e-6):
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return solve(robot, T, errors, off)
+
+    monkeypatch.setattr(points, "minimise_energies", breaks)
+    data = sweep_poses(robot, axes).squeeze()
+    assert data.status.values.tolist() == ["ok", "ok", "solver failed", "ok", "ok"]
+    assert data.reason.values[2] == "SVD did not converge"
+    others = [0, 1, 3, 4]
+    found = data.energy.values[others]
+    assert np.array_equal(found, expected.energy.values.ravel()[others])
+    assert np.isnan(data.energy.values[2])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "sweep: expected --grid or --poses, one of them"),
+        ({"grid": "tx=0", "reading": "fozen"}, '--reading: found "fozen"; did you'),
+        ({"grid": "tx=0", "vary": ["link_a.link.beam.radius"]},
+         '--vary: found "link_a.link.beam.radius", expected PATH=VALUE,..'),
+        ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03,-1"]},
+         'irsbot2: frame "leg1.link_a".link.beam.radius: found -1.0, expected a'),
+        ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03,0.03"]},
+         "--vary link_a.link.beam.radius: found a value twice"),
+        ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03",
+                                   "leg1.link_a.link.beam.radius=0.04"]},
+         "leg1.link_a.link.beam.radius varies already"),
+        ({"grid": "tx=0", "draws": 3}, "sweep: --errors and --draws go together"),
+        ({"grid": "tx=0", "wrench": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
+        ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
+        ({"grid": "tx=0:1:1e-5,tz=0:1:0.1", "vary": ["tip.mass=1:100:1"]},
+         "sweep: 110001100 points; expected at most 10000000"),
+    ],
+)  # fmt: skip
+def test_a_sweep_asked_for_wrongly_is_one_message(options, message):
+    with pytest.raises(BadInput) as error:
+        ask_sweep("irsbot2", **options)
+    assert message in str(error.value)
+
+
+def test_figures_need_only_the_data_set(tmp_path):
+    path = tmp_path / "errors.toml"
+    path.write_text(ERRORS)
+    grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
+    asked = ask_sweep("five_bar", grid=grid, errors=path, draws=3, near=0.6,
+                      play_alone=True)  # fmt: skip
+    data = sweep_in_memory(asked)
+    figure = figure_of(data)
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert len(titles) == 6
+    assert titles[-1] == "position error by play alone [mm]"
+    assert "median of 3 draws" in {t.get_text() for t in figure.texts}
+    assert "parallel: " in figure.get_suptitle()
+    panel = next(a for a in figure.axes if "energy" in a.get_title())
+    shown = np.ma.filled(panel.collections[0].get_array(), np.nan)
+    expected = data.energy.median("draw").transpose("ty", "tx").values
+    assert shown.reshape(expected.shape) == pytest.approx(expected, nan_ok=True)
+    crosses = panel.lines[0].get_xydata()
+    near = data.near_singularity.isel(draw=0) != ""
+    assert len(crosses) == int(near.sum())
+    one = figure_of(data, {"draw": 1, "tx": 0.0})
+    assert [a.get_xlabel() for a in one.axes] == ["ty [m]"] * 6
+    with pytest.raises(BadInput, match='--at: no axis "tz"'):
+        figure_of(data, {"tz": 1.0})
+    with pytest.raises(BadInput, match="found a single point"):
+        figure_of(data, {"draw": 1, "tx": 0.0, "ty": 0.12})

@@ -1,0 +1,176 @@
+"""Grids, and data sets over them."""
+
+import numpy as np
+import pytest
+import xarray
+
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.sweeps.dataset import save_dataset
+from assembly.sweeps.maps import map_figure
+from assembly.sweeps.sweep import assemblable, sweep_poses
+from assembly.sweeps.targets import parse_grid
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+GRID = "tx=-0.4:0.4:0.2,tz=-0.65:-0.45:0.1"
+
+
+@pytest.fixture(scope="module")
+def data():
+    return sweep_poses(irsbot2_with(NUMBERS["cases"][0]), parse_grid(GRID))
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("tx=0:1:0.25", [0, 0.25, 0.5, 0.75, 1.0]),
+        ("tx=0:1:0.3", [0, 0.3, 0.6, 0.9]),  # not whole: the end is left out
+        ("tx=-0.2:0.2:0.1", [-0.2, -0.1, 0, 0.1, 0.2]),  # whole within rounding
+        ("tx=0.3:0.1:-0.1", [0.3, 0.2, 0.1]),
+        ("tx=0.5", [0.5]),
+    ],
+)
+def test_both_ends_count_when_the_step_fits(text, values):
+    assert parse_grid(text)["tx"] == pytest.approx(values, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tx=0:1", 'grid tx: found "0:1", expected START:STOP:STEP or one number'),
+        ("tx=a:b:c", 'grid tx: found "a:b:c", expected START:STOP:STEP'),
+        ("tx=0:nan:1", 'grid tx: found "0:nan:1", expected'),
+        ("tx=0:1:-0.1", "grid tx: step -0.1 never leads from 0 to 1"),
+        ("tx=0:1:0", "grid tx: step 0 never leads from 0 to 1"),
+        ("x=0:1:0.1", 'grid: unknown pose component "x"'),
+        ("tx=0,tx=1", 'grid: "tx" is given twice'),
+        ("tx=0:1:1e-9", "grid tx: 1e+09 points; is the step too small?"),
+        ("tx=0:1:1e-4,ty=0:1:1e-4", "grid: more than 10000000 points"),
+        ("", 'grid: unknown pose component ""'),
+    ],
+)
+def test_a_bad_grid_is_one_message(text, message):
+    with pytest.raises(BadInput) as error:
+        parse_grid(text)
+    assert str(error.value).startswith(message)
+
+
+def test_every_point_of_a_sweep_is_the_single_solution(data):
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    for x in (-0.2, 0.2):
+        one = solve_assembly(place_robot(robot, pose={"tx": x, "tz": -0.45}))
+        point = data.sel(tx=x, tz=-0.45, method="nearest")
+        assert float(point.energy) == pytest.approx(one.energy, rel=1e-7)
+        assert np.allclose(point.platform_screw, one.platform_screw, atol=1e-8)
+        assert float(point.duality_gap) < 1e-8 * one.energy
+    reference = NUMBERS["cases"][0]["points"][1]
+    point = data.sel(tx=0.2, tz=-0.45, method="nearest")
+    assert float(point.margin) == pytest.approx(reference["t_compliant_rigid"])
+    assert float(point.margin_free) == pytest.approx(reference["t_compliant_free"])
+
+
+def test_points_out_of_reach_say_so_and_stop_nothing(data):
+    """(-0.4, -0.65) is 0.83 m from leg 1's centre; its links give 0.758 m."""
+    point = data.sel(tx=-0.4, tz=-0.65, method="nearest")
+    assert point.status.item() == "out of reach"
+    assert "cannot be reached" in point.reason.item()
+    assert np.isnan(point.energy)
+    assert (data.status == "ok").sum() == 13
+
+
+def test_points_that_cannot_be_assembled_have_an_infinite_margin():
+    robot = coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0]))
+    data = sweep_poses(robot, {"tx": np.array([0.5])})
+    assert data.status.item() == "ok"
+    assert np.isinf(data.margin.item())
+    assert data.energy.item() == pytest.approx(0.5e6 * 1e-8 / 2)
+
+
+def test_a_saved_sweep_reads_back_with_units_and_provenance(data, tmp_path):
+    save_dataset(data, tmp_path / "map.nc")
+    assert [p.name for p in tmp_path.iterdir()] == ["map.nc"]
+    with xarray.open_dataset(tmp_path / "map.nc") as back:
+        assert back.energy.attrs["units"] == "J"
+        assert back.tx.attrs["units"] == "m"
+        assert back.platform_screw.dims == ("tx", "tz", "screw")
+        assert list(back.screw.values) == ["RX", "RY", "RZ", "TX", "TY", "TZ"]
+        assert len(back.attrs["robot_sha256"]) == 64
+        assert back.status.values.tolist() == data.status.values.tolist()
+        assert np.array_equal(back.energy, data.energy, equal_nan=True)
+
+
+def test_a_folder_that_is_not_there_is_refused(data, tmp_path):
+    with pytest.raises(BadInput, match="no folder .*nowhere; expected one"):
+        save_dataset(data, tmp_path / "nowhere" / "map.nc")
+
+
+def test_assemblable_is_margin_up_to_one(data):
+    inside = assemblable(data)
+    at = data.indexes["tx"].get_indexer([0.4], method="nearest")[0]
+    assert inside[at, -1]  # 0.327 at (0.4, -0.45)
+    assert inside.sum() < inside.size
+
+
+def test_maps_show_each_quantity_of_the_grid(data):
+    figure = map_figure(data)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert "minimum assembly energy [J]" in titles
+    assert "ok: 13, out of reach: 2" in titles
+    image = next(a for a in figure.axes if "energy" in a.get_title()).collections[0]
+    shown = np.ma.filled(image.get_array(), np.nan).ravel()
+    assert np.nanmax(shown) == pytest.approx(float(data.energy.max()))
+
+
+def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
+                       reading="frozen")  # fmt: skip
+    assert data.rotation_error.dims == ("tx", "tz", "bound")
+    assert data.bound.values.tolist() == ["lower", "upper"]
+    assert data.translation_error.attrs["units"] == "m"
+    point = NUMBERS["cases"][0]["points"][1]
+    there = data.sel(tx=0.2, tz=-0.45, method="nearest")
+    low, high = there.rotation_error.values
+    assert low <= point["full_rigid_R"][1] + 1e-7
+    assert high >= point["full_rigid_R"][0] - 1e-7
+    assert np.isnan(data.rotation_error.sel(tz=-0.9, method="nearest")).all()
+    figure = map_figure(data)
+    panel = next(a for a in figure.axes if "orientation" in a.get_title())
+    shown = np.ma.filled(panel.collections[0].get_array(), np.nan)
+    highest = float(data.rotation_error.sel(bound="upper").max())
+    assert np.nanmax(shown) == pytest.approx(1e3 * highest)
+
+
+def test_maps_need_two_axes(data):
+    with pytest.raises(ValueError, match="two axes, this one has 1"):
+        map_figure(data.isel(tx=[0]))
+
+
+def test_progress_counts_points_block_by_block():
+    seen = []
+    robot = coaxial_beams(np.zeros(6))
+    axes = {"tx": np.linspace(0.4, 0.6, 130)}  # a block is 128
+    sweep_poses(robot, axes, lambda d, n: seen.append((d, n)))
+    assert seen == [(128, 130), (130, 130)]
+
+
+def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
+    """The solver gives up on one reading of one point: its neighbour is not touched."""
+    from assembly.sweeps import points
+
+    solve = points.zone_margins
+
+    def spoilt(robot, frames, reading, off, errors):
+        found = solve(robot, frames, reading, off, errors)
+        if reading == "free":
+            found.margin[0], found.reason[0] = np.nan, "zone margin: gave up"
+        return found
+
+    monkeypatch.setattr(points, "zone_margins", spoilt)
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    data = sweep_poses(robot, {"tx": np.array([0.0, 0.1]), "tz": np.array([-0.4])})
+    assert data.status.values.ravel().tolist() == ["solver failed", "ok"]
+    assert data.reason.values.ravel().tolist() == ["zone margin: gave up", ""]
+    assert np.isnan(data.energy.values[0, 0])
+    assert np.isfinite(data.energy.values[1, 0])

@@ -1,0 +1,215 @@
+"""``assembly error`` at a point and along a direction; ``exact`` under gravity."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_postures import minimise_energies
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+
+ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
+
+
+def test_a_point_of_the_platform_and_a_direction(run):
+    status, out, _ = run(
+        "assembly", "error", *ROBOT, "--reading", "free", "--point", "x=0.1,z=-0.05",
+        "--direction", "tx=1,tz=-1", "--json", "-",
+    )  # fmt: skip
+    assert status == 0
+    found = json.loads(out)
+    posture = place_robot(load_robot("irsbot2"), pose={"tx": 0.1, "tz": -0.5})
+    offset = posture.platform[:3, :3] @ [0.1, 0, -0.05]
+    answer = solve_assembly(posture)
+    expected = bound_pose_error(answer, "free", offset=offset)
+    error = found["error"]["free"]
+    assert error["translation"]["lower"] == pytest.approx(
+        expected.translation_error[0], abs=1e-9
+    )
+    direction = np.array([0, 0, 0, 1, 0, -1]) / np.sqrt(2)
+    assert found["direction"] == pytest.approx(direction.tolist())
+    support = reachable_screws(answer, "free").at_point(offset).support(direction)
+    assert error["along"]["upper"] == pytest.approx(support.height, rel=1e-9)
+    assert error["along"]["lower"] == pytest.approx(support.height, rel=1e-6)
+    screw = error["along"]["platform_screw"]
+    assert direction @ screw == pytest.approx(error["along"]["lower"])
+    assert error["along"]["upper"] <= error["translation"]["upper"]
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--point", "tx=1"], '--point: unknown component "tx"; valid: x, y, z'),
+        (["--direction", "mx=1"], '--direction: unknown component "mx"'),
+        (["--direction", "tx=0"], "expected components of a translation or of a rot"),
+        (["--direction", "tx=1,rz=1"], "expected components of a translation or of"),
+    ],
+)
+def test_what_is_no_point_or_direction_is_refused(run, option, message):
+    status, out, err = run("assembly", "error", *ROBOT, *option)
+    assert status == 2
+    assert out == ""
+    assert message in err
+
+
+def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
+    gravity = ["--gravity", "z=-9.81", "--json", "-"]
+    _, out, _ = run("assembly", "exact", "arm6", *gravity)
+    exact = json.loads(out)
+    here = solve_exact(home_posture(load_robot("arm6")), gravity=[0, 0, -9.81])
+    assert exact["platform_screw"] == pytest.approx(here.platform_screw.tolist())
+    assert exact["platform_screw"][5] < -5e-4
+    _, out, _ = run("assembly", "solve", "arm6", *gravity)
+    linear = json.loads(out)
+    assert linear["linearisation_error"]["status"] == "ok"
+    off = np.subtract(linear["platform_screw"], exact["platform_screw"])
+    assert linear["linearisation_error"]["translation"] == pytest.approx(
+        off[3:].tolist(), abs=1e-15
+    )
+
+
+def test_the_error_under_a_load_is_the_sag_and_what_play_adds(run, tmp_path):
+    """A pin with play on an elastic post, pushed down: the axial play is pressed, so
+    only the radial one is left; the post gives F / k. By hand.
+    """
+    (tmp_path / "post.toml").write_text("""
+platform = "tip"
+[[frame]]
+name = "post"
+parent = "base"
+joint_stiffness = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6]
+clearance = { radial = 3e-5, axial = 2e-5 }
+mass = 2.0
+[[frame]]
+name = "tip"
+parent = "post"
+mass = 3.0
+""")
+    words = ["assembly", "error", tmp_path / "post.toml", "--load", "fz=-20"]
+    _, out, _ = run(*words, "--json", "-")
+    found = json.loads(out)
+    assert list(found["error"]) == ["frozen", "free"]
+    assert found["load"] == [0, 0, 0, 0, 0, -20]
+    sag = 2e-5 + 20 / 1e6
+    bounds = found["error"]["frozen"]["translation"]
+    far = np.hypot(3e-5, sag)
+    assert bounds["lower"] <= far * (1 + 1e-9)
+    assert bounds["upper"] >= far * (1 - 1e-9)
+    assert bounds["upper"] - bounds["lower"] <= 1e-6
+    _, out, _ = run(*words, "--gravity", "z=-10", "--json", "-")
+    # the post's own mass hangs before its joint
+    sag = 2e-5 + (20 + 3.0 * 10) / 1e6
+    screw = json.loads(out)["platform_screw"]
+    assert screw[5] == pytest.approx(-sag, rel=1e-9)
+    status, out, err = run(*words, "--reading", "budget")
+    assert (status, out) == (2, "")
+    assert "reading budget: found a load; expected frozen or free" in err
+
+
+HINGE = """
+platform = "tip"
+[[frame]]
+name = "hinge"
+parent = "base"
+joint = "revolute"
+joint_stiffness = [1e6, 1e6, 100, 1e6, 1e6, 1e6]
+clearance = { radial = 3e-5, axial = 2e-5 }
+[[frame]]
+name = "tip"
+parent = "hinge"
+"""
+
+
+def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
+    """A moment that the hinge's own spring carries; by hand M / k, and the play."""
+    file = tmp_path / "hinge.toml"
+    file.write_text(HINGE)
+    status, out, _ = run("assembly", "error", file, "--load", "mz=0.1")
+    assert status == 0
+    frozen, free = out.splitlines()[1:]
+    assert frozen.split() == "frozen rotation 1 to 1 mrad, translation".split() + [
+        "0.0360555", "to", "0.0360555", "mm",
+    ]  # fmt: skip
+    assert free.startswith("free    no answer: the load drives a motion")
+    _, out, _ = run("assembly", "error", file, "--load", "mz=0.1", "--json", "-")
+    assert json.loads(out)["error"]["free"]["rotation"] is None
+    _, out, _ = run("assembly", "error", file, "--reading", "free")
+    assert "rotation without bound, translation 0.0360555 to" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["solve", "--load", "fx=1e300"],
+         "--load fx: found 1e+300, expected a number of size at most 1e+40"),
+        (["exact", "--load", "mz=-1e300"], "--load mz: found -1e+300"),
+        (["error", "--load", "fx=1e300"], "--load fx: found 1e+300"),
+        (["solve", "--gravity", "z=1e300"],
+         "--gravity z: found 1e+300, expected a number of size at most 1e+06"),
+        (["solve", "--pose", "tx=1e300"], "--pose tx: found 1e+300"),
+        (["zone", "--pose", "rz=1e160"], "--pose rz: found 1e+160"),
+        (["solve", "--joint", "left.drive=1e300"], "--joint left.drive: found 1e+300"),
+        (["solve", "--under", "temperature=1e300"], "--under temperature: found"),
+        (["error", "--point", "x=1e300"], "--point x: found 1e+300"),
+        (["error", "--direction", "tx=1e300"], "--direction tx: found 1e+300"),
+        (["error", "--energy-budget", "1e300"], "--energy-budget: found 1e+300"),
+    ],
+)  # fmt: skip
+def test_what_no_double_carries_is_refused_by_name(run, words, message):
+    status, out, err = run("assembly", words[0], "five_bar", *words[1:])
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_the_same_from_python():
+    posture = home_posture(load_robot("five_bar"))
+    with pytest.raises(BadInput, match=r"load: found 1e\+300, expected finite numbers"):
+        solve_assembly(posture, [0, 0, 0, 1e300, 0, 0])
+    with pytest.raises(BadInput, match="gravity: found nan"):
+        solve_assembly(posture, gravity=[0, 0, np.nan])
+    errors = np.zeros((len(posture.robot.frames), 6))
+    errors[2, 3] = 1e300
+    robot = posture.robot.with_errors(errors)
+    with pytest.raises(BadInput, match=r"geometric_error: found 1e\+300"):
+        solve_assembly(replace(posture, robot=robot))
+    with pytest.raises(ValueError, match="an error is larger than"):
+        minimise_energies(robot, posture.transforms[None])
+    assert solve_assembly(posture, [0, 0, 0, 1e40, 0, 0]).energy > 1e60
+
+
+def test_solve_prints_the_wrenches_of_frames_and_closures(run):
+    status, out, _ = run("assembly", "solve", "five_bar", "--load", "fx=10,mz=1")
+    assert status == 0
+    lines = out.splitlines()
+    heads = [line for line in lines if "MX [N m]" in line]
+    assert len(heads) == 2
+    frames = lines[lines.index(heads[0]) + 1 :]
+    answer = solve_assembly(home_posture(load_robot("five_bar")), [0, 0, 1, 10, 0, 0])
+    robot = answer.posture.robot
+    for frame, line in zip(robot.frames, frames, strict=False):
+        assert line.split()[0] == frame.name
+        assert len(line) == len(heads[0])
+        shown = [float(word) for word in line.split()[1:]]
+        expected = answer.wrenches[robot.index(frame.name)]
+        np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-9)
+    closure = lines[lines.index(heads[1]) + 1]
+    assert closure.startswith("left.tip - right.tip ")
+    shown = [float(word) for word in closure.split()[3:]]
+    expected = answer.closure_wrenches[0]
+    np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-9)
+    assert "platform error proved to" in out
+
+
+def test_the_certificate_of_solve_covers_the_screw(run):
+    _, out, _ = run("assembly", "solve", "five_bar", "--load", "fx=10", "--json", "-")
+    found = json.loads(out)["certificate"]
+    assert 0 < found["screw_rotation_error"] < 1e-6
+    assert found["screw_rotation"] >= found["screw_rotation_open"] > 1e-5

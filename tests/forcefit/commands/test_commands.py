@@ -1,0 +1,311 @@
+"""The command: what it writes, and how it refuses."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+import xarray
+
+import forcefit
+from assembly.files.robot_file import write_robot
+from forcefit.commands import app as command
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def robot_file(tmp_path):
+    path = tmp_path / "robot.toml"
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), path)
+    return path
+
+
+def test_solve_writes_the_public_keys_to_standard_output_and_nothing_else(
+    run, robot_file
+):
+    status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", "-")  # fmt: skip
+    found = json.loads(out)
+    assert status == 0
+    point = NUMBERS["cases"][0]["points"][0]
+    assert found["energy"] == pytest.approx(point["energy"], rel=1e-10)
+    assert set(found["zone"]) >= {"assemblable", "margin", "margin_free"}
+    assert found["zone"]["assemblable"] is False
+    assert set(found["certificate"]) >= {
+        "closure_residual", "clearance_excess", "duality_gap", "relative_gap",
+    }  # fmt: skip
+    frame = found["frames"]["leg1.link_a"]
+    assert {k: len(v) for k, v in frame.items()} == dict.fromkeys(
+        ("clearance", "link", "joint", "wrench", "joint_wrench"), 6
+    )
+    assert found["closures"][-1]["frames"] == ["leg1.tip", "leg2.tip"]
+    assert len(found["closures"][-1]["wrench"]) == 6
+
+
+def test_pose_and_joints_name_the_same_configuration(run, robot_file):
+    _, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.1",
+                    "--pose", "tz=-0.45", "--json", "-")  # fmt: skip
+    by_pose = json.loads(out)
+    drives = [f"{n}={by_pose['joints'][n]!r}" for n in ("leg1.drive", "leg2.drive")]
+    _, out, _ = run("assembly", "solve", robot_file, "--joint", ",".join(drives),
+                    "--json", "-")  # fmt: skip
+    by_joints = json.loads(out)
+    assert by_joints["energy"] == pytest.approx(by_pose["energy"], rel=1e-9)
+    assert by_joints["pose"]["tx"] == pytest.approx(0.1, abs=1e-10)
+
+
+def test_load_does_work(run, tmp_path):
+    path = tmp_path / "beams.toml"
+    write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), path)
+    status, out, _ = run("assembly", "solve", path, "--load", "fx=400", "--json", "-")
+    found = json.loads(out)
+    assert status == 0
+    assert found["platform_screw"][3] == pytest.approx(1e-4)  # 400 / (1e6 + 3e6)
+    assert found["potential"] == pytest.approx(-400 * 1e-4 / 2)
+
+
+def test_cannot_assemble_is_an_answer_with_exit_status_1(run, tmp_path):
+    path = tmp_path / "stuck.toml"
+    path.write_text(
+        'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'
+        'name = "b"\nparent = "base"\ngeometric_error = [0, 0, 0, 1e-3, 0, 0]\n'
+        '[[closure]]\nframes = ["a", "b"]\n'
+    )
+    status, out, _ = run("assembly", "solve", path, "--json", "-")
+    found = json.loads(out)
+    assert status == 1
+    assert found["status"] == "cannot assemble"
+    assert found["energy"] is None
+    assert found["zone"]["margin"] is None
+    assert found["zone"]["assemblable"] is False
+
+
+def test_error_writes_the_public_keys(run, robot_file, tmp_path):
+    status, out, _ = run("assembly", "error", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", tmp_path / "e.json")  # fmt: skip
+    found = json.loads((tmp_path / "e.json").read_text())["error"]
+    assert status == 0
+    assert "frozen" in out
+    assert set(found) == {"frozen", "free", "budget"}
+    point = NUMBERS["cases"][0]["points"][0]
+    for name, key in (("rotation", "full_rigid_R"), ("translation", "full_rigid_T")):
+        bracket = found["frozen"][name]
+        assert bracket["lower"] <= point[key][1] + 1e-9
+        assert bracket["upper"] >= point[key][0] - 1e-9
+        assert len(bracket["platform_screw"]) == 6
+    assert found["budget"]["rotation"]["lower"] >= found["frozen"]["rotation"]["lower"]
+
+
+def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
+    out_file, figure = tmp_path / "out.nc", tmp_path / "map.png"
+    status, out, _ = run("assembly", "sweep", robot_file, "--grid",
+                         "tx=0:0.1:0.1,tz=-0.5:-0.4:0.1", "-o", out_file,
+                         "--figure", figure)  # fmt: skip
+    assert (status, out.strip()) == (0, "ok: 4")
+    with xarray.open_dataset(out_file) as data:
+        sizes = {"tx": 2, "tz": 2, "screw": 6, "bound": 2, "kind": 3}
+        assert dict(data.sizes) == sizes
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_zone_gives_both_margins(run, robot_file):
+    status, out, _ = run("assembly", "zone", robot_file, "--pose", "tx=0.4,tz=-0.45",
+                         "--json", "-")  # fmt: skip
+    zone = json.loads(out)["zone"]
+    point = NUMBERS["cases"][0]["points"][3]
+    assert status == 0
+    assert zone["margin"] == pytest.approx(point["t_compliant_rigid"])
+    assert zone["margin_free"] == pytest.approx(point["t_compliant_free"])
+    assert (zone["assemblable"], zone["assemblable_free"]) == (False, True)
+
+
+def test_exact_states_what_the_linear_model_gets_wrong(run, robot_file):
+    status, out, _ = run("assembly", "exact", robot_file, "--pose", "tx=0,tz=-0.5",
+                         "--json", "-")  # fmt: skip
+    found = json.loads(out)
+    assert status == 0
+    assert found["certificate"]["closure_residual"] < 1e-11
+    gap = np.subtract(found["linear"]["platform_screw"], found["platform_screw"])
+    assert np.allclose(found["linearisation_error"]["rotation"], gap[:3])
+    assert 1e-6 < np.linalg.norm(gap[3:]) < 2e-4  # tens of micrometres at full errors
+
+
+def test_gravity_pulls_an_arm_down(run):
+    _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
+    found = json.loads(out)
+    assert found["platform_screw"][5] < 0
+    # springs alone would give potential = -energy; the arm's play falls as well
+    assert found["potential"] < -found["energy"]
+
+
+def test_show_draws_a_picture(run, robot_file, tmp_path):
+    status, _, _ = run("assembly", "show", robot_file, "-o", tmp_path / "robot.png")
+    assert status == 0
+    assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["assembly", "solve", "irsbot3"], '"irsbot3": neither a built-in robot nor a'),
+        (["assembly", "solve", "no.toml"], "no.toml: cannot be read: No such file"),
+        (["assembly", "solve", "irsbot2", "--pose", "tx"], '--pose: found "tx"'),
+        (["assembly", "solve", "irsbot2", "--pose", "q=1"], 'unknown component "q"'),
+        (["assembly", "solve", "irsbot2", "--pose", "tx=nan"], "--pose tx: found nan"),
+        (["assembly", "solve", "irsbot2", "--pose", "tz=-9"], "cannot be reached"),
+        (["assembly", "solve", "irsbot2", "--pose", "tx=0", "--joint", "leg1.drive=0"],
+         "found both a pose and joints"),
+        (["assembly", "solve", "irsbot2", "--joint", "leg1.elbow=1"],
+         'no actuated joint "leg1.elbow"'),
+        (["assembly", "solve", "irsbot2", "--load", "f=1"], '--load: unknown'),
+        (["assembly", "solve", "irsbot2", "--json", "/nowhere/x.json"],
+         "/nowhere/x.json: "),
+        (["assembly", "solve", "irsbot2", "--gravity", "w=1"], "--gravity: unknown"),
+        (["assembly", "error", "irsbot2", "--reading", "fre"], '--reading: found'),
+        (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
+         "--tolerance-rotation: found -1.0, expected a finite number > 0"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
+         "grid tx: step 0"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0", "-o", "/nowhere/x.nc"],
+         "/nowhere/x.nc: no folder /nowhere"),
+        (["assembly", "solve", "irsbot2", "--poze", "tx=0"],
+         "--pose"),
+        (["assembly", "solve", "irsbot2", "--po\nze"], r"--po\x0aze"),
+        (["assembly", "solve"], "Missing argument 'ROBOT'"),
+        (["assembly", "solev", "irsbot2"], "'solve'"),
+        (["asembly"], "'assembly'"),
+        (["assembly", "solve", "irsbot2", "more"], "unexpected extra argument"),
+        (["assembly", "solve", "irsbot2", "--pose"], "--pose"),
+        (["assembly", "sweep", "irsbot2", "--grid", "tx=0"], "Missing option '-o'"),
+        (["assembly", "error", "irsbot2", "--energy-budget", "x"],
+         "Invalid value for '--energy-budget': "),
+        (["assembly", "sweep", "irsbot2", "-o", "x.nc", "--draws", "0"],
+         "Invalid value for '--draws': "),
+        (["stiffness", "beam", "--length", "1", "--young", "1", "--poisson", "a"],
+         "Invalid value for '--poisson': "),
+        (["study", "no.toml"], "no.toml: cannot be read: No such file or directory"),
+        (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_message_and_exit_status_2(run, tmp_path, monkeypatch, words,
+                                                    message):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(*words)
+    assert status == 2
+    assert out == ""
+    assert message in err
+    assert err.startswith("forcefit: ")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def commands(command, words=()):
+    """Every command and group of commands with the words that call it."""
+    yield words, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from commands(inner, (*words, name))
+
+
+EVERY_COMMAND = dict(commands(typer.main.get_command(command.app)))
+
+
+@pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
+def test_every_command_explains_itself(run, words):
+    status, out, err = run(*words, "--help")
+    assert (status, err) == (0, "")
+    assert out.startswith(" ".join(("Usage: forcefit", *words)))
+    assert run(*words, "-h") == (status, out, err)
+
+
+@pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
+def test_help_prints_every_unit_in_brackets_and_cuts_nothing_short(run, words):
+    """No part of a text is markup, and a list of commands has whole sentences."""
+    _, out, _ = run(*words, "--help")
+    printed = " ".join(out.split())
+    command = EVERY_COMMAND[words]
+    for text in [command.help or "", *(p.help or "" for p in command.params)]:
+        for part in re.findall(r"\[[^]]*\]", text):
+            assert " ".join(part.split()) in printed
+    assert "..." not in out.partition("Commands:")[2]
+
+
+def test_there_are_units_to_print():
+    assert len(EVERY_COMMAND) > 25
+    helps = [p.help or "" for c in EVERY_COMMAND.values() for p in c.params]
+    assert sum("[" in text for text in helps) > 40
+
+
+def test_the_version_is_that_of_the_package(run):
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert run("--version") == (0, f"forcefit {declared['version']}\n", "")
+    assert forcefit.__version__ == declared["version"]
+    with pytest.raises(AttributeError, match="no attribute 'version'"):
+        forcefit.version  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [("forcefit asse", "assembly"), ("forcefit assembly so", "solve"),
+     ("forcefit validation crosscheck --clear", "--clearances"),
+     ("forcefit assembly zone arm", "arm6")],
+)  # fmt: skip
+def test_a_shell_completes_commands_options_and_robots(typed, offered):
+    asked = {"_FORCEFIT_COMPLETE": "complete_bash", "COMP_WORDS": typed,
+             "COMP_CWORD": str(len(typed.split()) - 1)}  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "forcefit"], env=os.environ | asked,
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert done.stdout.split() == [offered]
+
+
+def test_the_installed_command_refuses_without_a_traceback():
+    done = subprocess.run([sys.executable, "-m", "forcefit", "assembly", "solve", "x"],
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith('forcefit: "x": neither a built-in robot nor a file')
+    assert done.stdout == ""
+
+
+@pytest.mark.slow
+def test_processes_that_compile_at_once_leave_everything_compiled(tmp_path):
+    """Three on an empty cache; a fourth then compiles nothing, and says nothing."""
+    command = [sys.executable, "-m", "forcefit", "warm-up"]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    runs = [
+        subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    for run in runs:
+        _, said = run.communicate(timeout=900)
+        assert (run.returncode, said.count("compiling its solvers")) == (0, 1), said
+    again = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (again.returncode, "compiling its solvers" in again.stderr) == (0, False)
+
+
+@pytest.mark.slow
+def test_every_compiled_function_is_warmed_up_and_has_one_signature(tmp_path):
+    """Others would be compiled later, or by each process under the same name."""
+    code = """
+import importlib, pathlib, forcefit.commands.warm_up
+from numba.core.dispatcher import Dispatcher
+forcefit.commands.warm_up.warm_up()
+for path in sorted(pathlib.Path("assembly").rglob("*.py")):
+    if "import kernel" in path.read_text():
+        module = importlib.import_module(".".join(path.with_suffix("").parts))
+        for name, one in vars(module).items():
+            if isinstance(one, Dispatcher) and len(one.signatures) != 1:
+                print(module.__name__, name, len(one.signatures))
+"""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True,
+        cwd=Path(__file__).parents[3], check=True,
+    )  # fmt: skip
+    assert run.stdout == ""

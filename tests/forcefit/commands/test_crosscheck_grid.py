@@ -1,0 +1,81 @@
+"""Cross-checks over a grid of poses."""
+
+import json
+
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.robots import load_robot
+from forcefit.commands import app as command
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+from validation.crosscheck.crosscheck import crosscheck
+from validation.crosscheck.poses import check_poses, poses_table, poses_text
+from validation.multibody.simulation import SimulationFailed
+
+pytestmark = pytest.mark.exudyn
+AXES = {"tx": [-0.7, 0.0, 0.2], "tz": [-0.45]}
+
+
+def test_every_reachable_pose_is_checked_and_the_others_say_so():
+    robot, seen = irsbot2_with(NUMBERS["cases"][0]), []
+    rows = check_poses(
+        robot,
+        AXES,
+        lambda p: crosscheck(p, (1.0, 0.5)),
+        lambda *step: seen.append(step),
+    )
+    assert [row["status"] for row in rows] == ["out of reach", "ok", "ok"]
+    assert [row["passed"] for row in rows] == [None, True, True]
+    assert rows[1]["asked"] == {"tx": 0.0, "tz": -0.45}
+    assert all(abs(row["slope"] - 2) < 0.1 for row in rows[1:])
+    assert poses_table(rows)["passed"]
+    assert poses_text(rows).splitlines()[-1] == "2 of 2 reachable poses passed"
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_a_pose_that_fails_is_named_and_stops_nothing():
+    def check(posture):
+        if posture.pose()["tx"] > 0.1:
+            raise SimulationFailed("irsbot2", "no equilibrium")
+        return crosscheck(posture, (1.0, 0.5))
+
+    rows = check_poses(irsbot2_with(NUMBERS["cases"][0]), AXES, check)
+    assert [row["passed"] for row in rows] == [None, True, False]
+    assert rows[2]["status"] == "simulation failed"
+    assert not poses_table(rows)["passed"]
+    assert "FAILED (simulation failed)" in poses_text(rows)
+
+
+def test_no_reachable_pose_is_no_proof():
+    rows = check_poses(irsbot2_with(NUMBERS["cases"][0]), {"tz": [-0.9]}, None)
+    assert not poses_table(rows)["passed"]
+
+
+def test_the_command_takes_a_grid(tmp_path, capsys, monkeypatch):
+    import sys
+
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
+    words = ["forcefit", "validation", "crosscheck", str(tmp_path / "robot.toml")]
+    words += ["--grid", "tx=0:0.1:0.1,tz=-0.5", "--scale", "1,0.5", "--json", "-"]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as done:
+        command.main()
+    found = json.loads(capsys.readouterr().out)
+    assert done.value.code == 0
+    assert found["reached"] == 2
+    assert len(found["poses"]) == 2
+    monkeypatch.setattr(sys, "argv", [*words, "--pose", "tx=0"])
+    with pytest.raises(SystemExit) as done:
+        command.main()
+    assert done.value.code == 2
+    assert "--grid: not together with" in capsys.readouterr().err
+
+
+def test_a_pose_where_nothing_is_compared_is_not_passed():
+    """The built-in robot has no errors: at every pose zero is compared with zero."""
+    rows = check_poses(load_robot("irsbot2"), AXES, lambda p: crosscheck(p, (1.0, 0.5)))
+    assert [row["passed"] for row in rows] == [None, False, False]
+    assert not poses_table(rows)["passed"]
+    said = poses_text(rows).splitlines()
+    assert said[1].endswith("NOT CHECKED, nothing stands out of the noise")
+    assert said[-1] == "0 of 2 reachable poses passed"

@@ -1,0 +1,217 @@
+"""The commands of the stiffness folder: keys, messages, files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from forcefit.commands.options import parse_axis
+from forcefit.commands.stiffness import app
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.sections import rectangular_section, round_section
+from stiffness.link import LinkStiffness, inverted
+from stiffness.report.compare import compare_link
+from stiffness.report.plot import plot_comparison
+from stiffness.report.results import comparison_text
+
+MESHES = Path(__file__).parents[3] / "meshes"
+MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
+BEAM = ["beam", "--length", "0.452", *MATERIAL]
+PLAIN = [str(MESHES / "distal_plain.stl"), "--base", "z=0", "--tip", "z=0.452"]
+
+
+def run(*arguments):
+    """The JSON a command prints; its own errors come through."""
+    result = CliRunner().invoke(app, [*arguments], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_beam_writes_the_papers_link():
+    results = json.loads(run(*BEAM, "--radius", "0.04", "--json", "-"))
+    K = np.array(results["stiffness"])
+    assert K[1, 1] == pytest.approx(1015962.1690558865, rel=1e-12)
+    np.testing.assert_allclose(inverted(np.array(results["compliance"])), K, rtol=1e-9)
+    assert results["tip"] == [0.452, 0, 0]
+    assert results["relative_error_estimate"] == 0
+
+
+def test_beam_text_shows_the_matrix():
+    text = run(*BEAM, "--radius", "0.04")
+    assert "Timoshenko beam; K read at the tip (0.452, 0, 0) m" in text
+    assert "1.01596e+06" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "section", "axis", "theory"),
+    [
+        (
+            ["--radius", "0.04", "--inner-radius", "0.03", "--axis", "z"],
+            round_section(0.04, 0.3, 0.03),
+            [0, 0, 1],
+            "timoshenko",
+        ),
+        (
+            ["--width", "0.02", "--height", "0.05", "--axis=-1,0,2", "--up", "y"],
+            rectangular_section(0.02, 0.05, 0.3),
+            [-1, 0, 2],
+            "timoshenko",
+        ),
+        (
+            ["--radius", "0.04", "--theory", "euler", "--axis=-y"],
+            round_section(0.04, 0.3),
+            [0, -1, 0],
+            "euler",
+        ),
+    ],
+)
+def test_beam_options_reach_the_formula(options, section, axis, theory):
+    results = json.loads(run(*BEAM, *options, "--json", "-"))
+    up = [0, 1, 0] if "--up" in options else None
+    C = beam_compliance(0.452, section, 6e10, 0.3, axis=axis, up=up, theory=theory)
+    np.testing.assert_allclose(results["compliance"], C, rtol=1e-12, atol=1e-25)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--radius", "nan"], "--radius: found nan, expected a finite number > 0 [m]"),
+        (["--radius", "0"], "--radius: found 0"),
+        (["--radius", "1", "--inner-radius", "1"], "--inner-radius: found 1"),
+        (["--radius", "1", "--width", "1"], "either --radius, or --width"),
+        ([], "either --radius, or --width"),
+        (["--width", "1"], "--height: missing"),
+        (
+            ["--width", "1", "--height", "1", "--inner-radius", "0.1"],
+            "goes with --radi",
+        ),
+        (["--radius", "1", "--length", "inf"], "--length: found inf"),
+        (["--radius", "1", "--young", "-1"], "--young: found -1"),
+        (["--radius", "1", "--poisson", "0.5"], "--poisson: found 0.5"),
+        (["--radius", "1", "--theory", "eular"], "--theory: found 'eular'; did you me"),
+        (["--radius", "1", "--axis", "q"], "--axis: found 'q', expected x, y, z or"),
+        (["--radius", "1", "--axis", "0,0,0"], "--axis: found '0,0,0'"),
+        (["--radius", "1", "--up", "x"], "lies along the axis"),
+    ],
+)
+def test_beam_refuses_with_the_options_name(options, message):
+    with pytest.raises(BadInput) as caught:
+        run(*BEAM, *options)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (["--base", "z=1"], "no face of the surface lies on the base interface"),
+        (["--tip", "q=1"], "--tip: found 'q=1'"),
+        (["--accuracy", "0"], "--accuracy: found 0"),
+        (["--accuracy", "nan"], "--accuracy: found nan"),
+        (["--density", "-1"], "--density: found -1"),
+        (["--time-limit", "0"], "--time-limit: found 0"),
+        (["--unit", "mile"], "unit: found 'mile'"),
+        (["--interface", "rigd"], "interface: found 'rigd'"),
+        (["--part", "z=0..1"], "--part: found 'z=0..1', expected"),
+        (["--part", "z=1..0/young=1e9,poisson=0.3"], "--part: found 'z=1..0/"),
+        (["--part", "q=0..1/young=1e9,poisson=0.3"], "--part: found 'q=0..1/"),
+        (["--part", "z=0..1/young=1e9,poison=0.3"], "--part: found 'z=0..1/"),
+        (["--part", "z=0..1/young=1e9,poisson=0.7"], "--part: material: nu = 0.7"),
+        (["--mass", "1.5"], "--mass: found '1.5', expected"),
+        (["--mass", "-1/0,0,0"], "--mass: found -1"),
+        (["--mass", "1/0,0,nan"], "--mass: found '1/0,0,nan'"),
+        (["--json", "/absent/folder/x.json"], "no folder"),
+    ],
+)
+def test_fea_refuses_before_it_works(change, message):
+    with pytest.raises(BadInput) as caught:
+        run("fea", *PLAIN, *MATERIAL, *change)
+    assert message in str(caught.value)
+
+
+def test_fea_refuses_a_file_that_is_none(tmp_path):
+    path = tmp_path / "x.stl"
+    path.write_text("solid rubbish")
+    with pytest.raises(BadInput, match=r"x.stl: "):
+        run("fea", str(path), *PLAIN[1:], *MATERIAL)
+
+
+def test_fea_writes_the_keys_of_the_format(tmp_path):
+    target = tmp_path / "k.json"
+    text = run("fea", *PLAIN, *MATERIAL, "--density", "2700", "--json", str(target))
+    results = json.loads(target.read_text())
+    assert results["stiffness"][0][0] == pytest.approx(1032277, rel=5e-3)
+    assert len(results["compliance"]) == 6
+    assert results["tip"] == pytest.approx([0, 0, 0.452], abs=1e-9)
+    assert 0 < results["relative_error_estimate"] <= 0.005
+    assert results["mesh"]["elements"] > 100
+    assert results["mesh"]["volume"] == pytest.approx(np.pi * 0.04**2 * 0.452, rel=1e-4)
+    assert results["mass"] == pytest.approx(2700 * np.pi * 0.04**2 * 0.452, rel=1e-4)
+    assert "the asked 0.005 was reached" in text
+
+
+def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
+    """Without Poisson's effect plane sections stay plane and compliances add up:
+    of pure bending h/EI, of torsion h/GJ with G = E/2, of tension h/EA.
+
+    Accuracy 1 %; the faces between the materials are those of elements, not the plane,
+    which costs half a per cent of the mass at most."""
+    text = run(
+        "fea", *PLAIN, "--young", "6e10", "--poisson", "0", "--density", "2700",
+        "--part", "z=0.226..1/young=1.8e11,poisson=0,density=7800",
+        "--mass", "1.5/0.3,0,0.452", "--accuracy", "0.01", "--json", "-",
+    )  # fmt: skip
+    found = json.loads(text)
+    C, half, area = np.array(found["compliance"]), 0.226, np.pi * 0.04**2
+    inertia, soft = np.pi * 0.04**4 / 4, 1 / 6e10 + 1 / 1.8e11
+    # torsion: 2 (1 + nu) / E over 2 I, bending: 1 / E over I
+    expected = half * soft * np.array([1 / inertia, 1 / inertia, 1 / inertia, 1 / area])
+    np.testing.assert_allclose(np.diag(C)[[0, 1, 2, 5]], expected, rtol=0.01)
+    body = area * half * np.array([2700, 7800])
+    assert found["mass"] == pytest.approx(body.sum() + 1.5, rel=5e-3)
+    center = [0.3 * 1.5, 0, 0.113 * body[0] + 0.339 * body[1] + 0.452 * 1.5]
+    center = np.array(center) / (body.sum() + 1.5)
+    np.testing.assert_allclose(found["center_of_mass"], center, atol=2e-3)
+
+
+def test_compare_writes_both_and_draws(tmp_path):
+    figure = tmp_path / "k.png"
+    options = ["--radius", "0.04", "--figure", str(figure), "--json", "-"]
+    results = json.loads(run("compare", *PLAIN, *MATERIAL, *options))
+    difference = np.array(results["difference"])
+    # 1 032 277 / 1 015 962 - 1 = 1.6 %, and the mesh adds up to 0.5 %
+    assert 0.016 < difference[0, 0] < 0.0212
+    assert abs(difference[2, 2]) < 1e-3
+    assert results["slenderness"] == pytest.approx(0.452 / 0.04)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def links():
+    C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
+    beam = LinkStiffness("Timoshenko beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
+    other = LinkStiffness("other", C / 1.02, tip=[0.4, 0, 0], base=[0, 0, 0])
+    return beam, other
+
+
+def test_a_link_two_percent_stiffer_is_seen_as_that():
+    """K 2 % up, L / r = 20: the end effect c of 1 + c r / L is 0.4 everywhere."""
+    comparison = compare_link(*links(), size=0.02)
+    np.testing.assert_allclose(np.diag(comparison.difference), 0.02, rtol=1e-9)
+    np.testing.assert_allclose(comparison.end_effect, 0.4, rtol=1e-9)
+    assert "c = 0.40 0.40 0.40 (rotations)" in comparison_text(comparison)
+
+
+def test_the_picture_shows_every_entry_that_matters():
+    """8 of the upper entries are not zero: the diagonal and two couplings."""
+    figure = plot_comparison(compare_link(*links(), size=0.02))
+    bars, image = figure.axes[0], figure.axes[1]
+    assert len(bars.patches) == 2 * 8
+    assert image.images[0].get_array().shape == (6, 6)
+    assert "L / r = 20" in figure.get_suptitle()
+
+
+def test_directions_as_people_write_them():
+    np.testing.assert_array_equal(parse_axis("--axis", "-z"), [0, 0, -1])
+    np.testing.assert_array_equal(parse_axis("--axis", "1, 2,3"), [1, 2, 3])

@@ -1,0 +1,284 @@
+"""``forcefit assembly sweep`` and ``plot``: what they write, and how they refuse."""
+
+import json
+import os
+import zlib
+
+import pytest
+import xarray
+
+import forcefit
+
+ERRORS = """
+[[errors]]
+frames = ["elbow", "arm"]
+most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
+"""
+
+
+def test_everything_at_once_ends_in_one_file_and_one_object(run, tmp_path):
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.5\n")
+    words = ["five_bar", "--poses", tmp_path / "poses.csv",
+             "--errors", tmp_path / "errors.toml", "--draws", "2", "--seed", "5",
+             "--vary", "elbow.link.young=7e10,2.1e11", "--wrench-of", "left.arm",
+             "--play-alone", "--linearisation"]  # fmt: skip
+    status, out, _ = run("assembly", "sweep", *words, "-o", tmp_path / "x.nc",
+                         "--json", "-")  # fmt: skip
+    found = json.loads(out)
+    assert status == 0
+    assert found["axes"] == {"elbow.link.young": 2, "posture": 2, "draw": 2}
+    assert found["status"] == {"ok": 4, "out of reach": 4}
+    assert found["seed"] == 5
+    assert found["quantities"]["energy"]["units"] == "J"
+    assert found["command"].startswith("forcefit assembly sweep five_bar --poses ")
+    assert "--workers" not in found["command"]
+    with xarray.open_dataset(tmp_path / "x.nc") as data:
+        assert data.wrench.dims[-2:] == ("frame", "wrench_component")
+        assert data.ty.values.tolist() == [0.13, 0.5]
+        assert data.posture.values.tolist() == ["a", "b"]
+        assert float(data.linearisation_translation.max()) < 1e-6
+        # springs that are stiffer never close the same gap with less energy
+        energy = data.energy.isel(posture=0).values
+        assert (energy[1] >= energy[0]).all()
+        # and what planar errors within the play cost is nothing, not its rounding
+        assert ((energy == 0.0) | (energy > 1e-20)).all()
+    assert sorted(p.name for p in tmp_path.glob("x.nc*")) == ["x.nc"]
+
+
+def messages(err):
+    """How many; beside them stderr has, of slow machines, a line of progress."""
+    lines = [line for line in err.splitlines() if line != "robot: 0 of 1"]
+    assert all(line.startswith("forcefit: ") for line in lines)
+    return len(lines)
+
+
+def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
+    """A log file shows it before the work ends, not only the bars after it."""
+    import forcefit.commands.assembly
+
+    monkeypatch.setattr(forcefit.commands.options, "_MOMENT", 0.0)
+    with forcefit.commands.options.progress_bars() as update:
+        update("points", 3, 12)
+        said = ""
+        while "points: 3 of 12" not in said:  # from a thread of its own
+            said += capsys.readouterr().err
+        assert said == "points: 3 of 12\n"
+
+
+def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
+    file, picture = tmp_path / "x.nc", tmp_path / "x.png"
+    grid = "tx=-0.01:0.01:0.01,ty=0.12:0.14:0.02"
+    assert run("assembly", "sweep", "five_bar", "--grid", grid, "-o", file)[0] == 0
+    from assembly.sweeps import points
+
+    monkeypatch.setattr(points, "_solve_reached", None)
+    status, out, err = run("assembly", "plot", file, "-o", picture)
+    assert (status, out, err) == (0, "", "")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert run("assembly", "plot", file, "--at", "tx=0", "-o", picture)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["sweep", "five_bar", "-o", "x.nc"], "expected --grid or --poses"),
+        (["sweep", "five_bar", "--grid", "tx=0", "-o", "x.nc", "--workers", "2",
+          "--scheduler", "tcp://h:1"], "found --workers and --scheduler, expected one"),
+        (["sweep", "five_bar", "--poses", "no.csv", "-o", "x.nc"],
+         "no.csv: cannot be read: No such file"),
+        (["sweep", "five_bar", "--grid", "tx=0", "--vary", "left.elbow.young=1",
+          "-o", "x.nc"], 'five_bar: no number "left.elbow.young"'),
+        (["sweep", "five_bar", "--grid", "tx=0", "--errors", "no.toml", "--draws", "2",
+          "-o", "x.nc"], "no.toml: cannot be read: No such file"),
+        (["plot", "no.nc", "-o", "x.png"], "no.nc: no such file; expected a data set"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_message_and_nothing_is_written(run, tmp_path, monkeypatch,
+                                                         words, message):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run("assembly", *words)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert messages(err) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_journal_of_another_grid_is_refused(run, tmp_path):
+    from assembly.sweeps.sweep import journal_path
+
+    file = tmp_path / "x.nc"
+    journal = journal_path(file)
+    line = b'{"kind": "forcefit sweep journal 2", "robot": "delta"}'
+    journal.write_bytes(b"%s %08x\n" % (line, zlib.crc32(line)))
+    status, _, err = run("assembly", "sweep", "five_bar", "--grid", "tx=0", "-o", file)
+    assert status == 2
+    assert "journal of another sweep: found robot 'delta'" in err
+    assert "expected robot 'five_bar'" in err
+    assert not file.exists()
+
+
+STIFF = """
+name = "stiff"
+platform = "p"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "prismatic"
+actuated = true
+[[frame]]
+name = "p"
+parent = "drive"
+[[frame]]
+name = "slide"
+parent = "base"
+joint = "prismatic"
+[[frame]]
+name = "q"
+parent = "slide"
+geometric_error = [0, 0, 0, 1e-4, 0, 0]
+[[closure]]
+frames = ["p", "q"]
+"""
+GRIDS = {
+    "one point": ("q.drive=0", []),
+    "a line": ("q.drive=0:0.2:0.1", ["--figure"]),
+    "a map": ("q.drive=0:0.2:0.1", ["--figure", "--vary"]),
+}
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("errors", ["1e-4", "0"])
+def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
+    run, tmp_path, errors, grid
+):
+    """Errors without play or springs: no margin is finite, nothing has an energy."""
+    robot, file, picture = (tmp_path / n for n in ("r.toml", "x.nc", "x.png"))
+    robot.write_text(STIFF.replace("1e-4", errors))
+    axes, more = GRIDS[grid]
+    options = {"--figure": picture, "--vary": "p.mass=1,2"}
+    words = [word for name in more for word in (name, options[name])]
+    status, out, err = run("assembly", "sweep", robot, "--grid", axes, "-o", file,
+                           *words, "--json", "-")  # fmt: skip
+    assert status == 0
+    assert "Warning" not in err
+    found = json.loads(out)
+    if errors != "0":
+        assert list(found["status"]) == ["cannot assemble"]
+        assert found["quantities"]["energy"] is None
+        assert found["quantities"]["margin"] is None
+    if more:
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert run("assembly", "plot", file, "-o", picture) == (0, "", "")
+
+
+def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
+    file, picture = tmp_path / "x.nc", tmp_path / "x.png"
+    words = ["--grid", "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture]
+    status, out, err = run("assembly", "sweep", "five_bar", *words)
+    assert (status, out) == (0, "out of reach: 9\n")
+    assert "Warning" not in err
+    assert run("assembly", "plot", file, "-o", picture, "--at", "tx=5")[0] == 0
+
+
+def test_postures_of_a_list_and_designs_are_a_map(run, tmp_path):
+    (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.14\n")
+    words = ["--vary", "elbow.link.young=2e11,7e10,1e11", "-o", tmp_path / "x.nc",
+             "--figure", tmp_path / "x.svg"]  # fmt: skip
+    status, _, err = run("assembly", "sweep", "five_bar", "--poses",
+                         tmp_path / "poses.csv", *words)  # fmt: skip
+    assert (status, "Warning" in err) == (0, False)
+    assert (tmp_path / "x.svg").read_bytes().startswith(b"<?xml")
+
+
+def test_ask_sweep_takes_paths_as_text_or_as_paths(tmp_path):
+    from assembly.files.robot_file import write_robot
+    from assembly.robots import load_robot
+    from assembly.sweeps.request import ask_sweep
+
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    (tmp_path / "poses.csv").write_text("pose.tx,pose.ty\n0,0.13\n")
+    write_robot(load_robot("five_bar"), tmp_path / "robot.toml")
+    files = {"poses": tmp_path / "poses.csv", "errors": tmp_path / "errors.toml"}
+    one = ask_sweep(tmp_path / "robot.toml", **files, draws=2)
+    text = {name: str(path) for name, path in files.items()}
+    other = ask_sweep(str(tmp_path / "robot.toml"), **text, draws=2)
+    assert one.identity == other.identity
+    assert one.command == other.command
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "robot.toml"], 'robot.toml: found the ending ".toml", expected a '
+         "NetCDF file of forcefit: .nc"),
+        (["-o", "x"], "x: found no ending, expected a NetCDF file of forcefit: .nc"),
+        (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
+         "forcefit; expected one, or nothing there: it is not overwritten"),
+        (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
+         "sweep by forcefit"),
+        (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
+         "expected a picture: .png or .svg or .pdf"),
+        (["-o", "x.nc", "--figure", "other.png"], "other.png: found a file that is not "
+         "a picture"),
+        (["-o", "x.nc", "--json", "robot.toml"], 'found the ending ".toml", expected a '
+         "JSON file: .json"),
+        (["-o", "x.nc", "--figure", "x.png"], "figure: found a single point"),
+        (["-o", "x.nc", "--json", "full.json"], "full.json: found a device, pipe or "
+         "socket, expected a regular file"),
+        (["-o", "pipe.nc"], "pipe.nc: found a device, pipe or socket"),
+        (["-o", "no/x.nc"], "no/x.nc: no folder no; expected one that exists"),
+        (["-o", "robot.toml/x.nc"], "no folder robot.toml"),
+        (["-o", f"{'x' * 300}.nc"], "cannot be written: File name too long"),
+    ],
+)  # fmt: skip
+def test_an_output_that_is_not_the_commands_is_refused_and_left(
+    run, tmp_path, monkeypatch, words, message
+):
+    monkeypatch.chdir(tmp_path)
+    for name in ("robot.toml", "other.nc", "other.png"):
+        (tmp_path / name).write_text("mine\n")
+    xarray.Dataset({"x": 1}).to_netcdf("measured.nc", engine="h5netcdf")
+    os.symlink("/dev/full", "full.json")
+    os.mkfifo("pipe.nc")
+    before = {p: p.lstat().st_mtime_ns for p in tmp_path.iterdir()}
+    status, out, err = run("assembly", "sweep", "five_bar", "--grid", "tx=0,ty=0.13",
+                           *words)  # fmt: skip
+    assert (status, out) == (2, "")
+    assert message in err
+    assert messages(err) == 1
+    assert {p: p.lstat().st_mtime_ns for p in tmp_path.iterdir()} == before
+
+
+def test_a_sweep_replaces_its_own_file(run, tmp_path):
+    for grid in ("tx=0,ty=0.13", "tx=0,ty=0.14"):
+        words = ["five_bar", "--grid", grid, "-o", tmp_path / "x.nc"]
+        assert run("assembly", "sweep", *words)[0] == 0
+    with xarray.open_dataset(tmp_path / "x.nc") as data:
+        assert data.ty.values.tolist() == [0.14]
+
+
+def test_ctrl_c_in_compiled_code_is_130_too(run, monkeypatch):
+    """Python says so by a SystemError whose cause is the interrupt."""
+
+    def interrupted(**_):
+        raise SystemError("returned a result with an exception set") from (
+            KeyboardInterrupt()
+        )
+
+    monkeypatch.setattr(forcefit, "app", interrupted)
+    assert run("study")[0] == 130
+
+
+def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path):
+    """HDF5 opens some of them, and h5netcdf then fails half open."""
+    file = tmp_path / "x.nc"
+    words = ["five_bar", "--grid", "tx=0:0.01:0.01,ty=0.13", "-o", file]
+    assert run("assembly", "sweep", *words)[0] == 0
+    content = file.read_bytes()
+    for place in range(100, len(content), len(content) // 6):
+        spoilt = content[:place] + bytes(40) + content[place + 40 :]
+        file.write_bytes(spoilt)
+        status, _, err = run("assembly", "plot", file, "-o", tmp_path / "x.svg")
+        assert status in {0, 2}
+        assert messages(err) == (status == 2)

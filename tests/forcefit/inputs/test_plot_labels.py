@@ -1,0 +1,75 @@
+"""Names that users chose, in every figure: shown as they are written."""
+
+import numpy as np
+import pytest
+import xarray
+
+from assembly.statistics.plot import (
+    allocation_figure,
+    histogram_figure,
+    tornado_figure,
+)
+from assembly.sweeps.maps import map_figure, path_figure
+from forcefit.inputs.errors import plot_label
+
+ODD = ["$x^{<b>&_\\$", "a$b", "$\\frac{1}{$", "_$_$", "\\$", "\\\\$a$", "^_\\&<>"]
+
+
+def drawn(figure):
+    """The figure, drawn; a text that is no formula but read as one dies here."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure).draw()
+    return figure
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_matplotlib_shows_a_name_as_it_is_written(name):
+    """As wide as the same text with formulas switched off."""
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    shown = figure.text(0, 0, plot_label(name))
+    plain = figure.text(0, 0.5, name, parse_math=False)
+    drawn(figure)
+    wide, expected = (t.get_window_extent().width for t in (shown, plain))
+    assert wide == pytest.approx(expected, abs=0.5)
+
+
+def grid(count, axes):
+    """A sweep's data set with odd names wherever a user has a say."""
+    shape = tuple(count[: len(axes)])
+    values = np.ones(shape)
+    status = np.full(shape, "ok", dtype=object)
+    near = np.full(shape, f"parallel: {ODD[2]}, {ODD[4]}", dtype=object)
+    names = ("margin", "margin_free", "energy", "condition")
+    data = {name: (axes, values) for name in names}
+    data |= {"status": (axes, status), "near_singularity": (axes, near)}
+    data["platform_screw"] = ((*axes, "screw"), np.ones((*shape, 6)))
+    coords = {a: np.arange(n, dtype=float) for a, n in zip(axes, shape, strict=True)}
+    return xarray.Dataset(data, coords, {"robot": ODD[0]})
+
+
+def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
+    both = grid((2, 3), (f"q.{ODD[0]}", f"{ODD[2]}.link.length"))
+    assert drawn(map_figure(both)).get_suptitle().startswith(plot_label(ODD[0]))
+    drawn(path_figure(grid((4,), (f"q.{ODD[2]}",))))
+
+
+def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
+    attrs = {"robot": ODD[0], "seed": 1, "play": "worst"}
+    draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
+    drawn(histogram_figure(xarray.Dataset(draws, attrs=attrs)))
+    shares = np.full((1, len(ODD), 3), 0.5)
+    axes = ("quantity", "group", "estimate")
+    coords = {"quantity": ["energy"], "group": ODD}
+    coords["estimate"] = ["value", "lower", "upper"]
+    indices = {key: (axes, shares) for key in ("first_index", "total_index")}
+    drawn(tornado_figure(xarray.Dataset(indices, coords)))
+    sizes = {
+        key: ("class", np.full(len(ODD), 1e-4))
+        for key in ("tolerance", "loosest_allowed", "scaled_alike")
+    }
+    sizes["unit"] = ("class", np.full(len(ODD), "m"))
+    plan = xarray.Dataset(sizes, {"class": ODD}, {"said": f"{ODD[0]}; {ODD[2]}"})
+    drawn(allocation_figure(plan))

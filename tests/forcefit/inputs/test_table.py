@@ -1,0 +1,271 @@
+"""Strict reading of tables: what is found, what is expected, in one short line."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from forcefit.inputs.errors import one_line
+from forcefit.inputs.table import (
+    BadInput,
+    Table,
+    describe,
+    find_fault,
+    nearest,
+    number_array,
+    quoted,
+    read_text,
+    read_toml,
+)
+
+
+def table(**content):
+    return Table(content, "f.toml", "place")
+
+
+def message(function, *args, **kwargs):
+    """What a call complains of."""
+    with pytest.raises(BadInput) as caught:
+        function(*args, **kwargs)
+    return str(caught.value)
+
+
+def test_bad_input_is_a_value_error():
+    """So that callers of the library need not know our class."""
+    assert isinstance(BadInput("x"), ValueError)
+
+
+def test_a_message_is_one_line_whatever_is_put_into_it():
+    text = str(BadInput("a\nb\x1b[31m\u2028c\ud800"))
+    assert text == r"a\nb\x1b[31m\u2028c\ud800"
+    assert len(str(BadInput("x" * 10**6))) <= 800
+    assert str(BadInput("größer 大 \N{MICRO SIGN}m")) == "größer 大 \N{MICRO SIGN}m"
+
+
+@given(st.text(alphabet=st.characters()), st.integers(20, 90))
+def test_one_line_keeps_short_plain_text_and_cuts_long_text(text, longest):
+    """An unseen character may take up to ten places once it is spelt out."""
+    line = one_line(text, longest)
+    assert len(line) <= 10 * longest
+    assert "\n" not in line
+    if text.isprintable() and len(text) <= longest:
+        assert line == text
+
+
+def test_the_nearest_name_is_offered_or_all_of_them():
+    assert nearest("raduis", ["radius", "width"]) == '; did you mean "radius"?'
+    assert nearest("q", ["b", "a", "a"]) == "; valid: a, b"
+    assert nearest("q", []) == ""
+    many = nearest("q", [f"name{i:02d}" for i in range(20)])
+    assert many.endswith("name11, ...")
+    assert len(nearest("x" * 10**6, ["y" * 10**5] * 20)) < 100
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (True, "true"),
+        (1.5, "1.5"),
+        ("a", "'a'"),
+        ([1, [2]], "[1, [2]]"),
+        (2**2000, "an integer of 2001 bits"),
+        ({"b": True}, "{'b': true}"),
+    ],
+    ids=str,
+)
+def test_a_value_is_described_as_it_stands_in_the_file(value, text):
+    assert describe(value) == text
+
+
+def test_an_integer_that_python_does_not_print_is_described():
+    assert describe(16**5000) == "an integer of 20001 bits"
+
+
+def test_a_description_is_short_whatever_is_described():
+    deep = []
+    for _ in range(100_000):
+        deep = [deep]
+    wide = {str(i): [1.0] * 1000 for i in range(1000)}
+    for value in (deep, wide, "x" * 10**7, [["a" * 999] * 99] * 99, np.eye(99)):
+        assert len(describe(value)) <= 60
+    while deep:  # taken apart by hand: Python would recurse
+        deep = deep[0]
+
+
+def test_a_name_in_quotes_is_short():
+    assert quoted("a b") == '"a b"'
+    assert len(quoted("x" * 10**6)) <= 62
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        ([1, 2.5], [1.0, 2.5]),
+        ([[1, 2], [3, 4]], [[1, 2], [3, 4]]),
+        ([], []),
+        ([math.inf], [math.inf]),
+    ],
+)
+def test_lists_of_numbers_become_arrays(value, expected):
+    np.testing.assert_array_equal(number_array(value), expected)
+    assert number_array(value).dtype == float
+
+
+@pytest.mark.parametrize(
+    "value",
+    [1.0, "12", None, {"a": 1}, [True], ["1"], [[1], [1, 2]], [[1], 2], [1, [2]],
+     [[1], ["a"]], [2**1024], [-(10**400)]],
+)  # fmt: skip
+def test_what_is_not_numbers_of_one_shape_becomes_none(value):
+    assert number_array(value) is None
+
+
+def test_the_largest_integer_that_a_float_holds_is_a_number():
+    assert number_array([int(1.7976931348623157e308)]) is not None
+
+
+@pytest.mark.parametrize(
+    ("value", "shape", "text"),
+    [
+        ("abc", (3,), "'abc'"),
+        ([1, 2], (3,), "[1, 2] of length 2"),
+        ([1, math.nan, 3], (3,), "nan as number 2"),
+        ([1, 2, math.inf], (3,), "inf as number 3"),
+        ([[1, 2], [3, True]], (2, 2), "true as number 2 in row 2"),
+        ([[1, 2], 3], (2, 2), "3 in row 2"),
+        ([[1, 2], [3]], (2, 2), "[3] of length 1 in row 2"),
+    ],
+)
+def test_the_fault_in_an_array_is_pointed_at(value, shape, text):
+    assert find_fault(value, shape) == text
+
+
+def test_inf_is_no_fault_where_it_is_a_number():
+    assert find_fault([1, math.inf, "a"], (3,), infinite=True) == "'a' as number 3"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (math.nan, "found nan"), (math.inf, "found inf"), (True, "found true"),
+        ("1", "found '1'"), ([1], "found [1]"), (10**400, "found an integer of 1329"),
+        (0, "found 0"), (2, "found 2"), (-1.5, "found -1.5"),
+    ],
+)  # fmt: skip
+def test_a_number_out_of_range_is_refused(value, text):
+    found = message(table(a=value).number, "a", "m", above=0.0, below=2.0)
+    assert found.startswith(f"f.toml: place.a: {text}")
+    assert found.endswith("expected a finite number > 0 and < 2 [m]")
+
+
+def test_a_number_without_limits_says_so():
+    assert message(table().number, "a", "rad") == (
+        "f.toml: place.a: missing; expected a finite number [rad]"
+    )
+    found = message(table(a=-2e6).number, "a", "m", largest=1e6)
+    assert found.endswith(
+        "found -2000000.0, expected a number of size at most 1e+06 [m]"
+    )
+
+
+def test_defaults_stand_in_for_what_is_absent():
+    empty = table()
+    assert empty.number("a", "m", 2.5) == 2.5
+    assert empty.text("b", "x") == "x"
+    assert empty.boolean("c", True) is True
+    assert empty.integer("d", 3) == 3
+    assert empty.choice("e", ("x", "y"), "y") == "y"
+    assert empty.tables("f") == []
+    np.testing.assert_array_equal(empty.array("g", (2,), "m", np.ones(2)), [1, 1])
+
+
+def test_a_default_does_not_cover_a_mistake():
+    wrong = table(a="x", b=3, c=1, d=1.5, e="z", f=[1], g=[1])
+    assert "place.a: found 'x'" in message(wrong.number, "a", "m", 2.5)
+    assert "place.b: found 3, expected a string" in message(wrong.text, "b", "x")
+    assert "found 1, expected true or false" in message(wrong.boolean, "c", True)
+    assert "found 1.5, expected a whole number >= 0" in message(wrong.integer, "d", 3)
+    assert "found 'z', expected \"x\"" in message(wrong.choice, "e", ("x",), "x")
+    assert "found [1], expected tables [[f]]" in message(wrong.tables, "f")
+    assert "found [1] of length 1, expected 2 finite numbers [m]" in message(
+        wrong.array, "g", (2,), "m", np.ones(2)
+    )
+    assert "place.g: found [1], expected a table" in message(wrong.table, "g")
+
+
+@pytest.mark.parametrize("value", [True, -1, 1.0, "1"])
+def test_a_whole_number_is_an_integer(value):
+    assert "expected a whole number >= 0" in message(table(a=value).integer, "a")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("", "found '', expected a name"),
+        (" \t", "expected a name"),
+        (7, "found 7, expected a name"),
+        ("a\nb", r"found 'a\nb', expected no control characters"),
+        ("a" * 60, "of 60 characters, expected at most 50"),
+    ],
+)
+def test_a_text_is_one_short_line(value, text):
+    assert text in message(
+        table(a=value).text, "a", expected="a name", longest=50
+    )  # fmt: skip
+
+
+def test_a_misspelt_key_is_found_when_it_is_missed_and_when_it_is_left_over():
+    wrong = table(raduis=1.0)
+    assert 'found "raduis" instead' in message(wrong.number, "radius", "m")
+    assert message(wrong.finish) == (
+        'f.toml: place: unknown key "raduis"; did you mean "radius"?'
+    )
+
+
+def test_an_inner_table_knows_its_place():
+    root = Table({"a": [{"b": {"c": 1}}]}, "f.toml", "")
+    inner = root.tables("a")[0].table("b")
+    assert message(inner.text, "c") == "f.toml: a[1].b.c: found 1, expected a string"
+    root.finish()
+
+
+def test_text_is_read_with_or_without_a_mark_and_with_any_line_ends(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
+    assert read_text(path) == "a\nb\n"
+
+
+def test_a_file_too_large_is_not_read(tmp_path):
+    path = tmp_path / "large"
+    with path.open("wb") as file:
+        file.truncate((64 << 20) + 1)
+    assert message(read_text, path) == f"{path}: larger than 64 MiB"
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a = 1 b", "Expected newline or end of document after a statement"),
+        ("a = " + "[" * 5000, "nested too deeply"),
+        ("a = " + "{a=" * 5000, "nested too deeply"),
+        ("[" + "a." * 50_000 + "a]", "nested too deeply"),
+        ("a = " + "9" * 5000, "found a whole number of thousands of digits"),
+        ("a = 1\na = 2", "Cannot overwrite a value"),
+    ],
+)
+def test_what_is_not_toml_is_refused_with_its_reason(text, reason, tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(text)
+    found = message(read_toml, path)
+    assert found.startswith(f"{path}: not valid TOML: {reason}")
+    assert len(found) < len(str(path)) + 250
+
+
+def test_deep_keys_that_are_sound_are_read(tmp_path):
+    """Dots in numbers and in texts are no nesting."""
+    path = tmp_path / "a.toml"
+    numbers = ", ".join(["0.25"] * 500)
+    path.write_text(f"a.b.c.d = [{numbers}]\ntext = '{'so. ' * 50}'\n")
+    assert read_toml(path).content["a"]["b"]["c"]["d"] == [0.25] * 500

@@ -1,0 +1,238 @@
+"""Every file is written whole or not at all, by one function."""
+
+import ast
+import multiprocessing
+import os
+import resource
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import (
+    JSON,
+    PICTURE,
+    PIXELS,
+    ROBOT,
+    check_writable,
+    save_figure,
+    save_pixels,
+    whole_file,
+    write_json,
+    write_text,
+)
+
+ROOT = Path(__file__).parents[3]
+# the functions that put bytes on a disk, and the files that may call them
+_WRITERS = {"write_text", "write_bytes", "savefig", "to_netcdf", "screenshot", "dump",
+            "imsave", "savez", "savez_compressed", "dump_to_store"}  # fmt: skip
+_MAY = {
+    "forcefit/inputs/writing.py",
+    "stiffness/mesh/mesh.py",  # its cache through whole_file; the mesher's scratch
+    "stiffness/mesh/mesh_worker.py",  # likewise
+    "assembly/sweeps/dataset.py",  # NetCDF through whole_file
+    "forcefit/commands/assembly.py",  # pixels of a screenshot
+    "validation/html.py",  # into memory
+    "assembly/statistics/replay.py",  # likewise
+    "validation/study/report.py",  # likewise
+}
+
+
+def written_elsewhere(path):
+    """Calls in a file that write without ``forcefit/inputs/writing.py``."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            if node.func.attr in _WRITERS:
+                yield f"{path.relative_to(ROOT)}:{node.lineno} {node.func.attr}"
+
+
+def test_no_command_writes_a_file_by_itself():
+    files = [p for f in ("stiffness", "assembly", "validation") for p in
+             (ROOT / f).rglob("*.py")]  # fmt: skip
+    files = [p for p in files if p.relative_to(ROOT).as_posix() not in _MAY]
+    assert [said for path in files for said in written_elsewhere(path)] == []
+
+
+def limited(size):
+    """No file of this process may grow beyond a size: a disk that is full."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+
+@pytest.fixture
+def full_disk():
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    limited(512)
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def a_figure():
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.subplots().plot(np.arange(20) ** 2)
+    return figure
+
+
+def a_dataset(path):
+    import xarray
+
+    from assembly.sweeps.dataset import save_dataset
+
+    save_dataset(xarray.Dataset({"x": ("i", np.arange(1000.0))}), path)
+
+
+# what may stand where a picture is written
+WRITTEN = {".png": b"\x89PNG\r\n", ".svg": b"<?xml", ".pdf": b"%PDF-"}
+WRITE = {
+    "text.txt": lambda path: write_text("x" * 4000, path),
+    "found.json": lambda path: write_json({"x": list(range(999))}, str(path)),
+    "robot.toml": lambda path: write_robot(load_robot("irsbot2"), path),
+    "picture.png": lambda path: save_figure(a_figure(), path),
+    "picture.svg": lambda path: save_figure(a_figure(), path),
+    "picture.pdf": lambda path: save_figure(a_figure(), path),
+    "pixels.png": lambda path: save_pixels(
+        np.random.default_rng(0).integers(0, 255, (40, 40, 3), np.uint8), path
+    ),
+    "data.nc": a_dataset,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRITE)
+@pytest.mark.parametrize("before", [None, b"what stood there\n"])
+def test_a_full_disk_is_one_message_and_the_old_file_stays(
+    tmp_path, full_disk, name, before
+):
+    path = tmp_path / name
+    if before is not None:
+        path.write_bytes(WRITTEN.get(path.suffix, before))
+        before = path.read_bytes()
+    with pytest.raises(BadInput) as error:
+        WRITE[name](path)
+    assert str(error.value).startswith(f"{path}: cannot be written: ")
+    left = [p.read_bytes() for p in tmp_path.iterdir()]
+    assert left == ([] if before is None else [before])
+
+
+@pytest.mark.parametrize("name", WRITE)
+def test_a_file_appears_whole_with_nothing_beside_it(tmp_path, name):
+    WRITE[name](tmp_path / name)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).stat().st_size > 500
+
+
+@pytest.mark.parametrize("ending", PIXELS.endings)
+def test_every_ending_of_a_picture_works_and_is_replaced(tmp_path, ending):
+    path = tmp_path / f"picture{ending.upper()}"
+    for _ in range(2):
+        save_pixels(np.zeros((5, 5, 3), np.uint8), path)
+        check_writable(path, PIXELS)
+
+
+@pytest.mark.parametrize("ending", PICTURE.endings)
+def test_every_ending_of_a_figure_works_and_is_replaced(tmp_path, ending):
+    for _ in range(2):
+        save_figure(a_figure(), tmp_path / f"figure{ending}")
+
+
+def fail_in(path):
+    with whole_file(path) as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+
+
+def test_a_failure_while_writing_leaves_the_old_file(tmp_path):
+    path = tmp_path / "x.txt"
+    path.write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        fail_in(path)
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_file_keeps_its_mode_and_a_link_leads_where_it_led(tmp_path):
+    path, link = tmp_path / "real.json", tmp_path / "link.json"
+    path.write_text("{}")
+    path.chmod(0o600)
+    link.symlink_to(path)
+    write_json({"a": 1}, str(link))
+    assert link.is_symlink()
+    assert path.read_text() == '{\n "a": 1\n}\n'
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("device", ["/dev/null", "/dev/full"])
+def test_a_device_is_refused_and_stays_one(tmp_path, device):
+    for target in (Path(device), tmp_path / "link"):
+        if target.name == "link":
+            target.symlink_to(device)
+        with pytest.raises(BadInput, match="found a device, pipe or socket"):
+            write_text("x", target)
+    assert Path(device).is_char_device()
+
+
+def test_a_pipe_is_refused_without_waiting_for_a_reader(tmp_path):
+    os.mkfifo(tmp_path / "x.json")
+    with pytest.raises(BadInput, match="found a device, pipe or socket"):
+        write_json({}, str(tmp_path / "x.json"))
+
+
+def test_a_robot_file_written_by_hand_is_not_replaced(tmp_path):
+    path = tmp_path / "robot.toml"
+    write_robot(load_robot("five_bar"), path)
+    check_writable(path, ROBOT)
+    assert read_robot(path).name == "five_bar"
+    path.write_text('name = "mine"\n')
+    with pytest.raises(BadInput, match="found a file that is not a robot file written"):
+        check_writable(path, ROBOT)
+
+
+def test_odd_paths_are_one_message():
+    for path in ("a\0b.json", "x" * 300 + ".json", "", ".", "/dev/null/x.json"):
+        with pytest.raises(BadInput):
+            check_writable(path, JSON)
+
+
+def test_text_that_is_not_utf_8_is_written_escaped(tmp_path):
+    write_text("name \udcff\n", tmp_path / "x.txt")
+    assert (tmp_path / "x.txt").read_bytes() == b"name \\udcff\n"
+
+
+def write_many(path, mark, count):
+    for _ in range(count):
+        write_text(mark * 30_000, path)
+
+
+def test_two_programs_at_once_leave_one_of_their_files(tmp_path):
+    """Each waits for the other: no mixture, and nothing beside it."""
+    path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
+    both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
+    for one in both:
+        one.start()
+    seen = set()
+    while any(one.is_alive() for one in both):
+        if path.exists():
+            seen.add(path.read_text())
+    for one in both:
+        one.join()
+    assert [one.exitcode for one in both] == [0, 0]
+    assert seen <= {"a" * 30_000, "b" * 30_000}
+    assert [p.name for p in tmp_path.iterdir()] == ["x.txt"]
+
+
+def test_what_a_killed_program_left_is_replaced(tmp_path):
+    path = tmp_path / "x.txt"
+    child = os.fork()
+    if not child:
+        with whole_file(path) as part:
+            part.write_text("half" * 1000)
+            os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(60)
+    os.waitpid(child, 0)
+    assert [p.name for p in tmp_path.iterdir()] == ["x.txt.part"]
+    write_text("whole", path)
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["whole"]

@@ -1,0 +1,202 @@
+"""NAFEMS's standard tests LE1, LE10 and LE11: our elements on structured meshes.
+
+The Standard NAFEMS Benchmarks (1990).  LE1 and LE10 are quarters of an elliptic ring:
+inner (x / 2)^2 + y^2 = 1, outer (x / 3.25)^2 + (y / 2.75)^2 = 1; E = 210 GPa, nu = 0.3.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stiffness.fem.elements import (
+    assemble,
+    integration,
+    isoparametric,
+    lame,
+    node_gradients,
+    triangle_rule,
+)
+from stiffness.fem.sparse_solver import solve
+from tests.solids_for_tests import box_solid
+
+LAM, MU = lame(210e9, 0.3)
+
+
+def ring(counts, thickness):
+    """Cubic tetrahedra of the ring; nodes in the unit box come along."""
+    flat = isoparametric(box_solid(counts, (1.0, 1.0, 1.0)))
+    s, t, height = flat.nodes.T
+    # finer toward the inner edge and toward the x axis, where D is
+    s, t = (np.expm1(1.5 * v) / np.expm1(1.5) for v in (s, t))
+    angle = np.pi / 2 * t
+    a, b = 2 + 1.25 * s, 1 + 1.75 * s
+    places = np.column_stack([a * np.cos(angle), b * np.sin(angle), thickness * height])
+    curved = np.ones(len(flat.cells), dtype=bool)
+    return flat.nodes, replace(flat, nodes=places, curved=curved)
+
+
+def sphere_cone_cylinder(counts):
+    """Cubic tetrahedra of a quarter of LE11's body, as :func:`ring`.
+
+    Inside a sphere of radius 1 m up to 45 degrees, then a cylinder; outside a sphere of
+    1.4 m up to z = 0.7, a cone to r = 1 at z = 1.39, a cylinder to the top, 1.79.
+    """
+    flat = isoparametric(box_solid(counts, (1.0, 1.0, 1.0)))
+    s, t, turn = flat.nodes.T
+    # finer toward A, at s = t = 0
+    s, low = (np.expm1(2 * v) / np.expm1(2) for v in (s, np.minimum(4 * t, 1.0)))
+    t = np.where(t < 0.25, low / 4, t)
+    corner, top = np.sqrt(0.5), 1.79
+    # four bands, cut where the outline has corners
+    inner_angle = np.interp(t, [0, 0.5], [0, np.pi / 4])
+    height = np.interp(t, [0.5, 1.0], [corner, top])
+    inner = np.where(
+        t <= 0.5,
+        [np.cos(inner_angle), np.sin(inner_angle)],
+        [np.full(len(t), corner), height],
+    )
+    angle = np.interp(t, [0, 0.25], [0, np.arcsin(0.5)])
+    line = [0.25, 0.5, 0.75, 1.0]
+    edge_r = 1.4 * np.sqrt(0.75)
+    outer = np.where(
+        t <= 0.25,
+        [1.4 * np.cos(angle), 1.4 * np.sin(angle)],
+        [
+            np.interp(t, line, [edge_r, (edge_r + 1) / 2, 1.0, 1.0]),
+            np.interp(t, line, [0.7, 1.045, 1.39, top]),
+        ],
+    )
+    r, z = inner + s * (outer - inner)
+    places = np.column_stack([
+        r * np.cos(np.pi / 2 * turn),
+        r * np.sin(np.pi / 2 * turn),
+        z,
+    ])
+    curved = np.ones(len(flat.cells), dtype=bool)
+    return flat.nodes, replace(flat, nodes=places, curved=curved)
+
+
+def pressed(mesh, faces, pressure):
+    """(n, 3) nodal forces of a pressure [Pa] against faces."""
+    N, dN, weights = triangle_rule(mesh.order)
+    J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
+    normal = np.cross(J[:, :, 0], J[:, :, 1])
+    middle = mesh.nodes[faces].mean(axis=1) - mesh.nodes.mean(axis=0)
+    flip = np.sign(np.einsum("tqx,tx->tq", normal, middle))
+    force = np.einsum("q,qa,tq,tqx->tax", weights, N, -pressure * flip, normal)
+    loads = np.zeros_like(mesh.nodes)
+    np.add.at(loads, faces, force)
+    return loads
+
+
+def stress_at(mesh, held, loads, node, direction=1):
+    """sigma_yy [Pa], or another, at a node, averaged over its elements."""
+    ones = np.ones(len(mesh.cells))
+    upper = assemble(mesh, LAM * ones, MU * ones)
+    free = ~held.ravel()
+    u = np.zeros(free.size)
+    u[free] = solve(upper[free][:, free], loads.ravel()[free][:, None])[:, 0]
+    u = u.reshape(-1, 3)
+    found = []
+    for part, G in node_gradients(mesh):
+        nodes = mesh.cells[part]
+        slope = np.einsum("cqax,cai->cqix", G, u[nodes])
+        along = slope[:, :, direction, direction]
+        stress = LAM * np.trace(slope, axis1=2, axis2=3) + 2 * MU * along
+        found.append(stress[nodes == node])
+    return float(np.concatenate(found).mean())
+
+
+def on(mesh, values, value):
+    """Boundary faces whose nodes all have a coordinate of the unit box."""
+    return mesh.faces[np.isclose(values[mesh.faces], value, atol=1e-9).all(axis=1)]
+
+
+def test_le1_elliptic_membrane():
+    """10 MPa outward on the outer edge; sigma_yy at D (2, 0) is 92.7 MPa.
+
+    Plane stress by a free sheet of 0.02 m; printed to three digits, so 0.1 % of it.
+    """
+    unit, mesh = ring((10, 16, 1), 0.02)
+    held = np.zeros(mesh.nodes.shape, dtype=bool)
+    held[unit[:, 1] == 0, 1] = True
+    held[unit[:, 1] == 1, 0] = True
+    held[unit[:, 2] == 0, 2] = True
+    loads = pressed(mesh, on(mesh, unit[:, 0], 1.0), -10e6)
+    (node,) = np.flatnonzero((unit == 0).all(axis=1))
+    assert mesh.nodes[node] == pytest.approx([2, 0, 0])
+    assert stress_at(mesh, held, loads, node) == pytest.approx(92.7e6, rel=1e-3)
+
+
+def test_le10_thick_plate():
+    """1 MPa on the upper face; sigma_yy at D (2, 0, top) is -5.38 MPa, 0.6 %."""
+    unit, mesh = ring((6, 7, 4), 0.6)
+    held = np.zeros(mesh.nodes.shape, dtype=bool)
+    held[unit[:, 1] == 0, 1] = True
+    held[unit[:, 1] == 1, 0] = True
+    outer = unit[:, 0] == 1
+    held[outer, 0] = held[outer, 1] = True
+    held[outer & np.isclose(unit[:, 2], 0.5), 2] = True
+    loads = pressed(mesh, on(mesh, unit[:, 2], 1.0), 1e6)
+    (node,) = np.flatnonzero((unit == [0, 0, 1]).all(axis=1))
+    assert mesh.nodes[node] == pytest.approx([2, 0, 0.6])
+    assert loads.sum(axis=0)[2] == pytest.approx(
+        -1e6 * np.pi / 4 * (3.25 * 2.75 - 2), rel=1e-3
+    )
+    assert stress_at(mesh, held, loads, node) == pytest.approx(-5.38e6, rel=6e-3)
+
+
+def heated(mesh, temperature, coefficient):
+    """(n, 3) nodal forces that stand for a temperature [K]."""
+    loads = np.zeros_like(mesh.nodes)
+    modulus = (3 * LAM + 2 * MU) * coefficient
+    for part, _, _, N, G, w in integration(mesh):
+        T = temperature(np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]]))
+        force = np.einsum("tq,tqax->tax", w * modulus * T, G)
+        np.add.at(loads, mesh.cells[part], force)
+    return loads
+
+
+def warmth(x):
+    """LE11's temperature, r + z."""
+    return np.hypot(x[..., 0], x[..., 1]) + x[..., 2]
+
+
+def test_free_expansion_is_stressless():
+    """A body held nowhere but against rigid motion grows by coefficient x T."""
+    mesh = isoparametric(box_solid((2, 2, 2), (0.3, 0.2, 0.1)))
+    loads = heated(mesh, lambda x: np.full(x.shape[:-1], 50.0), 2.3e-4)
+    held = mesh.nodes == 0  # the three planes through the origin
+    ones = np.ones(len(mesh.cells))
+    upper = assemble(mesh, LAM * ones, MU * ones)
+    free = ~held.ravel()
+    u = np.zeros(free.size)
+    u[free] = solve(upper[free][:, free], loads.ravel()[free][:, None])[:, 0]
+    expected = 50 * 2.3e-4 * mesh.nodes
+    np.testing.assert_allclose(u.reshape(-1, 3), expected, atol=1e-13)
+
+
+def le11_stress(counts):
+    """sigma_zz [Pa] on the circle through A, (1, 0, 0), by a mesh of so many boxes."""
+    unit, mesh = sphere_cone_cylinder(counts)
+    held = np.zeros(mesh.nodes.shape, dtype=bool)
+    held[unit[:, 2] == 0, 1] = True
+    held[unit[:, 2] == 1, 0] = True
+    held[(unit[:, 1] == 0) | (unit[:, 1] == 1), 2] = True
+    loads = heated(mesh, warmth, 2.3e-4)
+    circle = np.flatnonzero((unit[:, 0] == 0) & (unit[:, 1] == 0))
+    assert np.hypot(*mesh.nodes[circle, :2].T) == pytest.approx(1)
+    middle = circle[np.argmin(np.abs(unit[circle, 2] - 0.5))]
+    thermal = (3 * LAM + 2 * MU) * 2.3e-4 * warmth(mesh.nodes[middle])
+    return stress_at(mesh, held, loads, middle, direction=2) - thermal
+
+
+def test_le11_solid_cylinder_taper_sphere():
+    """T = r + z, 2.3e-4 / K, ends held along z; sigma_zz at A is -105 MPa, 0.6 %.
+
+    A is a corner with a steep gradient: it takes six cubic elements across.
+    """
+    coarse, fine = le11_stress((4, 12, 4)), le11_stress((6, 16, 4))
+    assert fine == pytest.approx(-105e6, rel=6e-3)
+    assert abs(fine + 105e6) < 0.6 * abs(coarse + 105e6)

@@ -1,0 +1,158 @@
+"""Stress: superposition, closed forms of bars, the singular edge kept out."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.fem.adaptive_step import solve_level
+from stiffness.fem.fea import MeshedLink
+from stiffness.fem.material import Material
+from stiffness.fem.stress import peak_stress, stress_influence, von_mises
+from stiffness.link import LinkStiffness, inverted
+from stiffness.report.plot import plot_stress
+from stiffness.report.results import stress_results, stress_text
+from tests.solids_for_tests import bar_solid, masked_solid, with_plane_sides
+
+R, L = 0.04, 0.4
+AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
+
+
+@pytest.fixture(scope="module")
+def solved():
+    centers = np.array([[0, 0, 0], [0, 0, L]])
+    steel = [Material(60e9, 0.3, 2700.0)]
+    level = solve_level(bar_solid(2, 20, R, L), steel, centers, "rigid")
+    C = inverted(level.solution.stiffness)
+    link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
+    return MeshedLink(link, level, centers)
+
+
+def notched(keep):
+    """Stresses in a column of four boxes by two by two, of which some are kept."""
+    solid = with_plane_sides(masked_solid((2, 2, 4), (0.1, 0.1, 0.4), keep))
+    centers = np.array([[0.05, 0.05, 0], [0.05, 0.05, 0.4]])
+    level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
+    link = LinkStiffness("test", inverted(level.solution.stiffness),
+                         tip=centers[1], base=centers[0])  # fmt: skip
+    return stress_influence(MeshedLink(link, level, centers), away=0.05)
+
+
+def test_inner_edges_without_a_fillet_are_named():
+    """A notch in the column's middle has two; a whole column has none, and neither
+    do its clamped outlines count, which are further away than is looked."""
+    whole = notched(lambda x: np.full(len(x), True))
+    notch = notched(lambda x: (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1))
+    assert not whole.inner_edges
+    assert "inner edges" not in whole.region
+    assert notch.inner_edges
+    assert "inner edges without a fillet" in notch.region
+
+
+def test_von_mises_by_hand():
+    """Uniaxial s, pure shear sqrt(3) t, pressure nothing."""
+    assert von_mises([2.0, 0, 0, 0, 0, 0]) == 2.0
+    assert von_mises([0, 0, 0, 0, 3.0, 0]) == pytest.approx(3 * np.sqrt(3))
+    assert von_mises([5.0, 5, 5, 0, 0, 0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("wrench", "expected"),
+    [
+        ([0, 0, 0, 0, 0, 1e3], 1e3 / AREA),
+        ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
+        ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
+    ],
+)
+def test_a_bar_in_the_middle_has_the_stress_of_the_books(solved, wrench, expected):
+    """Four radii from both ends the ends are forgotten (e^-4 a radius): 0.3 %,
+    the mesh's (averaged at nodes, elements of half the radius)."""
+    stress = stress_influence(solved, away=4 * R)
+    assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
+
+
+def test_a_pulled_bar_is_pulled_along_and_free_across(solved):
+    """Components, since von Mises does not see a pressure: zz = F / A, xx = yy = 0."""
+    stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
+    np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
+    assert np.abs(stress[:, :2]).max() < 1e-3 * 1e3 / AREA
+
+
+def test_a_bent_bar_peaks_at_the_far_section_of_the_region(solved):
+    stress = stress_influence(solved, away=2 * R)
+    value, place = stress.peak([0, 0, 0, 1e3, 0, 0])
+    distance = L - place[2]
+    assert place[2] < 2.6 * R
+    assert np.hypot(place[0], place[1]) == pytest.approx(R, rel=1e-6)
+    expected = 1e3 * distance * R / SECOND
+    assert value == pytest.approx(expected, rel=0.02)
+
+
+def test_stresses_superpose(solved, rng):
+    stress = stress_influence(solved)
+    a, b = rng.normal(size=(2, 6))
+    np.testing.assert_allclose(
+        stress.stresses(2 * a - b),
+        2 * stress.stresses(a) - stress.stresses(b),
+        atol=1e-6,
+    )
+    assert stress.peak(3 * a)[0] == pytest.approx(3 * stress.peak(a)[0])
+
+
+def test_the_region_is_stated_and_the_edge_kept_out(solved):
+    stress = stress_influence(solved)
+    assert stress.away == pytest.approx(R, rel=1e-6)
+    assert stress.places[:, 2].min() >= R * (1 - 1e-9)
+    assert stress.places[:, 2].max() <= (L - R) * (1 + 1e-9)
+    assert "at least 0.04 m away" in stress.region
+    with pytest.raises(BadInput, match="nothing of the link is 1 m away"):
+        stress_influence(solved, away=1.0)
+
+
+def test_the_peak_has_the_beams_beside_it(solved):
+    """A sideways force: at the section nearest to the base the region ends on, M = F
+    (L - away); the whole beam's is F L.  Mesh 2 %, as above."""
+    load = [0, 0, 0, 1e3, 0, 0]
+    peak = peak_stress(solved, load, section={"radius": R})
+    assert peak.away == pytest.approx(R, rel=1e-6)
+    assert peak.beam_whole == pytest.approx(1e3 * L * R / SECOND, rel=1e-6)
+    stress, place = peak.beam
+    assert stress == pytest.approx(1e3 * (L - R) * R / SECOND, rel=1e-6)
+    assert np.abs(place) == pytest.approx([R, 0, R], abs=1e-6)
+    assert peak.von_mises == pytest.approx(stress, rel=0.02)
+    assert np.linalg.norm(peak.place[:2]) == pytest.approx(R, rel=1e-6)
+
+
+def test_the_beam_is_read_in_the_links_axes(solved):
+    """Torsion about the link's z, and a moment at the tip that is the base's too."""
+    twist = peak_stress(solved, [0, 0, 50, 0, 0, 0], section={"radius": R})
+    expected = np.sqrt(3) * 50 * R / (2 * SECOND)
+    assert twist.beam[0] == pytest.approx(expected, rel=1e-9)
+    assert twist.von_mises == pytest.approx(expected, rel=0.02)
+    plate = {"width": 0.02, "height": 0.05}
+    bent = [peak_stress(solved, m, section=plate, up=[0, 1, 0]) for m in
+            ([50, 0, 0, 0, 0, 0], [0, 50, 0, 0, 0, 0])]  # fmt: skip
+    # up is y: a moment about x bends the height, about y the width
+    assert bent[0].beam[0] == pytest.approx(50 * 6 / (0.02 * 0.05**2), rel=1e-9)
+    assert bent[1].beam[0] == pytest.approx(50 * 6 / (0.05 * 0.02**2), rel=1e-9)
+
+
+def test_a_section_of_constants_is_refused_before_the_work(solved):
+    section = {"area": 1.0, "I_y": 1.0, "I_z": 1.0, "J": 1.0}
+    with pytest.raises(BadInput, match="says nothing of its outer fibres"):
+        peak_stress(solved, np.ones(6), section=section)
+
+
+def test_the_report_and_the_picture_say_where(solved):
+    peak = peak_stress(solved, [0, 0, 0, 1e3, 0, 0], section={"radius": R})
+    text = stress_text(peak)
+    assert "at least 0.04 m away from both interfaces" in text
+    assert "beam, whole length: 7.958 MPa" in text  # 400 N m over 5.027e-5 m^3
+    results = stress_results(peak)
+    assert results["beam"]["von_mises_whole_length"] == peak.beam_whole
+    everywhere = stress_influence(solved, away=0.0)
+    assert len(everywhere.places) == len(solved.level.mesh.nodes)
+    ends = solved.link.base, solved.link.tip
+    axes = plot_stress(everywhere, peak, *ends, {"radius": R}).axes[0]
+    line = axes.get_lines()[-1]
+    assert line.get_ydata()[0] * 1e6 == pytest.approx(peak.beam_whole)
+    assert line.get_ydata()[-1] < line.get_ydata()[0]

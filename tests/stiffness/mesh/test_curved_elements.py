@@ -1,0 +1,177 @@
+"""Bent elements: on their shapes, of their shapes' volume, none folded."""
+
+import numpy as np
+import pytest
+
+from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
+from stiffness.fem.error_indicator import shape_errors
+from stiffness.mesh.curved_elements import curved, without_folds
+from stiffness.mesh.edge_grading import layered, without_chords
+from stiffness.mesh.lagrange import lattice, shape_functions
+from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.surface.primitives import Plane, Sphere
+from tests.solids_for_tests import bar_solid, box_cells, outward
+
+HALF = 0.5  # tangent of half the angle that the shell's piece is seen under
+SOLID_ANGLE = 4 * np.arcsin(HALF**2 / (1 + HALF**2))
+
+
+def shell(counts, inner, outer):
+    """A piece of a spherical shell between four planes through its centre.
+
+    Patch 0 is hollow, a sphere seen from inside the part, patch 1 is round.
+    """
+    unit, cells = box_cells(counts)
+    s, t, u = unit.T
+    way = np.column_stack([HALF * (2 * s - 1), HALF * (2 * t - 1), np.ones(len(s))])
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    points = way * (inner + u * (outer - inner))[:, None]
+    cells = outward(points, cells)
+    faces = boundary_faces(cells)
+    patch = np.zeros(len(faces), dtype=int)
+    sides = [(2, 0, 0), (2, 1, 1), (0, 0, 2), (0, 1, 3), (1, 0, 4), (1, 1, 5)]
+    for axis, value, number in sides:
+        patch[(np.abs(unit[faces][:, :, axis] - value) < 1e-9).all(axis=1)] = number
+    zero = np.zeros(3)
+    planes = [
+        Plane(zero, np.array(n) / np.linalg.norm(n))
+        for n in ((-1, 0, -HALF), (1, 0, -HALF), (0, -1, -HALF), (0, 1, -HALF))
+    ]
+    shapes = Sphere(zero, inner), Sphere(zero, outer), *planes
+    return Solid(points, cells, faces, patch, shapes)
+
+
+def layers_of_bar(rings, layers, order):
+    held = (0, 1)
+    solid = without_chords(bar_solid(rings, layers, 0.04, 0.2), held)
+    return isoparametric(solid, order), isoparametric(
+        solid, order, layered(solid, held)
+    )
+
+
+def side_errors(mesh):
+    """[1] by which the side's nodes leave the cylinder, of its radius."""
+    nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
+    return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
+
+
+def test_nodes_and_layers_follow_the_cylinder():
+    """Cubic elements leave it by the fourth power of their size, cut or not."""
+    found = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
+    for k in range(2):
+        coarse, fine = (side_errors(found[rings][k]).max() for rings in (2, 4))
+        assert coarse < 1e-3
+        assert coarse / fine > 0.9 * 2**4
+    for mesh in found[4]:
+        on = np.unique(mesh.faces[mesh.patch <= 1])
+        height = mesh.nodes[on, 2]
+        np.testing.assert_allclose(height, np.where(height > 0.1, 0.2, 0), atol=1e-15)
+
+
+def volume(mesh):
+    return sum(chunk.w.sum() for chunk in integration(mesh))
+
+
+def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
+    """What is left of an arc lies to both sides of it, for edges and faces alike; the
+    quadratic elements' error falls with the fourth."""
+    exact = np.pi * 0.04**2 * 0.2
+    for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
+        error = [
+            volume(isoparametric(bar_solid(n, 2 * n, 0.04, 0.2), order)) / exact - 1
+            for n in (2, 4)
+        ]
+        assert np.log2(error[0] / error[1]) > power - 0.2
+        assert abs(error[1]) < least
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_cutting_layers_leaves_a_bent_element_as_it_is(order):
+    """Parts are cut in its own coordinates: the same volume, the same area."""
+    whole, cut = layers_of_bar(2, 4, order)
+    assert len(cut.cells) > len(whole.cells)
+    assert volume(cut) == pytest.approx(volume(whole), rel=1e-12)
+    area = [triangle_areas(m, m.faces)[1].sum() for m in (whole, cut)]
+    assert area[1] == pytest.approx(area[0], rel=1e-6)
+
+
+def shell_volume(inner, outer):
+    return SOLID_ANGLE * (outer**3 - inner**3) / 3
+
+
+def test_a_spheres_volume_converges_with_the_sixth_power():
+    """Faces bent both ways, hollow and round; nodes at the outline on both shapes."""
+    error = []
+    for n in (1, 2, 4):
+        mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
+        error.append(abs(volume(mesh) / shell_volume(0.6, 1.0) - 1))
+    assert np.log2(error[1] / error[2]) > 5.7
+    assert error[2] < 1e-6
+
+
+def test_the_outline_of_a_sphere_lies_on_its_planes():
+    mesh = isoparametric(shell((2, 2, 2), 0.6, 1.0))
+    for number in range(2, 6):
+        solid = shell((1, 1, 1), 0.6, 1.0)
+        nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == number])]
+        assert np.abs(solid.shapes[number].signed(nodes)[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
+def test_a_wall_off_its_shape_is_energy_density_times_volume(number, sign):
+    """A constant strain: a hollow radius larger by 1e-4 takes volume from the shape, a
+    round one adds it; the difference of energies is the density's times that."""
+    solid = shell((3, 3, 2), 0.6, 1.0)
+    mesh = isoparametric(solid)
+    lam, mu = lame(60e9, 0.3)
+    A = np.array([[1.0, 0.2, 0], [0.2, -0.5, 0.3], [0, 0.3, 0.4]])
+    density = lam * np.trace(A) ** 2 + 2 * mu * (A**2).sum()
+    ones = np.ones(len(mesh.cells))
+    field = (mesh.nodes @ A)[:, :, None]
+    found, radius = [], solid.shapes[number].radius
+    for excess in (0, 1e-4):
+        shapes = list(solid.shapes)
+        shapes[number] = Sphere(np.zeros(3), radius * (1 + excess))
+        each = shape_errors(mesh, shapes, field, lam * ones, mu * ones)
+        found.append(each[mesh.patch == number].sum() / density)
+    taken = sign * SOLID_ANGLE * radius**3 * 1e-4
+    assert found[1] - found[0] == pytest.approx(taken, rel=1e-5)
+    # what the mesh itself leaves is a hundredth of that
+    assert abs(found[0]) < 0.02 * abs(taken)
+
+
+THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.99)]
+
+
+@pytest.mark.parametrize(("counts", "inner"), THIN)
+@pytest.mark.parametrize("order", [2, 3])
+def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
+    """A face that bulges by a quarter of the wall would fold its tetrahedron: these
+    are straightened; each has the hand of its straight corners everywhere."""
+    solid = shell(counts, inner, 1.0)
+    bent = curved(solid, order)
+    assert bent.folded.any()
+    corners = solid.points[bent.cells[:, :4]]
+    hand = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    _, dN = shape_functions(order, lattice(order) / order)
+    J = np.einsum("qai,tax->tqix", dN, bent.nodes[bent.cells])
+    assert (np.linalg.det(J) * hand[:, None] > 0).all()
+    # corners stay, and so does what two elements share
+    np.testing.assert_array_equal(bent.nodes[: len(solid.points)], solid.points)
+
+
+@pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
+def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
+    """Straightened elements leave the shape; smaller ones by less than half of it."""
+    solid = shell(counts, inner, 1.0)
+    error = [
+        abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)
+        for s in (solid, without_folds(solid, 3))
+    ]
+    assert error[1] < error[0] / 2
+
+
+def test_what_does_not_fold_is_left_as_it_is():
+    for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
+        assert not curved(solid, 3).folded.any()
+        assert without_folds(solid, 3) is solid

@@ -1,0 +1,200 @@
+"""Layers along singular edges: found, cut alike on both sides, nothing lost, nested."""
+
+from math import prod
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiffness.fem.condensation import KINDS, condense
+from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
+from stiffness.link import scaled
+from stiffness.mesh.edge_grading import SHARE, layered, singular_edges, without_chords
+from stiffness.mesh.lagrange import FACES
+from stiffness.mesh.refine import edges_of
+from tests.solids_for_tests import (
+    bar_solid,
+    box_solid,
+    masked_solid,
+    with_plane_sides,
+)
+
+LAM, MU = lame(60e9, 0.3)
+SIZE = np.array([0.2, 0.2, 0.3])
+CLAMPED = [(0, 1), (0,), ()]  # patches: both ends, the base, none
+
+
+def corner_post(counts=(2, 2, 3)):
+    """An L: a post without the quarter beyond x = y = 0.1; one inner edge."""
+    return with_plane_sides(
+        masked_solid(counts, SIZE, lambda c: (c[:, :2] < 0.1).any(axis=1))
+    )
+
+
+def on_outline(x):
+    """Whether places x are on the L's outline, whatever their height."""
+    near = np.abs(x[..., :2] - 0.1) < 1e-9
+    inner = near & (x[..., 1::-1] > 0.1 - 1e-9)
+    outer = (np.abs(x[..., :2]) < 1e-9) | (np.abs(x[..., :2] - 0.2) < 1e-9)
+    return (inner | outer).any(axis=-1)
+
+
+@pytest.mark.parametrize("held", CLAMPED)
+def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(held):
+    """Eight edges around each end that is clamped, three along the inner edge."""
+    solid = corner_post()
+    found = {tuple(edge) for edge in singular_edges(solid, held)}
+    ends, _ = edges_of(solid.cells, len(solid.points))
+    middle = solid.points[ends].mean(axis=1)
+    heights = [(0.0, 0.3)[k] for k in held]
+    clamped = on_outline(middle) & np.isin(np.round(middle[:, 2], 9), heights)
+    inner = (np.abs(middle[:, :2] - 0.1) < 1e-9).all(axis=1)
+    assert (clamped.sum(), inner.sum()) == (8 * len(heights), 3)
+    assert found == {tuple(edge) for edge in ends[clamped | inner]}
+
+
+def test_fewer_clamped_patches_have_fewer_singular_edges():
+    for solid, least in ((corner_post(), 3), (bar_solid(2, 3, 0.02, 0.1), 0)):
+        none, one, two = (
+            {tuple(e) for e in singular_edges(solid, held)}
+            for held in reversed(CLAMPED)
+        )
+        assert none < one < two
+        assert len(none) == least
+
+
+def touched(solid, held):
+    corner = np.zeros(len(solid.points), dtype=bool)
+    corner[singular_edges(solid, held)] = True
+    return corner
+
+
+def check_chordless(solid, held):
+    """Each tetrahedron has no corner, one, or one edge on a singular edge."""
+    ends = {tuple(edge) for edge in singular_edges(solid, held)}
+    on = touched(solid, held)[solid.cells]
+    assert on.sum(axis=1).max() <= 2
+    for cell, which in zip(solid.cells, on, strict=True):
+        if which.sum() == 2:
+            assert tuple(sorted(cell[which])) in ends
+
+
+def check_layers(solid, held):
+    """Every inner face has two parts, every outer one its patch; nothing is lost."""
+    parts = layered(solid, held)
+    mesh = isoparametric(solid, 2, parts)
+    faces, count = np.unique(
+        mesh.cells[:, :4][:, FACES].reshape(-1, 3), axis=0, return_counts=True
+    )
+    assert count.max() <= 2
+    outer = {tuple(face) for face in faces[count == 1]}
+    assert outer == {tuple(face) for face in mesh.faces[:, :3]}
+    assert len(mesh.faces) == len(outer)
+    whole = isoparametric(solid, 2)
+    for patch in np.unique(solid.patch):
+        area = [
+            triangle_areas(m, m.faces[m.patch == patch])[1].sum() for m in (whole, mesh)
+        ]
+        assert area[1] == pytest.approx(area[0], rel=1e-12)
+        places = mesh.nodes[mesh.faces[mesh.patch == patch]].reshape(-1, 3)
+        assert np.abs(solid.shapes[patch].signed(places)[0]).max() < 1e-12
+    # parts of a tetrahedron together are as large as it
+    volume = np.zeros(len(solid.cells))
+    for chunk in integration(mesh):
+        np.add.at(volume, parts.parent[chunk.part], chunk.w.sum(axis=1))
+    np.testing.assert_allclose(volume, solid.volumes(), rtol=1e-11)
+    return mesh, parts
+
+
+@pytest.mark.parametrize("held", CLAMPED)
+def test_layers_of_an_l_conform_and_lose_nothing(held):
+    solid = without_chords(corner_post(), held)
+    check_chordless(solid, held)
+    assert solid.volumes().sum() == pytest.approx(0.75 * SIZE.prod(), rel=1e-12)
+    mesh, _ = check_layers(solid, held)
+    assert len(mesh.cells) > 1.5 * len(solid.cells)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    kept=st.lists(st.booleans(), min_size=12, max_size=12).filter(any),
+    held=st.sampled_from(CLAMPED),
+)
+def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
+    """Bodies that touch in an edge or a corner, holes and steps among them."""
+    counts = np.array([3, 2, 2])
+
+    def keep(centers):
+        i, j, k = np.floor(centers / SIZE * counts).astype(int).T
+        return np.array(kept)[4 * i + 2 * j + k]
+
+    solid = without_chords(with_plane_sides(masked_solid(counts, SIZE, keep)), held)
+    check_chordless(solid, held)
+    share = sum(kept) / len(kept)
+    assert solid.volumes().sum() == pytest.approx(share * SIZE.prod(), rel=1e-12)
+    check_layers(solid, held)
+
+
+def test_the_layer_takes_its_share_of_each_edge():
+    """New corners lie at SHARE of the way from a singular corner to one that is not;
+    old corners stay, and tetrahedra away from singular edges stay whole."""
+    held = (0, 1)
+    solid = without_chords(corner_post(), held)
+    parts = layered(solid, held)
+    new = parts.corners >= len(solid.points)
+    corners = np.sort(solid.cells, axis=1)[parts.parent]
+    on = touched(solid, held)[corners]
+    places = parts.places[new]
+    of = np.broadcast_to(on[:, None, :], parts.places.shape)[new]
+    shares = np.tile([0, 0, SHARE, 1 - SHARE], (len(places), 1))
+    np.testing.assert_allclose(np.sort(places, axis=1), shares, rtol=1e-12)
+    assert of[places > 0.5].all()
+    assert not of[(places > 0) & (places < 0.5)].any()
+    assert (parts.places[~new].max(axis=1) == 1).all()
+    far = np.flatnonzero(~touched(solid, held)[solid.cells].any(axis=1))
+    assert (np.bincount(parts.parent)[far] == 1).all()
+
+
+def test_a_layer_of_another_share_is_as_thin():
+    held = (0,)
+    solid = without_chords(box_solid((2, 2, 2), (0.2, 0.2, 0.2)), held)
+    new = layered(solid, held, share=0.1).places
+    found = np.unique(np.round(new, 12))
+    np.testing.assert_allclose(found, [0, 0.1, 0.9, 1])
+
+
+# --- nested spaces -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_richer_space_gives_a_softer_link(kind):
+    """On a box the geometry is exact: quadratic fields are cubic ones, and those of
+    whole elements are those of their parts; K falls in every direction."""
+    held = (0, 1)
+    solid = without_chords(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
+    parts = layered(solid, held)
+    centers = np.array([[0.025, 0.04, 0], [0.025, 0.04, 0.2]])
+
+    def stiffness(order, parts):
+        mesh = isoparametric(solid, order, parts)
+        ones = np.ones(len(mesh.cells))
+        return condense(mesh, LAM * ones, MU * ones, centers, kind).stiffness
+
+    K = {
+        (p, cut): stiffness(p, parts if cut else None) for p in (2, 3) for cut in (0, 1)
+    }
+    order = [(2, 0), (3, 0), (3, 1)], [(2, 0), (2, 1), (3, 1)]
+    for road in order:
+        for poor, rich in zip(road, road[1:], strict=False):
+            values = np.linalg.eigvalsh(scaled(K[poor] - K[rich], K[poor]))
+            assert values[0] > -1e-9
+            assert values[5] > 1e-5 or kind != "rigid"
+
+
+def test_a_smooth_box_stays_whole():
+    solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
+    assert len(singular_edges(solid, ())) == 0
+    assert without_chords(solid, ()).cells.shape == solid.cells.shape
+    mesh = isoparametric(solid, 3, layered(solid, ()))
+    assert len(mesh.nodes) == prod(3 * n + 1 for n in (2, 2, 3))

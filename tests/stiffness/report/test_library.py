@@ -1,0 +1,546 @@
+"""Libraries of links: built, resumed, read, interpolated, exported."""
+
+import csv
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from forcefit.commands.stiffness import app
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.curve import curve_compliance
+from stiffness.beam.sections import rectangular_section, round_section
+from stiffness.fem.adaptive_step import estimated_error, solve_level
+from stiffness.fem.material import Material
+from stiffness.link import LinkStiffness, inverted, scaled
+from stiffness.report import library as library_module
+from stiffness.report.export import library_csv, stiffness_for, translations_first
+from stiffness.report.library import (
+    Entry,
+    Spec,
+    build_library,
+    entry_key,
+    look_up,
+    read_compliance,
+    read_entry,
+    read_library,
+    read_spec,
+)
+from stiffness.report.library_surface import SurfaceLink
+from stiffness.surface.beam_surfaces import SHAPES, shape_beam, shape_surface
+from tests.solids_for_tests import bar_solid
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "link_library.toml"
+GRID = {"length": (0.2, 0.3, 0.45), "radius": (0.01, 0.02, 0.04)}
+MATERIAL = {"young": (6e10,), "poisson": (0.3,)}
+
+
+@pytest.fixture
+def spec(tmp_path):
+    return Spec(tmp_path / "links", "round", "beam", GRID | MATERIAL)
+
+
+def exact(length, radius, young=6e10, poisson=0.3):
+    section = round_section(radius, poisson)
+    return inverted(
+        beam_compliance(length, section, young, poisson, axis=[0, 0, 1], up=[0, 1, 0])
+    )
+
+
+def test_entries_hold_what_they_were_made_for(spec):
+    files = build_library(spec)
+    assert len(files) == 9
+    key = "round-beam-length0.3-radius0.02-young6e+10-poisson0.3"
+    entry = read_entry(spec.folder, key)
+    assert (
+        np.abs(scaled(entry.stiffness - exact(0.3, 0.02), entry.stiffness)).max() < 1e-9
+    )
+    C = read_compliance(spec.folder, key)
+    np.testing.assert_allclose(C, np.linalg.inv(entry.stiffness), rtol=1e-9, atol=1e-20)
+    assert entry.parameters["radius"] == 0.02
+    assert entry.about["program"].startswith("forcefit")
+    assert entry.about["date"].endswith("+00:00")
+
+
+def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
+    made = []
+    whole = library_module._make_entry
+
+    def stops_after_four(spec, point):
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        made.append(point)
+        whole(spec, point)
+
+    monkeypatch.setattr(library_module, "_make_entry", stops_after_four)
+    with pytest.raises(KeyboardInterrupt):
+        build_library(spec)
+    assert len(read_library(spec.folder)) == 4
+    seen = []
+    monkeypatch.setattr(
+        library_module, "_make_entry", lambda s, p: (seen.append(p), whole(s, p))
+    )
+    build_library(spec)
+    assert len(seen) == 5
+    assert len(read_library(spec.folder)) == 9
+
+
+def test_two_processes_build_the_same(spec):
+    told = []
+    build_library(
+        spec, workers=2, update=lambda done, total: told.append((done, total))
+    )
+    assert told[0] == (0, 9)
+    assert told[-1] == (9, 9)
+    assert len(read_library(spec.folder)) == 9
+
+
+def test_between_the_grid_points_the_error_is_covered(spec, rng):
+    """Nearly powers of the lengths: a grid of three is good to a per cent or two."""
+    build_library(spec)
+    entries = read_library(spec.folder)
+    for _ in range(20):
+        length, radius = rng.uniform(0.2, 0.45), rng.uniform(0.01, 0.04)
+        wanted = {"length": length, "radius": radius, "young": 6e10, "poisson": 0.3}
+        K, error = look_up(entries, wanted)
+        truth = exact(length, radius)
+        gap = np.abs(scaled(K - truth, truth)).max()
+        assert gap <= scaled(error, K).max() + 1e-9
+        assert gap < 0.02
+
+
+def test_a_grid_point_is_given_back_as_it_is(spec):
+    build_library(spec)
+    wanted = {"length": 0.3, "radius": 0.04, "young": 6e10, "poisson": 0.3}
+    K, error = look_up(read_library(spec.folder), wanted)
+    assert np.abs(scaled(K - exact(0.3, 0.04), K)).max() < 1e-9
+    assert scaled(error, K).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"radius": 0.05}, "radius = 0.05 is outside the grid, 0.01 .. 0.04"),
+        ({"radios": 0.02}, 'unknown parameter "radios"; did you mean "radius"?'),
+        ({"radius": None}, "radius: missing; the grid has it"),
+    ],
+)
+def test_what_the_grid_does_not_hold_is_refused(spec, change, message):
+    build_library(spec)
+    wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3} | change
+    wanted = {k: v for k, v in wanted.items() if v is not None}
+    with pytest.raises(BadInput) as caught:
+        look_up(read_library(spec.folder), wanted)
+    assert message in str(caught.value)
+
+
+def test_a_grid_with_a_hole_is_refused(spec):
+    files = build_library(spec)
+    files[0].unlink()
+    wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
+    with pytest.raises(BadInput, match="do not fill a grid"):
+        look_up(read_library(spec.folder), wanted)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("rubbish", "damaged entry"),
+        ("[]", "damaged entry"),
+        ("{}", 'not an entry; expected format "forcefit link 1"'),
+        ('{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
+    ],
+)
+def test_a_damaged_entry_is_refused(spec, content, message):
+    (file, *_) = build_library(spec)
+    file.write_text(content)
+    with pytest.raises(BadInput) as caught:
+        read_entry(spec.folder, file.stem)
+    assert message in str(caught.value)
+
+
+def test_an_entry_in_another_order_or_not_definite_is_refused(spec):
+    (file, *_) = build_library(spec)
+    content = json.loads(file.read_text())
+    swapped = content | {"wrench": ["FX", "FY", "FZ", "MX", "MY", "MZ"]}
+    file.write_text(json.dumps(swapped))
+    with pytest.raises(BadInput, match="another order than RX RY RZ TX TY TZ"):
+        read_entry(spec.folder, file.stem)
+    content["stiffness"][0][0] = -1.0
+    file.write_text(json.dumps(content))
+    with pytest.raises(BadInput, match="not positive definite"):
+        read_entry(spec.folder, file.stem)
+
+
+def test_what_is_not_there_is_named(spec, tmp_path):
+    build_library(spec)
+    with pytest.raises(BadInput, match='no entry "round-beam"'):
+        read_entry(spec.folder, "round-beam")
+    with pytest.raises(BadInput, match="no entry"):
+        read_entry(spec.folder, "../links/x")
+    with pytest.raises(BadInput, match="no library there"):
+        read_entry(tmp_path / "absent", "x")
+
+
+SPEC = """
+library = "links"
+shape = "round"
+method = "beam"
+[grid]
+length = [0.2, 0.3]
+radius = 0.01
+young = 6e10
+poisson = 0.3
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("round", "rond"), 'unknown "rond"; did you mean "round"?'),
+        (("radius", "radios"), 'unknown length "radios"'),
+        (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
+        (("0.01", '"a"'), "expected a finite number, or a list"),
+        (("[0.2, 0.3]", "[0.2, 0.2]"), "a value stands there twice"),
+        (("young = 6e10", ""), "young: missing"),
+        (('"beam"', '"bem"'), '"beam"'),
+        (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),
+        (('method = "beam"', 'method = "beam"\nfoo = 1'), 'unknown key "foo"'),
+    ],
+)
+def test_a_build_file_that_is_none_is_refused(tmp_path, change, message):
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC.replace(*change))
+    with pytest.raises(BadInput) as caught:
+        read_spec(path)
+    assert message in str(caught.value)
+
+
+LINKS = """
+library = "links"
+accuracy = 0.01
+[[link]]
+name = "bar"
+surface = "bar.stl"
+unit = "mm"
+base = "z=0"
+tip = "z=0.08"
+young = 6e10
+poisson = 0.3
+density = 2700
+"""
+
+
+@pytest.fixture
+def bar_stl(tmp_path, monkeypatch):
+    """A square bar of 20 x 20 x 80 mm, in a file of millimetres."""
+    pyvista = pytest.importorskip("pyvista")
+    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
+    path = tmp_path / "bar.stl"
+    pyvista.PolyData.from_regular_faces(1000 * bar.points, bar.triangles).save(path)
+    return path
+
+
+def test_a_surface_is_an_entry_with_its_files_digest_and_error(bar_stl, tmp_path):
+    """Held ends make a bar of L / r = 7 stiffer than its beam, by less than 10 %."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text(LINKS)
+    command = ["library", "build", str(spec), "--json", "-"]
+    result = CliRunner().invoke(app, command, catch_exceptions=False)
+    assert json.loads(result.stdout)["keys"] == ["bar"]
+    entry = read_entry(tmp_path / "links", "bar")
+    digest = hashlib.sha256(bar_stl.read_bytes()).hexdigest()
+    assert entry.about["request"]["surface_digest"] == digest
+    assert 0 < entry.about["relative_error_estimate"] <= 0.01
+    assert entry.about["mass"] == pytest.approx(2700 * 0.02**2 * 0.08, rel=1e-6)
+    section = rectangular_section(0.02, 0.02, 0.3)
+    beam = inverted(beam_compliance(0.08, section, 6e10, 0.3, axis=[0, 0, 1]))
+    ratio = np.diag(entry.stiffness) / np.diag(beam)
+    assert (ratio > 1).all()
+    assert (ratio < 1.1).all()
+    compliance = read_compliance(tmp_path / "links", "bar")
+    assert np.abs(scaled(inverted(compliance) - entry.stiffness, beam)).max() < 1e-12
+    row = next(csv.DictReader(io.StringIO(library_csv([entry]))))
+    assert (row["key"], float(row["young"])) == ("bar", 6e10)
+    with pytest.raises(BadInput, match="only entries of surfaces, expected a grid"):
+        look_up([entry], {"young": 6e10})
+
+
+def test_an_entry_of_a_surface_is_made_again_only_if_something_changed(
+    bar_stl, tmp_path, monkeypatch
+):
+    made = []
+
+    def solve(link):
+        made.append(link.young)
+        C = inverted(exact(0.2, 0.01, link.young))
+        return LinkStiffness("made up", C, tip=np.array([0, 0, 0.2]), base=np.zeros(3))
+
+    monkeypatch.setattr(SurfaceLink, "solve", solve)
+    spec = tmp_path / "spec.toml"
+
+    def build(text=LINKS):
+        spec.write_text(text)
+        (file,) = build_library(read_spec(spec))
+        return file
+
+    file = build()
+    before = file.read_bytes()
+    assert build().read_bytes() == before
+    assert len(made) == 1
+    build(LINKS.replace("6e10", "7e10"))
+    assert made == [6e10, 7e10]
+    bar_stl.write_bytes(bar_stl.read_bytes()[:-1] + b"\1")
+    build(LINKS.replace("6e10", "7e10"))
+    file.write_text("{")
+    build(LINKS.replace("6e10", "7e10"))
+    assert made == [6e10, 7e10, 7e10, 7e10]
+    both = LINKS.replace("accuracy = 0.01", 'shape = "round"\nmethod = "beam"')
+    spec.write_text(both + SPEC[SPEC.index("[grid]") :])
+    names = [file.stem for file in build_library(read_spec(spec))]
+    assert len(names) == 3
+    assert names[-1] == "bar"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('name = "bar"', 'name = "../bar"'),
+         "link[1].name: found '../bar', expected letters, digits"),
+        (("bar.stl", "rab.stl"), "link[1].surface: found no file "),
+        (('"z=0"', '"z=o"'), "link[1].base: found "),
+        (('tip = "z=0.08"', ""), "link[1].tip: missing"),
+        (("young = 6e10", "young = -1"), "link[1].young: found -1"),
+        (("poisson = 0.3", "poisson = 0.5"), "link[1].poisson: found 0.5"),
+        (('"mm"', '"mmm"'), "link[1].unit: found 'mmm'"),
+        (("density", "densty"), 'unknown key "densty"; did you mean "density"?'),
+        (("[[link]]", "[link]"), "expected tables [[link]]"),
+        (("density = 2700", LINKS[LINKS.index("[[link]]") :]), 'found "bar" twice'),
+        (("accuracy = 0.01", 'shape = "round"'), "grid"),
+    ],
+)  # fmt: skip
+def test_a_surface_that_is_not_said_properly_is_refused(
+    bar_stl, tmp_path, change, message
+):
+    path = tmp_path / "spec.toml"
+    path.write_text(LINKS.replace(*change))
+    with pytest.raises(BadInput) as caught:
+        read_spec(path)
+    assert message in str(caught.value)
+
+
+def test_a_surface_without_its_interface_is_refused_and_nothing_written(
+    bar_stl, tmp_path
+):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(LINKS.replace("z=0.08", "z=0.09"))
+    with pytest.raises(BadInput, match='link "bar": .*tip'):
+        build_library(read_spec(spec))
+    assert not (tmp_path / "links").exists()
+
+
+def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch):
+    """A brick by gmsh's own kernel; STEP is in millimetres and says so."""
+    gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(-10, -10, 0, 20, 20, 80)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "bar.step"))
+    finally:
+        gmsh.finalize()
+    spec = tmp_path / "spec.toml"
+    spec.write_text(LINKS.replace("bar.stl", "bar.step"))
+    (file,) = build_library(read_spec(spec))
+    entry = read_entry(file.parent, "bar")
+    assert entry.about["surface"] == "bar.step"
+    assert entry.about["mass"] == pytest.approx(2700 * 0.02**2 * 0.08, rel=1e-6)
+
+
+def test_the_commands_build_list_look_up_and_export(tmp_path):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(EXAMPLE.read_text())
+    folder = tmp_path / "link_library"
+
+    def run(*arguments):
+        result = CliRunner().invoke(
+            app, ["library", *map(str, arguments)], catch_exceptions=False
+        )
+        assert result.exit_code == 0, result.output
+        return result.stdout
+
+    keys = json.loads(run("build", spec, "--json", "-"))["keys"]
+    assert len(keys) == 16
+    assert run("list", folder).count("\n") == 16
+    at = "length=0.37,radius=0.02,young=6e10,poisson=0.3"
+    found = json.loads(run("look-up", folder, "--at", at, "--json", "-"))
+    truth = exact(0.37, 0.02)
+    gap = np.abs(scaled(np.array(found["stiffness"]) - truth, truth)).max()
+    assert gap < found["relative_error_estimate"] < 0.02
+    rows = list(csv.DictReader(io.StringIO(run("export", folder))))
+    assert len(rows) == 16
+    row = next(r for r in rows if r["length"] == "0.45" and r["radius"] == "0.04")
+    assert float(row["K_RX_RX"]) == pytest.approx(exact(0.45, 0.04)[0, 0], rel=1e-9)
+    text = run("export", folder, "--to", "mapdl", "--key", keys[0])
+    assert text.count("RMORE") == 12
+    with pytest.raises(BadInput, match="--key: missing"):
+        run("export", folder, "--to", "adams")
+    with pytest.raises(BadInput, match="expected name=number"):
+        run("look-up", folder, "--at", "length")
+
+
+def test_other_programs_get_translations_first():
+    K = exact(0.3, 0.02)
+    swapped = translations_first(K)
+    assert swapped[0, 0] == K[3, 3]
+    assert swapped[4, 0] == K[1, 3]
+    written = {}
+    exec(stiffness_for("exudyn", K), {}, written)
+    np.testing.assert_allclose(written["stiffness"], swapped, rtol=1e-12, atol=1e-3)
+    lines = stiffness_for("mapdl", K).splitlines()[1:]
+    numbers = [float(v) for line in lines for v in line.split(",")[-6:]]
+    assert len(numbers) == 78
+    # the lower triangle of [[K, -K], [-K, K]]: last row ends with K[5, 5]
+    assert numbers[-1] == pytest.approx(swapped[5, 5])
+    assert numbers[0] == pytest.approx(swapped[0, 0])
+    with pytest.raises(BadInput, match='did you mean "adams"'):
+        stiffness_for("adam", K)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_surfaces_of_shapes_hold_their_volume(shape):
+    """Polygons of 64 corners lack 0.16 % of a circle's area."""
+    lengths = {
+        "length": 0.3, "radius": 0.03, "inner_radius": 0.02, "tip_radius": 0.02,
+        "width": 0.02, "height": 0.05, "wall": 0.003,
+    }  # fmt: skip
+    r = 0.03**2
+    volumes = {
+        "round": np.pi * r,
+        "tube": np.pi * (r - 0.02**2),
+        "cone": np.pi * (r + 0.03 * 0.02 + 0.02**2) / 3,
+        "rectangle": 0.02 * 0.05,
+        "box": 0.02 * 0.05 - 0.014 * 0.044,
+    }
+    surface = shape_surface(shape, {k: lengths[k] for k in SHAPES[shape]})
+    assert surface.volume == pytest.approx(0.3 * volumes[shape], rel=2e-3)
+    assert surface.repairs == ()
+
+
+@pytest.mark.slow
+def test_finite_elements_fill_a_library_too(tmp_path):
+    grid = {"length": (0.2,), "radius": (0.03,), "young": (6e10,), "poisson": (0.3,)}
+    grid["density"] = (2700.0,)
+    spec = Spec(tmp_path / "links", "round", "fea", grid)
+    (file,) = build_library(spec)
+    entry = read_entry(spec.folder, file.stem)
+    ratio = entry.stiffness[2, 2] / exact(0.2, 0.03)[2, 2]
+    assert ratio == pytest.approx(1, abs=1e-5)
+    assert entry.about["mass"] == pytest.approx(2700 * np.pi * 0.03**2 * 0.2, rel=1e-5)
+    assert len(entry.about["geometry"]) == 64
+
+
+def meshed_bar(length):
+    """An entry by finite elements: 30 mm a layer, one element to a radius."""
+    solid = bar_solid(1, round(length / 0.03), 0.02, length)
+    tip = np.array([0, 0, length])
+    centers = np.array([0 * tip, tip])
+    level = solve_level(solid, [Material(6e10, 0.3)], centers, "rigid")
+    error, _ = estimated_error([level.totals()])
+    parameters = {"length": length, "radius": 0.02}
+    K = level.solution.stiffness
+    return Entry(f"bar{length}", K, error, tip, parameters, {})
+
+
+@pytest.mark.parametrize("length", [0.24, 0.36])
+def test_between_finite_elements_the_error_is_covered_too(length):
+    """Meshed where the library has no entry; both answers may be wrong by their own
+    estimates.  Between three lengths interpolation itself leaves less than 1 %."""
+    entries = [meshed_bar(v) for v in (0.195, 0.3, 0.45)]
+    found, error = look_up(entries, {"length": length})
+    direct = meshed_bar(length)
+    gap = np.abs(found - direct.stiffness)
+    assert (gap <= error + np.abs(direct.stiffness_error) + 1e-9 * gap.max()).all()
+    assert scaled(gap, found).max() < 0.01
+    own = max(np.abs(scaled(e.stiffness_error, e.stiffness)).max() for e in entries)
+    assert scaled(error, found).max() < own + 0.01
+
+
+SHIPPED = EXAMPLE.parent / "stiffness_library"
+# diagonal RX, RZ, TX, TZ of links between the entries that ship, by Fourier modes in
+# their half section (benchmarks/stiffness_round_references.py), good to 1e-6
+BETWEEN = {
+    ("round", 0.25): (137442.8, 26455.52, 6526643.0, 355428100.0),
+    ("round", 0.37): (94455.39, 17875.35, 2061490.0, 239366500.0),
+    ("tube", 0.25): (60592.8, 12645.57, 2796218.0, 98155280.0),
+    ("tube", 0.37): (43336.49, 8544.305, 933078.5, 66207970.0),
+    ("cone", 0.25): (86712.04, 28632.81, 9460910.0, 399129400.0),
+    ("cone", 0.37): (59765.09, 19370.76, 3017814.0, 269134000.0),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_build_file_of_each_shape_ships_with_its_entries(shape):
+    """The keys are those a build would make: it finds all of them there."""
+    spec = read_spec(SHIPPED / f"{shape}.toml")
+    assert (spec.shape, spec.method) == (shape, "fea")
+    entries = read_library(SHIPPED / shape)
+    assert {e.key for e in entries} == {entry_key(spec, p) for p in spec.points()}
+    for entry in entries:
+        assert entry.about["mesh"]["reached"]
+        assert entry.about["relative_error_estimate"] <= spec.accuracy
+        assert len(entry.about["geometry"]) == 64
+
+
+@pytest.mark.parametrize(("shape", "length"), BETWEEN)
+def test_between_shipped_entries_an_independent_stiffness_is_covered(shape, length):
+    K, error = look_up(read_library(SHIPPED / shape), {"length": length})
+    i = [0, 2, 3, 5]
+    exact = np.array(BETWEEN[shape, length])
+    gap = np.abs(np.diag(K)[i] - exact)
+    assert (gap <= np.diag(error)[i]).all()
+    assert (gap < 0.01 * exact).all()
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "box"])
+def test_shipped_square_links_are_their_beams_with_stiffer_ends(shape):
+    """Held ends add up to 0.3 b / L in bending, nothing is softer than Timoshenko's
+    but a box in torsion, whose corners Bredt's formula leaves out."""
+    K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
+    lengths = read_spec(SHIPPED / f"{shape}.toml").grid
+    lengths = {k: lengths[k][0] for k in SHAPES[shape]} | {"length": 0.37}
+    beam = inverted(curve_compliance(shape_beam(shape, lengths, 0.33), 7e10, 0.33))
+    ratio = np.diag(K) / np.diag(beam)
+    assert ((ratio[[0, 1, 3, 4, 5]] > 1) & (ratio[[0, 1, 3, 4, 5]] < 1.05)).all()
+    assert 1 < ratio[2] < 1.06
+
+
+@pytest.mark.parametrize("length", [0.19, 0.46])
+def test_the_shipped_library_refuses_outside(length):
+    result = CliRunner().invoke(
+        app, ["library", "look-up", str(SHIPPED / "tube"), "--at", f"length={length}"]
+    )
+    assert isinstance(result.exception, BadInput)
+    assert "outside the grid, 0.2 .. 0.45" in str(result.exception)
+
+
+def test_a_build_that_fails_leaves_no_folder(tmp_path, monkeypatch):
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC)
+    spec = read_spec(path)
+
+    def fail(*_):
+        raise BadInput("no link")
+
+    monkeypatch.setattr("stiffness.report.library._solve_point", fail)
+    with pytest.raises(BadInput, match="no link"):
+        build_library(spec)
+    assert not spec.folder.exists()

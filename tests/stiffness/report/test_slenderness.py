@@ -1,0 +1,296 @@
+"""Beam beside finite elements over slenderness, and beams along curves from files."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from forcefit.commands.options import numbers, wrench
+from forcefit.commands.stiffness import app
+from forcefit.inputs.table import BadInput
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.curve import curve_compliance, curve_length
+from stiffness.beam.curve_file import read_curve
+from stiffness.beam.sections import rectangular_section, round_section
+from stiffness.link import LinkStiffness
+from stiffness.report.compare import compare_link
+from stiffness.report.plot import plot_slenderness
+from stiffness.report.results import comparison_results, sweep_text
+from stiffness.report.slenderness import fit_end_effect, sweep_slenderness
+
+MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
+
+
+def made_up(ratio, c, d, error=0.0):
+    """A bar and the same one stiffer by 1 + c / ratio + d / ratio^2."""
+    length = 0.02 * ratio
+    C = beam_compliance(length, round_section(0.02, 0.3), 6e10, 0.3)
+    ends = {"tip": [length, 0, 0], "base": [0, 0, 0]}
+    beam = LinkStiffness("beam", C, **ends)
+    factor = 1 + c / ratio + d / ratio**2
+    fea = LinkStiffness(
+        "fea", C / factor, **ends, stiffness_error=error * beam.stiffness
+    )
+    return compare_link(beam, fea, size=0.02)
+
+
+def diagonal_residual(sweep):
+    """Couplings, scaled by a diagonal that shear changes, are no plain series."""
+    return np.abs(np.diagonal(sweep.residual, axis1=1, axis2=2)).max()
+
+
+def test_the_fit_finds_what_was_put_in():
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20, 40)])
+    np.testing.assert_allclose(np.diag(sweep.end_effect), 0.2, rtol=1e-9)
+    np.testing.assert_allclose(np.diag(sweep.second), 0.7, rtol=1e-9)
+    assert diagonal_residual(sweep) < 1e-12
+    assert "c = 0.200 0.200 0.200 (rotations)" in sweep.explanation
+
+
+def test_what_does_not_fade_is_left_over():
+    """A modulus 1 % too high is no end effect: most of it stays in the residual."""
+    found = []
+    for ratio in (5, 10, 20, 40):
+        one = made_up(ratio, 0.2, 0.0)
+        C = one.fea.compliance / 1.01
+        fea = LinkStiffness("fea", C, tip=one.fea.tip, base=one.fea.base)
+        found.append(compare_link(one.beam, fea, size=0.02))
+    sweep = fit_end_effect(found)
+    assert 0.004 < diagonal_residual(sweep) < 0.01
+    clean = fit_end_effect([made_up(r, 0.2, 0.0) for r in (5, 10, 20, 40)])
+    assert diagonal_residual(clean) < 1e-12
+
+
+def test_mesh_errors_are_told_in_c():
+    """0.1 % of the beam's K on both meshes; by hand, c = 2 y20 20 - y10 10."""
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7, error=1e-3) for r in (10, 20)])
+    expected = 1e-3 * (40 / (1 + 0.01 + 0.7 / 400) + 10 / (1 + 0.02 + 0.7 / 100))
+    assert np.diag(sweep.end_effect_error) == pytest.approx(expected, rel=1e-9)
+
+
+def test_table_and_picture_show_every_entry():
+    sweep = fit_end_effect([made_up(r, 0.2, 0.7) for r in (5, 10, 20)])
+    text = sweep_text(sweep)
+    assert "RX" in text
+    assert "RY TZ" in text
+    assert text.count("\n") >= 7
+    axes = plot_slenderness(sweep).axes[0]
+    assert "L / r" in axes.get_xlabel()
+    assert axes.get_legend() is not None
+
+
+# K / K_beam - 1 of RX, TX and TZ, nu = 0.3, by Fourier modes in the half section, good
+# to 1e-6: benchmarks/stiffness_round_references.py on bars of these L / r
+ENDS = {
+    6: (0.025438, 0.030358, 0.017318),
+    12: (0.015261, 0.018274, 0.008585),
+    24: (0.008103, 0.009709, 0.004274),
+}
+
+
+@pytest.mark.slow
+def test_a_round_bars_ends():
+    """Beside an independent solution each mesh is too stiff, by no more than it says;
+    the same fit of the exact values has c = 0.212, 0.254, 0.102 and none in torsion."""
+    sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
+    for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
+        found = np.diag(comparison.difference)
+        gap = found[[0, 3, 5]] - exact
+        assert (gap > -1e-5).all()
+        assert (gap <= np.diag(comparison.fea.relative_errors)[[0, 3, 5]]).all()
+        assert 0 < found[2] + 1e-5 < 0.004
+    c, error = np.diag(sweep.end_effect), np.diag(sweep.end_effect_error)
+    assert (np.abs(c - [0.212, 0.212, 0, 0.254, 0.254, 0.102]) <= error).all()
+    assert np.abs(sweep.residual).max() < 0.004
+
+
+@pytest.mark.slow
+def test_without_poissons_ratio_tension_has_no_ends():
+    """K_TZ = E V / L^2 with the mesh's own volume, exactly but for the tilt of curved
+    sides, squared.  Arcs as parabolas leave phi^4 / 30 of the volume, phi = pi / n with
+    n of them around: 5e-5 for the 16 of the coarsest mesh."""
+    sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.0, [6, 12], accuracy=0.01)
+    for comparison in sweep.comparisons:
+        length, volume = comparison.length, comparison.fea.mesh["volume"]
+        expected = 6e10 * volume / length**2
+        assert comparison.fea.stiffness[5, 5] == pytest.approx(expected, rel=1e-7)
+        assert volume == pytest.approx(np.pi * 0.02**2 * length, rel=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--radius", "0.02", "--ratios", "5"], "found one length"),
+        (["--radius", "0.02", "--ratios", "5,x"], "--ratios: found '5,x'"),
+        (["--radius", "0.02", "--ratios", "5,5"], "5 is given twice"),
+        (["--radius", "0.02", "--ratios", "0,5"], "--ratios: found 0"),
+        (["--section", "width=1,height=1,web=.1,flange=.1"], "found a section of"),
+        (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
+        (["--section", "radius=1", "--radius", "1"], "--radius does not go with it"),
+        (["--section", "width=1"], "--section: found width, expected one of"),
+    ],
+)
+def test_slenderness_refuses_before_it_works(options, message):
+    with pytest.raises(BadInput) as caught:
+        CliRunner().invoke(
+            app, ["slenderness", *MATERIAL, *options], catch_exceptions=False
+        )
+    assert message in str(caught.value)
+
+
+def test_a_beam_that_ends_elsewhere_is_refused():
+    C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
+    one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
+    other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
+    with pytest.raises(BadInput, match="the surface's tip is at"):
+        compare_link(one, other, 0.02)
+
+
+def test_wrenches_and_numbers_as_people_write_them():
+    np.testing.assert_array_equal(wrench("-w", ["fx=1,mz=-2"]), [0, 0, -2, 1, 0, 0])
+    with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
+        wrench("--wrench", ["fq=1"])
+    assert numbers("--ratios", "20,5", "1") == [5.0, 20.0]
+
+
+# --- curves from files ---------------------------------------------------------------
+
+L_BRACKET = """
+[[piece]]
+end = [0, 0, 0.2]
+section = { width = 0.04, height = 0.05 }
+up = [0, 1, 0]
+[[piece]]
+end = [0.15, 0, 0.2]
+up = [0, 1, 0]
+"""
+
+
+def curve_file(tmp_path: Path, content: str) -> Path:
+    path = tmp_path / "curve.toml"
+    path.write_text(content)
+    return path
+
+
+def test_an_l_from_a_file_is_two_beams(tmp_path):
+    """The command prints what the function gives; length 0.35 m; Castigliano by hand
+    for a force along y at the tip: both legs bend, the first twists."""
+    path = curve_file(tmp_path, L_BRACKET)
+    result = CliRunner().invoke(
+        app, ["curve", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
+    )
+    C = np.array(json.loads(result.stdout)["compliance"])
+    pieces = read_curve(path, 0.3)
+    assert curve_length(pieces) == pytest.approx(0.35, rel=1e-12)
+    np.testing.assert_allclose(
+        C, curve_compliance(pieces, 6e10, 0.3, theory="euler"), rtol=1e-12, atol=1e-20
+    )
+    s = rectangular_section(0.04, 0.05, 0.3)
+    E, G, a, b = 6e10, 6e10 / 2.6, 0.2, 0.15
+    expected = (a**3 + b**3) / (3 * E * s.I_y) + a * b**2 / (G * s.J)
+    assert C[4, 4] == pytest.approx(expected, rel=1e-9)
+
+
+def test_tapers_and_arcs_from_a_file(tmp_path):
+    """A cone is stretched by L / (E pi r1 r2); a quarter circle ends on its axis."""
+    cone = """
+[[piece]]
+end = [0.3, 0, 0]
+section = { radius = 0.02 }
+tip_section = { radius = 0.01 }
+"""
+    C = curve_compliance(read_curve(curve_file(tmp_path, cone), 0.3), 6e10, 0.3)
+    assert C[3, 3] == pytest.approx(0.3 / (6e10 * np.pi * 0.02 * 0.01), rel=1e-9)
+    arc = """
+[[piece]]
+start = [0.1, 0, 0]
+center = [0, 0, 0]
+turn = [0, 0, 1.5707963267948966]
+section = { width = 0.01, height = 0.02, wall = 0.001 }
+"""
+    (piece,) = read_curve(curve_file(tmp_path, arc), 0.3)
+    np.testing.assert_allclose(piece.place(1.0), [0, 0.1, 0], atol=1e-15)
+    assert curve_length([piece]) == pytest.approx(np.pi * 0.05, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("[[piece]]", "[[pieces]]"), 'unknown key "pieces"; did you'),
+        (("section =", "sektion ="), "piece[1].section: missing"),
+        (("width", "widht"), 'piece[1].section: unknown "widht"; did you mean'),
+        (("height = 0.05", "height = -1"), "piece[1]: rectangular_section: height"),
+        (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece from start to end"),
+        (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
+        (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
+        (
+            ("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
+            "a taper has lengths of the same names",
+        ),
+    ],
+)
+def test_a_curve_file_that_is_none_is_refused(tmp_path, change, message):
+    path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
+    with pytest.raises(BadInput) as caught:
+        read_curve(path, 0.3)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_surface_goes_with_a_curve_or_a_section_not_both(tmp_path):
+    path = curve_file(tmp_path, L_BRACKET)
+    command = ["compare", "x.stl", "--base", "z=0", "--tip", "x=0.15", *MATERIAL]
+    with pytest.raises(BadInput, match="--curve: its file has the sections"):
+        CliRunner().invoke(
+            app,
+            [*command, "--curve", str(path), "--radius", "0.1"],
+            catch_exceptions=False,
+        )
+
+
+def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
+    """A 0.3 m bar by the beam formula, read at its tip."""
+    section = rectangular_section(width, height, 0.3)
+    C = beam_compliance(0.3, section, 6e10, 0.3, axis=axis, up=up)
+    tip = 0.3 * np.array(axis)
+    return LinkStiffness("beam", C / stiffer, tip=tip, base=np.zeros(3))
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
+def test_a_section_turned_by_a_quarter_is_told_apart_from_held_ends(axis):
+    """A 20 x 60 mm bar 2 % stiffer than its beam; I differs ninefold if turned."""
+    solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
+    right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
+    assert right.better_turn == (0, pytest.approx(0.02))
+    assert "Held faces" in right.explanation
+    across = np.cross(axis, [0, 1, 0])
+    for beam in (
+        rectangle(0.02, 0.06, [0, 1, 0], axis=axis),
+        rectangle(0.06, 0.02, across, axis=axis),
+    ):
+        turned = compare_link(beam, solid, 0.03)
+        assert turned.better_turn == (90, pytest.approx(0.02))
+        assert np.abs(turned.difference).max() > 5
+        assert "axes look swapped: turned by a quarter about base" in turned.explanation
+        assert "Held faces" not in turned.explanation
+        assert comparison_results(turned)["axes_turned"] == 90
+
+
+def test_a_nearly_square_bar_within_the_meshs_error_is_not_called_turned():
+    solid = rectangle(0.0200, 0.0202, [0, 1, 0])
+    unsure = replace(solid, stiffness_error=0.02 * solid.stiffness)
+    beam = rectangle(0.0202, 0.0200, [0, 1, 0])
+    assert compare_link(beam, unsure, 0.01).better_turn[0] == 0
+    assert compare_link(beam, solid, 0.01).better_turn[0] == 90
+
+
+def test_a_bent_beams_corner_is_named():
+    """Straight: no word of corners; an L: its corner is no end effect."""
+    one = made_up(20, 0.2, 0.0)
+    assert "corner" not in one.explanation
+    bent = compare_link(one.beam, one.fea, 0.02, length=1.5 * one.length)
+    assert "corner is stiffer" in bent.explanation
+    assert bent.slenderness == pytest.approx(30)

@@ -1,0 +1,154 @@
+"""Surfaces from MSH and STEP."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import find_patches
+from stiffness.surface.primitives import Cone, Plane
+from stiffness.surface.surface import read_surface
+
+CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
+SIDES = [
+    (1, 3, 4, 2),
+    (5, 6, 8, 7),
+    (1, 2, 6, 5),
+    (3, 7, 8, 4),
+    (1, 5, 7, 3),
+    (2, 4, 8, 6),
+]
+TRIANGLES = [t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))]
+TETRAHEDRA = [(1, 2, 4, 6), (1, 4, 3, 7), (1, 4, 7, 6), (1, 6, 7, 5), (4, 8, 7, 6)]
+
+
+def msh2(elements, kind):
+    """MSH 2.2 as in Gmsh's manual: number, type, two tags, corners."""
+    nodes = [f"{k} {x} {y} {z}" for k, (x, y, z) in enumerate(CORNERS, 1)]
+    cells = [
+        f"{k} {kind} 2 1 1 {' '.join(map(str, e))}" for k, e in enumerate(elements, 1)
+    ]
+    return "\n".join([
+        "$MeshFormat", "2.2 0 8", "$EndMeshFormat",
+        "$Nodes", str(len(nodes)), *nodes, "$EndNodes",
+        "$Elements", str(len(cells)), *cells, "$EndElements", "",
+    ])  # fmt: skip
+
+
+def msh4(elements, kind, dimension):
+    """MSH 4.1: one block of nodes, and one of elements for each half of them."""
+    nodes = [f"{x} {y} {z}" for x, y, z in CORNERS]
+    half = len(elements) // 2
+    blocks = []
+    for tag, part in ((1, elements[:half]), (2, elements[half:])):
+        blocks.append(f"{dimension} {tag} {kind} {len(part)}")
+        blocks += [
+            f"{k} {' '.join(map(str, e))}" for k, e in enumerate(part, 1 + 100 * tag)
+        ]
+    return "\n".join([
+        "$MeshFormat", "4.1 0 8", "$EndMeshFormat",
+        "$Nodes", "1 8 1 8", "2 1 0 8", *map(str, range(1, 9)), *nodes, "$EndNodes",
+        "$Elements", f"2 {len(elements)} 101 299", *blocks, "$EndElements", "",
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        msh2(TRIANGLES, 2),
+        msh4(TRIANGLES, 2, 2),
+        msh2(TETRAHEDRA, 4),
+        msh4(TETRAHEDRA, 4, 3),
+        msh2(SIDES, 3),
+    ],
+    ids=["2.2 triangles", "4.1 triangles", "2.2 solid", "4.1 solid", "2.2 quads"],
+)
+def test_a_cube_of_gmsh_is_a_cube(tmp_path, content, capfd):
+    """Written by hand after the format's description; 12 triangles around 1e-3 m^3."""
+    path = tmp_path / "cube.msh"
+    path.write_text(content)
+    surface = read_surface(path)
+    assert surface.volume == pytest.approx(1e-3, rel=1e-12)
+    assert surface.area == pytest.approx(6e-2, rel=1e-12)
+    assert len(surface.triangles) == 12
+    assert surface.repairs == ()
+    assert capfd.readouterr().out == ""  # `--json -` prints there
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("no mesh at all", "not a readable MSH file"),
+        (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
+        (msh2([(1, 2)], 1), "holds neither triangles nor tetrahedra"),
+        (msh2(TRIANGLES[:-1], 2), "the surface is open"),
+    ],
+)
+def test_a_msh_file_that_is_none_is_refused(tmp_path, content, message, capfd):
+    path = tmp_path / "bad.msh"
+    path.write_text(content)
+    with pytest.raises(BadInput, match=message):
+        read_surface(path)
+    assert capfd.readouterr().out == ""
+
+
+def test_step_without_gmsh_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "gmsh", None)
+    path = tmp_path / "part.step"
+    path.write_text("ISO-10303-21;")
+    with pytest.raises(BadInput, match=r"install forcefit\[gmsh\], or export .* STL"):
+        read_surface(path)
+
+
+@pytest.fixture
+def gmsh():
+    """Gmsh with a tube of 40 x 30 mm outer and inner diameter, 100 mm long."""
+    gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    outer = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 100, 20)
+    inner = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 100, 15)
+    gmsh.model.occ.cut([(3, outer)], [(3, inner)])
+    gmsh.model.occ.synchronize()
+    yield gmsh
+    if gmsh.isInitialized():
+        gmsh.finalize()
+
+
+def test_step_is_read_in_its_own_unit_and_its_cylinders_are_known(tmp_path, gmsh):
+    """Millimetres stand in the file; 48 facets a circle leave 0.3 % of the volume."""
+    path = tmp_path / "tube.step"
+    gmsh.write(str(path))
+    gmsh.finalize()
+    for unit in ("m", "mm"):
+        surface = read_surface(path, unit)
+        exact = np.pi * (0.02**2 - 0.015**2) * 0.1
+        assert surface.volume == pytest.approx(exact, rel=4e-3)
+    found = find_patches(surface, *map(parse_interface, ("z=0", "z=0.1")))
+    kinds = [type(shape) for shape in found.shapes]
+    assert kinds[:2] == [Plane, Plane]
+    assert set(kinds[2:]) == {Cone}
+    for shape in found.shapes[2:]:
+        assert min(abs(shape.radius - r) for r in (0.02, 0.015)) < 1e-9
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_gmsh_writes_is_read(tmp_path, gmsh, version, binary, dimension):
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.Binary", binary)
+    gmsh.model.mesh.generate(dimension)
+    path = tmp_path / "tube.msh"
+    gmsh.write(str(path))
+    surface = read_surface(path, "mm")
+    exact = np.pi * (0.02**2 - 0.015**2) * 0.1
+    assert surface.volume == pytest.approx(exact, rel=2e-2)
+
+
+def test_a_broken_step_file_is_refused(tmp_path, gmsh):
+    path = tmp_path / "part.step"
+    path.write_text("rubbish")
+    with pytest.raises(BadInput, match="not a readable STEP file|holds no triangles"):
+        read_surface(path)

@@ -1,0 +1,315 @@
+"""Campaign folders: what must load does, what must not says why in one line."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
+from validation.campaign.campaign import number_rows
+from validation.campaign.campaign_file import read_campaign
+
+
+def test_a_campaign_is_what_its_files_say(tmp_path):
+    """Two arms by hand: x = cos q1 + 0.8 cos(q1 + q2), y likewise."""
+    campaign = read_campaign(write_campaign(tmp_path / "first"))
+    assert campaign.name == "first"
+    assert campaign.ids == ("m1", "m2", "m3", "m4")
+    assert campaign.commanded == "joints"
+    assert campaign.registration == "known"
+    q1, q2 = np.array([0.1, 0.3, 0.1, 0.1]), np.array([0.2, 0.4, 0.2, 0.2])
+    tool = campaign.transforms[:, campaign.robot.index("tool"), :2, 3]
+    expected = [np.cos(q1) + 0.8 * np.cos(q1 + q2), np.sin(q1) + 0.8 * np.sin(q1 + q2)]
+    np.testing.assert_allclose(tool, np.transpose(expected), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(campaign.loads[:, 3], [0, 10, 0, 10])
+    assert not campaign.loads[:, [0, 1, 2, 4, 5]].any()
+    np.testing.assert_array_equal(campaign.measured[1, 3:], [2e-5, math.nan, 0])
+    assert np.isnan(campaign.measured[:, :3]).all()
+    np.testing.assert_array_equal(campaign.sigma[0], [1e-5] * 3 + [5e-6] * 3)
+    np.testing.assert_array_equal(campaign.covariates["approach"], [1, -1, 1, 1])
+    np.testing.assert_array_equal(campaign.configuration, [0, 1, 0, 0])
+    np.testing.assert_array_equal(campaign.repeat, [0, 1, 0, 2])
+    assert not campaign.measured.flags.writeable
+
+
+def test_taking_rows_keeps_their_order_and_their_numbers(tmp_path):
+    campaign = read_campaign(write_campaign(tmp_path))
+    some = campaign.take([3, 1])
+    assert some.ids == ("m4", "m2")
+    np.testing.assert_array_equal(some.configuration, [0, 1])
+    np.testing.assert_array_equal(some.covariates["time"], [180, 60])
+    assert campaign.take(campaign.configuration == 0).ids == ("m1", "m3", "m4")
+    assert campaign.take(slice(0, 2)).ids == ("m1", "m2")
+    assert len(campaign.take([])) == 0
+
+
+def test_rows_are_numbered_by_first_use():
+    numbers = number_rows([2.0, 1.0, 2.0 + 1e-12, -0.0, 0.0], [math.nan] * 5)
+    np.testing.assert_array_equal(numbers, [0, 1, 0, 2, 2])
+
+
+def test_poses_and_joints_name_the_same_configurations(tmp_path):
+    """The tool's poses written down as a command give the joints back."""
+    joints = read_campaign(write_campaign(tmp_path / "joints"))
+    tool = joints.transforms[:, joints.robot.index("tool")]
+    rows = [
+        f"p{i},{float(T[0, 3])!r},{float(T[1, 3])!r},1e-5" for i, T in enumerate(tool)
+    ]
+    folder = write_campaign(tmp_path / "pose", head="id,pose.tx,pose.ty,meas.tx",
+                            rows=rows)  # fmt: skip
+    poses = read_campaign(folder)
+    assert poses.commanded == "pose"
+    np.testing.assert_allclose(poses.coordinates, joints.coordinates, rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(poses.configuration, joints.configuration)
+
+
+def test_a_machine_without_drives_is_always_at_home(tmp_path):
+    robot = 'name = "post"\nplatform = "top"\n[[frame]]\nname = "top"\n'
+    robot += 'parent = "base"\ntranslation = [0, 0, 2]\n'
+    folder = write_campaign(tmp_path, robot=robot, head="id,meas.tz,cov.temperature",
+                            rows=["a,1e-5,0", "b,3e-5,2"])  # fmt: skip
+    campaign = read_campaign(folder)
+    np.testing.assert_array_equal(campaign.configuration, [0, 0])
+    np.testing.assert_array_equal(campaign.repeat, [0, 0])
+
+
+def test_a_robot_may_be_built_in(tmp_path):
+    folder = write_campaign(tmp_path, head="id,pose.tx,pose.tz,meas.tx",
+                            rows=["a,0.05,-0.5,1e-5"],
+                            toml={"robot": '"irsbot2"'})  # fmt: skip
+    assert read_campaign(folder).robot.name == load_robot("irsbot2").name
+
+
+def test_labels_in_any_script_and_spaces_are_read(tmp_path):
+    """Only control characters are refused, not what a spreadsheet may write."""
+    rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
+    assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
+
+
+def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
+    """The same numbers in another dialect are the same campaign."""
+    plain = read_campaign(write_campaign(tmp_path / "plain"))
+    in_mm = [
+        "m1;5,729577951308232;11,459155902616464;0;0;0,01;0,02;0,03;1,5;0;1",
+        "m2;17,188733853924695;22,918311805232928;0,01;0;0,02;;0;2;1;-1",
+        "m3;5,729577951308232;11,459155902616464;-0;0;0,011;0,021;0,031;1;2;1",
+        "m4;5,729577951308232;11,459155902616464;,01;0;1e-2;+0,02;3,0E-2;1;3;1",
+    ]
+    extra = '[table]\ndelimiter = ";"\ndecimal = ","\n[units]\nposition = "mm"\n'
+    extra += 'command_rotation = "deg"\nforce = "kN"\ntime = "min"\n'
+    folder = write_campaign(
+        tmp_path / "other", head=HEAD.replace(",", ";"), rows=in_mm, extra=extra
+    )
+    other = read_campaign(folder)
+    np.testing.assert_allclose(other.measured[:3], plain.measured[:3], rtol=1e-12)
+    np.testing.assert_allclose(other.loads, plain.loads, rtol=1e-12)
+    np.testing.assert_allclose(other.coordinates, plain.coordinates, rtol=1e-12)
+    np.testing.assert_allclose(
+        other.covariates["time"], plain.covariates["time"], rtol=1e-12
+    )
+    np.testing.assert_array_equal(other.repeat, plain.repeat)
+    np.testing.assert_array_equal(other.sigma, plain.sigma)  # [noise] is always SI
+
+
+def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
+    folder = write_campaign(tmp_path)
+    table = folder / "measurements.csv"
+    text = table.read_text().replace("\n", "\r\n") + "\r\n\r\n"
+    table.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert len(read_campaign(folder)) == 4
+    assert len(read_campaign(folder / "campaign.toml")) == 4
+
+
+def test_sigma_of_a_reading_goes_before_that_of_the_device(tmp_path):
+    rows = ["a,0,0,1e-5,2e-5,3e-6,", "b,0,0,1e-5,,,"]
+    head = "id,q.one,q.two,meas.tx,meas.ty,sigma.tx,sigma.ty"
+    sigma = read_campaign(write_campaign(tmp_path, head=head, rows=rows)).sigma
+    np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
+
+
+def test_a_device_somewhere_in_the_room_may_read_far(tmp_path):
+    rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
+    head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
+    head += "cov.temperature,cov.time,cov.approach"
+    with pytest.raises(BadInput, match="meas.rz.* at most half a turn"):
+        read_campaign(write_campaign(tmp_path, head=head,
+                                     rows=[rows[0].replace("3,-5.5", "3.2,-5.5")],
+                                     toml={"registration": '"unknown"'}))  # fmt: skip
+    rows = [rows[0].replace("1,2,3,-5.5", "1,2,2,-5.5")]
+    folder = write_campaign(tmp_path, head=head, rows=rows,
+                            toml={"registration": '"unknown"'})  # fmt: skip
+    assert read_campaign(folder).measured[0, 4] == 10
+
+
+BAD_TABLES = {
+    "unknown column": (HEAD.replace("meas.tx", "mess.tx"), ROWS,
+        r'line 1: unknown column "mess.tx"; did you mean "meas.tx"\?'),
+    "unknown joint": (HEAD.replace("q.two", "q.tow"), ROWS,
+        r'line 1: unknown column "q.tow"; did you mean "q.two"\?'),
+    "a joint that is not driven": (HEAD.replace("q.two", "q.tool"), ROWS,
+        r'unknown column "q.tool": that joint is fixed'),
+    "a drive without a command": (HEAD.replace("q.two", "cov.two"), ROWS,
+        r'line 1: missing column "q.two"; expected one for every actuated joint'),
+    "no command at all": ("id,meas.tx", ["a,1e-5"],
+        r'no commanded configuration; expected columns "q.one", "q.two" or pose.tx'),
+    "joints and poses": ("id,q.one,q.two,pose.tx,meas.tx", ["a,0,0,0,0"],
+        r'line 1: found both "q.one" and "pose.tx"; expected joint'),
+    "no id": (HEAD.replace("id,", "cov.id,"), ["1" + r[2:] for r in ROWS],
+        r'line 1: missing column "id"'),
+    "a column twice": (HEAD.replace("load.mx", "load.fx"), ROWS,
+        r'line 1: column "load.fx" is there twice'),
+    "a column without a name": (HEAD.replace("load.mx", " "), ROWS,
+        r"line 1: column 5 has no name"),
+    "no header": (None, ROWS, r"line 1 names no column of a table of measurements"),
+    "semicolons": (HEAD.replace(",", ";"), [r.replace(",", ";") for r in ROWS],
+        r'it has ; in it: if that parts the cells, say \[table\] delimiter = ";"'),
+    "decimal commas": (HEAD, [ROWS[0].replace("1.5", "1,5")],
+        r"line 2: found 12 cells, expected 11 as in the header; if decimals are writ"),
+    "quoted decimal commas": (HEAD, [ROWS[0].replace("1e-05", '"0,00001"'), *ROWS[1:]],
+        r'line 2 \(id "m1"\), meas.tx: found "0,00001", expected a finite number \[m\]'
+        r'; a decimal "," is not read here: write "0.00001", or say \[table\] delimi'
+        r'ter = ";", decimal = "," in campaign.toml and part cells by ";"'),
+    "decimal commas under one label": (HEAD, [ROWS[0].replace("1.5", '"1,5"')] * 2,
+        r'line 2 \(id "m1"\), cov.temperature: found "1,5", .* a decimal "," is not'),
+    "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
+        r"line 2 holds NUL; expected a text file"),
+    "NULs at the end": (HEAD, [*ROWS, "\0" * 50],
+        r"line 6 holds NUL; expected a text file"),
+    "a NUL in a column's name": (HEAD.replace("cov.time", "cov.t\0"), ROWS,
+        r"line 1 holds NUL; expected a text file"),
+    "a NUL in a number": (HEAD, [ROWS[0].replace("1e-05", "1\0e-05")],
+        r"line 2 holds NUL; expected a text file"),
+    "a line break in a label": (HEAD, [ROWS[0].replace("m1", '"m\n1"')],
+        r"line 3, \"id\": found 'm\\n1', expected text without line breaks"),
+    "a delete character": (HEAD, [ROWS[0].replace("m1", "m\x7f")],
+        r"line 2, \"id\": found 'm\\x7f', expected text without"),
+    "ragged": (HEAD, [*ROWS[:2], "m9,0.1"], r"line 4: found 2 cells, expected 11 as"),
+    "empty": (None, [], r"measurements.csv: empty; expected a header"),
+    "no rows": (HEAD, [], r"measurements.csv: no rows; expected one row a measurement"),
+    "a word": (HEAD, [ROWS[0].replace("1e-05", "small")],
+        r'line 2 \(id "m1"\), meas.tx: found "small", expected a finite number \[m\]'),
+    "nan": (HEAD, [ROWS[0].replace("1e-05", "nan")],
+        r'meas.tx: found "nan".*; leave the cell empty if it was not measured'),
+    "infinite": (HEAD, [ROWS[0].replace("1e-05", "inf")], r'meas.tx: found "inf"'),
+    "underscores": (HEAD, [ROWS[0].replace("1e-05", "1_0")], r'meas.tx: found "1_0"'),
+    "an empty command": (HEAD, [ROWS[0].replace(",0.1,", ",,")],
+        r"q.one: empty; only meas. and sigma. cells may be"),
+    "nothing measured": (HEAD, [ROWS[0].replace("1e-05,2e-05,3e-05", ",,")],
+        r'line 2 \(id "m1"\): no measured cell; expected at least one of meas.rx'),
+    "an id twice": (HEAD, [*ROWS, ROWS[1]],
+        r'line 6, id: found "m2", already the label of line 3; expected another'),
+    "no label": (HEAD, [ROWS[0].replace("m1", " ")], r"line 2, id: empty"),
+    "approach": (HEAD, [ROWS[0][:-1] + "0"],
+        r"cov.approach: found 0, expected -1 or 1"),
+    "before the first": (HEAD, [ROWS[0].replace("1.5,0,1", "1.5,-60,1")],
+        r"cov.time: found -60 s, expected seconds since the first measurement, >= 0"),
+    "a date": (HEAD, [ROWS[0].replace("1.5,0,1", "1.5,1.7e9,1")],
+        r"cov.time: found 1.7e\+09, expected seconds since the first measurement"),
+    "absolute temperature": (HEAD, [ROWS[0].replace("1.5,0,1", "293.15,0,1")],
+        r"cov.temperature: found 293.15, expected the deviation from the temperature"),
+    "metres for micrometres": (HEAD, [ROWS[0].replace("1e-05", "153")],
+        r"meas.tx: found 153, expected a length in m, at most the robot's 1\.\d+; if "
+        r"it is in other units say so in \[units\]"),
+    "degrees": (HEAD, [ROWS[0].replace(",0.1,", ",90,")],
+        r"q.one: found 90, expected an angle in rad; if it is in other units"),
+    "a load of 1e9 N": (HEAD, [ROWS[0].replace(",0,0,1e", ",1e9,0,1e")],
+        r"load.fx: found 1e\+09, expected a load in N"),
+    "out of reach": ("id,pose.tx,pose.ty,meas.tx", ["a,0.5,1,0", "b,5,1,0"],
+        r'line 3 \(id "b"\): pose tx=5, ty=1 cannot be reached'),
+    "a pose in mm": ("id,pose.tx,pose.ty,meas.tx", ["a,500,1000,0"],
+        r"pose.tx: found 500, expected a position in m; if it is in other units"),
+    "negative sigma": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,-1e-6"],
+        r"sigma.tx: found -1e-06 m, expected one standard deviation > 0"),
+    "no sigma of zero": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,0"],
+        r"sigma.tx: found 0 m, expected one standard deviation > 0"),
+    "sigma of 5 m": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,5"],
+        r"sigma.tx: found 5, expected a length in m, at most the robot's"),
+    "an open quote": (HEAD, ['"m1,0.1'], r"line \d: not CSV: unexpected end of data"),
+    "a covariate without a name": (HEAD.replace("cov.time", "cov."), ROWS,
+        r'line 1: unknown column "cov."'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_TABLES)
+def test_a_table_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+    head, rows, message = BAD_TABLES[case]
+    folder = write_campaign(tmp_path, head=head, rows=rows)
+    with pytest.raises(BadInput, match=message) as caught:
+        read_campaign(folder)
+    assert str(caught.value).startswith(str(folder / "measurements.csv"))
+    assert "\n" not in str(caught.value)
+
+
+BAD_TOML = {
+    "unknown key": ({"note": '"x"'}, NOISE, r'unknown key "note"; did you mean "noi'),
+    "robot missing": ({"robot": None}, NOISE, r"robot: missing; expected a built-in"),
+    "no such robot": ({"robot": '"irsbot3"'}, NOISE,
+        r'robot: found "irsbot3", neither a built-in robot nor a file beside this; '
+        r'did you mean "irsbot2"\?'),
+    "no table": ({"measurements": '"m.csv"'}, NOISE, r"m.csv: cannot be read: No such"),
+    "a point in mm": ({"reference_point": "[20, 0, 50]"}, NOISE,
+        r"reference_point: found 53.85.* m from the platform, the robot is 1\.\d+ m"),
+    "two numbers": ({"reference_point": "[0, 1]"}, NOISE, r"expected 3 finite numbers"),
+    "registration": ({"registration": '"unknwon"'}, NOISE, r'did you mean "unknown"'),
+    "noise": ({}, "[noise]\nrotatoin = 1\n", r'noise: unknown key "rotatoin"; did you'),
+    "no noise": ({}, "", r"sigma.tx: no sigma; expected a cell here or \[noise\] "),
+    "noise of 0": ({}, "[noise]\nposition = 0\n", r"noise.position: found 0, expected"),
+    "unit": ({}, '[units]\nposition = "miles"\n', "found 'miles', expected .m. . .mm"),
+    "unknown unit": ({}, '[units]\npostion = "m"\n', r'did you mean "position"\?'),
+    "comma twice": ({}, '[table]\ndecimal = ","\n', r"decimal commas need delimiter"),
+    "delimiter": ({}, '[table]\ndelimiter = "/"\n', r"delimiter: found '/', expected"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_TOML)
+def test_a_campaign_file_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+    toml, rest, message = BAD_TOML[case]
+    folder = write_campaign(tmp_path, toml=toml, noise=rest)
+    with pytest.raises(BadInput, match=message) as caught:
+        read_campaign(folder)
+    assert str(caught.value).startswith(str(folder))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_no_table_is_not_printed(tmp_path):
+    folder = write_campaign(tmp_path)
+    (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
+    with pytest.raises(BadInput, match="names no column") as caught:
+        read_campaign(folder)
+    assert "secret" not in str(caught.value)
+
+
+def test_a_folder_that_is_not_there_says_so(tmp_path):
+    with pytest.raises(BadInput, match=r"gone/campaign.toml: cannot be read: No such"):
+        read_campaign(tmp_path / "gone")
+
+
+def test_a_robot_file_that_is_wrong_is_named_itself(tmp_path):
+    folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
+    with pytest.raises(BadInput, match=r"robot.toml: frame"):
+        read_campaign(folder)
+
+
+def test_the_files_of_the_docs_are_read(tmp_path):
+    """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+    docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
+    blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
+    assert len(blocks) == 2
+    (tmp_path / "campaign.toml").write_text("".join(blocks), encoding="utf-8")
+    (tmp_path / "measurements.csv").write_text(
+        "id;pose.tx;pose.tz;load.fx;meas.tx;meas.ry;cov.time\n"
+        "a;100;-500;0,01;0,25;0,1;2\n"
+    )
+    campaign = read_campaign(tmp_path)
+    assert campaign.robot.name == load_robot("irsbot2").name
+    platform = campaign.transforms[0, campaign.robot.index(campaign.robot.platform)]
+    np.testing.assert_allclose(platform[[0, 2], 3], [0.1, -0.5], atol=1e-9)
+    assert campaign.loads[0, 3] == pytest.approx(10.0)
+    assert campaign.measured[0, 3] == pytest.approx(2.5e-4)
+    assert campaign.measured[0, 1] == pytest.approx(math.radians(0.1))
+    assert campaign.covariates["time"][0] == 120
+    np.testing.assert_array_equal(campaign.sigma[0], [1e-5] * 3 + [5e-6] * 3)

@@ -1,0 +1,282 @@
+"""Whatever is done to a campaign's files: it is read, or one line says why not."""
+
+import re
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from assembly.files.robot_file import read_robot
+from assembly.model.error_distributions import read_sources
+from forcefit.inputs.table import BadInput
+from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.study.study import read_study
+
+LIGHT = settings(
+    max_examples=300,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+QUICK = settings(LIGHT, max_examples=60)
+TEXT = "\n".join([HEAD, *ROWS, ""])
+ODD_CELLS = st.one_of(
+    st.sampled_from([
+        "", " ", "nan", "inf", "-inf", "1e400", "1e-400", "1e99999", "-0", "0", "1",
+        "-1", "1_0", "1,5", "1.5", "1..5", "1e", "+", ".", "0x10", "1e15", "1e16",
+        "1e308", "5e-324", "9" * 500, "x" * 5000, '"', '""', '"a""b"', "a\nb", "\r",
+        "\x00", "\u2028", "١", "−1", "id", "m1", "q.one", "meas.tx", "cov.", "cov.x",
+        "sigma.tx", "pose.tx", "load.fz", "cov.time", "q.", "meas.", "q.tool",
+        '"0,001"', '"1,5"', '"1.000,5"', "1.000.000", "\ufeffid", "\ufeff", "\x00id",
+        "m1\x00", "\x1a", "\x7f", "$x$", "<b>", "1e15" * 9, "-" + "9" * 400,
+        "0." + "0" * 400 + "1", "9e9999", "1e15,1e15", '"m1', "\u00a0", "1\u00a0000",
+    ]),
+    st.floats().map(repr),
+    st.text(max_size=12),
+)  # fmt: skip
+PIECES = st.sampled_from([
+    b"", b"\x00", b"\xff", b"\r", b'"', b",", b";", b"\n", b"\n\n", b"9", b"-", b"e",
+    b"\xef\xbb\xbf", b"id,", b",,", b"\t", b"\xe2\x80\xa8", b"\r\n", b"\x00" * 64,
+    b"\xff\xfei\x00d\x00", b"\xe9", b"\xed\xa0\x80", b'"0,5"', b"1e400", b"9" * 400,
+    b"\x1a", b"# ", b"id,id,", b"m1,", b"[[", b"]]", b"inf", b"nan", b"-0.0",
+])  # fmt: skip
+STUDY_KEYS = (
+    "robot", "title", "output", "grid", "scales", "frames", "least", "most", "seed",
+    "signs", "source", "surface", "accuracy", "tx", "maps",
+)  # fmt: skip
+ODD_VALUES = (
+    "true", "-1", "0", "1", "1e308", "1e-320", "nan", "inf", "''", "' '", "'.'", "'/'",
+    "[]", "[1, 'a']", "[[1]]", "[[1], [2, 3]]", "[1, true]", "[nan]", "[1, 1]", "{}",
+    "[{}]", "{a = 1}", "[1e308, 1e-308]", "'tx=1:2:1e-300'", "'tx=nan'", "'tx=1,tx=2'",
+    "'=,='", "'tx'", "'tx=0:1e300:1'", "'tx=0,ty=0,tz=0,rx=0,ry=0,rz=0,q=0'",
+    "[-1, 2, 3, 4, 5, 6]", "9223372036854775807", "18446744073709551616", f"{10**400}",
+    "1979-05-27", "07:32:00", "'irsbot2'", "'$x$'", "'study.toml'", "'\\u0000'",
+    '"\\u0000"', '"\\u0001"', "['one', 'one']", "['one.two']", "['']",
+    "[0, 0, 0, 0, 0, 1e400]", f"'{'x' * 300}'", f"'{'x/' * 1000}'",
+    "[0, 0, 0, 0, 0, nan]", "'\U0001f600'", f"'{'x' * 5000}'", "[1.0, 1.0e-200]",
+)  # fmt: skip
+TOML = (
+    'robot = "robot.toml"\nmeasurements = "measurements.csv"\n'
+    'reference_point = [0, 0, 0]\nregistration = "known"\n'
+    f'{NOISE}[table]\ndelimiter = ","\n[units]\nposition = "m"\n'
+)
+
+
+def assert_one_line(error, folder):
+    """The only way out: one line that names a file of the folder."""
+    text = str(error)
+    assert text.startswith(str(folder))
+    assert all(c >= " " for c in text)
+    assert len(text) <= 800
+
+
+def assert_read_or_says_why(folder):
+    """A campaign is read whole and sound, or not at all."""
+    try:
+        campaign = read_campaign(folder)
+    except BadInput as error:
+        assert_one_line(error, folder)
+        return
+    cells = np.isfinite(campaign.measured)
+    assert cells.any(axis=1).all()
+    assert (campaign.sigma[cells] > 0).all()
+    assert np.isfinite(campaign.transforms).all()
+    assert np.isfinite(campaign.loads).all()
+    assert len(set(campaign.ids)) == len(campaign)
+
+
+@LIGHT
+@given(
+    changes=st.lists(
+        st.tuples(st.integers(0, 4), st.integers(0, 10), ODD_CELLS), max_size=3
+    ),
+    registration=st.sampled_from(["known", "unknown"]),
+)
+def test_a_table_with_odd_cells_is_read_or_one_line_says_why(
+    changes, registration, tmp_path
+):
+    table = [line.split(",") for line in TEXT.splitlines()]
+    for row, column, cell in changes:
+        table[row][column] = cell
+    head, *rows = (",".join(row) for row in table)
+    folder = write_campaign(
+        tmp_path, head, rows, toml={"registration": f'"{registration}"'}
+    )
+    assert_read_or_says_why(folder)
+
+
+@st.composite
+def garbled(draw, text):
+    """The bytes of a file, some of them removed, repeated or replaced."""
+    content = text.encode()
+    for _ in range(draw(st.integers(1, 4))):
+        start = draw(st.integers(0, max(0, len(content) - 1)))
+        stop = start + draw(st.integers(0, 40))
+        piece = content[start:stop]
+        new = draw(
+            PIECES
+            | st.just(piece * 2)
+            | st.text("0123456789.-e,; \n\"'[]={}#_m", max_size=6).map(str.encode)
+        )
+        content = content[:start] + new + content[stop:]
+    return content
+
+
+@LIGHT
+@given(content=garbled(TEXT))
+def test_a_table_of_garbled_bytes_is_read_or_one_line_says_why(content, tmp_path):
+    folder = write_campaign(tmp_path)
+    (folder / "measurements.csv").write_bytes(content)
+    assert_read_or_says_why(folder)
+
+
+@LIGHT
+@given(content=garbled(TOML))
+def test_a_campaign_file_of_garbled_bytes_is_read_or_one_line_says_why(
+    content, tmp_path
+):
+    folder = write_campaign(tmp_path)
+    (folder / "campaign.toml").write_bytes(content)
+    assert_read_or_says_why(folder)
+
+
+@QUICK
+@given(
+    bom=st.booleans(), end=st.sampled_from(["\n", "\r\n", "\r", "\n\n"]),
+    delimiter=st.sampled_from([",", ";", "\t", "|"]), quote=st.booleans(),
+    decimal=st.sampled_from([".", ","]), encoding=st.sampled_from(
+        ["utf-8", "latin-1", "utf-16", "utf-32"]),
+    declared=st.sampled_from(["", 'delimiter = ";"\n', 'delimiter = "tab"\n']),
+    comma=st.booleans(), columns=st.lists(st.integers(0, 10), max_size=2),
+    cut=st.integers(0, 12),
+)  # fmt: skip
+def test_a_table_of_any_dialect_is_read_or_one_line_says_why(
+    bom,
+    end,
+    delimiter,
+    quote,
+    decimal,
+    encoding,
+    declared,
+    comma,
+    columns,
+    cut,
+    tmp_path,
+):
+    """Line ends, marks, encodings, columns twice, a last row that is cut short."""
+    table = [line.split(",") for line in TEXT.splitlines()]
+    table = [[*row, *(row[k] for k in columns)] for row in table]
+    table[1][0] = "é1"
+    table[-1] = table[-1][: len(table[-1]) - cut]
+    cells = [[c.replace(".", decimal) if r else c for c in row]
+             for r, row in enumerate(table)]  # fmt: skip
+    if quote:
+        cells = [[f'"{c}"' for c in row] for row in cells]
+    text = end.join(delimiter.join(row) for row in cells) + end
+    said = f"[table]\n{declared}" + ('decimal = ","\n' if comma else "")
+    folder = write_campaign(tmp_path, extra=said)
+    content = ("\ufeff" * bom + text).encode(encoding, "replace")
+    (folder / "measurements.csv").write_bytes(content)
+    assert_read_or_says_why(folder)
+
+
+STUDY = """
+robot = "robot.toml"
+title = "a study"
+output = "out"
+grid = "tx=-0.1:0.1:0.1,tz=-0.5"
+scales = [1.0, 0.5]
+[errors]
+frames = ["one", "tool"]
+least = [0, 0, 0, 0, 0, 0]
+most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
+seed = 1
+signs = "literal"
+[links]
+source = "beam"
+surface = "robot.toml"
+base = "z=0"
+tip = "z=1"
+accuracy = 0.005
+[pose]
+tx = 0.0
+[checks]
+maps = true
+reference = false
+"""
+SOURCES = """
+[[errors]]
+frames = ["one", "tool"]
+distribution = "truncated"
+deviation = [0, 0, 0, 1e-5, 1e-5, 1e-5]
+most = [0, 0, 0, 3e-5, 3e-5, 3e-5]
+[[errors]]
+frames = ["two"]
+distribution = "uniform"
+most = [0, 0, 0, 0, 0, 2e-5]
+"""
+
+
+@QUICK
+@given(content=garbled(STUDY))
+def test_a_study_file_of_garbled_bytes_is_read_or_one_line_says_why(content, tmp_path):
+    write_campaign(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    try:
+        study = read_study(path)
+    except BadInput as error:
+        assert_one_line(error, tmp_path)
+        return
+    assert np.isfinite(study.robot.errors).all()
+    assert set(study.asked) <= set(study.checks)
+    assert not list(tmp_path.glob("out*"))
+
+
+@QUICK
+@given(
+    key=st.sampled_from(STUDY_KEYS),
+    value=st.sampled_from(ODD_VALUES),
+)
+def test_a_study_file_with_an_odd_value_is_read_or_one_line_says_why(
+    key, value, tmp_path
+):
+    write_campaign(tmp_path)
+    path = tmp_path / "study.toml"
+    pattern = rf"(?m)^{re.escape(key)} = .*$"
+    path.write_text(re.sub(pattern, lambda _: f"{key} = {value}", STUDY, count=1))
+    try:
+        read_study(path)
+    except BadInput as error:
+        assert_one_line(error, tmp_path)
+
+
+@QUICK
+@given(content=garbled(SOURCES))
+def test_a_file_of_errors_of_garbled_bytes_is_read_or_one_line_says_why(
+    content, tmp_path
+):
+    folder = write_campaign(tmp_path)
+    path = tmp_path / "errors.toml"
+    path.write_bytes(content)
+    robot = read_robot(folder / "robot.toml")
+    try:
+        sources = read_sources(path, robot)
+    except BadInput as error:
+        assert_one_line(error, tmp_path)
+        return
+    assert np.isfinite(sources.errors(sources.draw(0, 1, 1)[0])).all()
+
+
+@settings(LIGHT, max_examples=100)
+@given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
+def test_any_numbers_are_read_or_one_line_says_why(rows, tmp_path):
+    lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]
+    assert_read_or_says_why(write_campaign(tmp_path, HEAD, lines))
+
+
+def test_the_campaign_that_is_mangled_is_sound(tmp_path):
+    """Otherwise every mutation would stop at the same first mistake."""
+    folder = write_campaign(tmp_path)
+    (folder / "campaign.toml").write_text(TOML)
+    assert len(read_campaign(folder)) == 4

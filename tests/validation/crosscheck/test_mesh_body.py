@@ -1,0 +1,112 @@
+"""Solids in a floating frame: Exudyn condenses our matrix, and gets our K_E."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix, diags
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from forcefit.inputs.table import BadInput
+from stiffness.fem.condensation import condense
+from stiffness.fem.elements import assemble, isoparametric, lame
+from tests.solids_for_tests import box_solid
+from validation.crosscheck.crosscheck import crosscheck
+from validation.crosscheck.link_models import link_models
+from validation.multibody.exudyn_parts import MeshBody, Solid
+from validation.multibody.motion import placement
+from validation.multibody.simulation import simulate_assembly
+
+pytestmark = pytest.mark.exudyn
+
+SURFACE = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
+SIZE = np.array([0.03, 0.04, 0.2])  # m; the link runs along the mesh's z
+TURN = np.array([0.4, -0.3, 0.8])  # rad: mesh axes seen from the frame's
+
+
+@pytest.fixture(scope="module")
+def block():
+    """A slender box as a mesh body, and its K_E at the tip in the frame's axes."""
+    solid = box_solid((2, 2, 8), SIZE)
+    mesh = isoparametric(solid)
+    constants = np.array(lame(70e9, 0.33))[:, None] * np.ones(len(solid.cells))
+    centers = np.array([[*SIZE[:2] / 2, 0], [*SIZE[:2] / 2, SIZE[2]]])
+    upper = assemble(mesh, *constants)
+    turn = placement(TURN, np.zeros(3))[:3, :3]
+    meshed = Solid(
+        nodes=mesh.nodes,
+        stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
+        base=np.unique(mesh.faces[mesh.patch == 0]),
+        tip=np.unique(mesh.faces[mesh.patch == 1]),
+        centers=centers,
+    )
+    A = np.kron(np.eye(2), turn)
+    return MeshBody(meshed, turn), A @ condense(
+        mesh, *constants, centers
+    ).stiffness @ A.T
+
+
+def test_a_loaded_solid_deforms_by_our_stiffness(block):
+    """screw = K_E^-1 w and E = w K_E^-1 w / 2; 1e-6 rad is linear to 1e-6."""
+    body, K = block
+    frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
+    posture = home_posture(Robot("block", "tip", (frame,)))
+    wrench = np.array([0.03, -0.02, 0.01, 0.3, 0.2, -0.4])
+    answer = simulate_assembly(posture, load=wrench, meshes={"tip": body})
+    screw = np.linalg.solve(K, wrench)
+    scale = np.abs(screw[:3]).max() * np.array([1, 1, 1, 0.2, 0.2, 0.2])
+    assert 1e-7 < scale[0] < 1e-5
+    np.testing.assert_allclose(answer.link_screws[0] / scale, screw / scale, atol=1e-5)
+    assert answer.energy == pytest.approx(wrench @ screw / 2, rel=1e-5)
+    np.testing.assert_allclose(answer.link_wrenches[0], wrench, atol=1e-5 * 0.4)
+
+
+def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
+    """The same loop with the solid and with its K_E: the difference is of second order.
+
+    A tenth of the misfit, a hundredth of the difference.
+    """
+    body, K = block
+    error = np.array([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
+    frames = (
+        Frame("a", translation=[0.1, 0, 0], link=MatrixLink(K), geometric_error=error),
+        Frame("wall", translation=[0.3, 0, 0]),
+        Frame("b", "wall", translation=[-0.2, 0, 0], link=MatrixLink(K / 3)),
+    )
+    posture = home_posture(Robot("walls", "a", frames, (("a", "b"),)))
+    difference = []
+    for scale in (1.0, 0.1):
+        solid = simulate_assembly(posture, scale, meshes={"a": body})
+        spring = simulate_assembly(posture, scale)
+        gap = np.abs(solid.platform_screw - spring.platform_screw).max()
+        assert solid.energy == pytest.approx(spring.energy, rel=1e-2 * scale)
+        difference.append(gap)
+    assert difference[0] > 1e-9
+    assert np.log10(difference[0] / difference[1]) > 1.8
+
+
+@pytest.mark.slow
+def test_a_robot_of_meshed_links_passes_with_solids():
+    """From the surface file: K_E in the linear model, the solid in the simulation.
+
+    Both come from one mesh; what K_E is off the solid by is the sparse solver's
+    rounding, and a floating frame bends linearly about its base.
+    """
+    link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
+    error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
+    frames = (
+        Frame("a", translation=[0.452, 0, 0], link=link, geometric_error=error),
+        Frame("wall", translation=[0.5, 0.4, 0.2]),
+        Frame("b", "wall", translation=[-0.048, -0.4, -0.2],
+              link=BeamLink({"radius": 0.02}, 60e9, 0.3)),
+    )  # fmt: skip
+    posture = home_posture(Robot("meshed", "a", frames, (("a", "b"),)))
+    answer = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
+    assert answer.passed, answer.checks
+    assert max(check.value for check in answer.limits.values()) < 1e-3
+
+
+def test_an_unknown_kind_of_link_is_refused():
+    with pytest.raises(BadInput, match="found 'shell', expected one of beam, spring"):
+        link_models(Robot("one", "f", (Frame("f"),)), "shell")

@@ -1,0 +1,319 @@
+"""Clearances as contact: closed forms, and the linear model's cones."""
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from assembly.robots import load_robot
+from validation.crosscheck.playcheck import playcheck
+from validation.crosscheck.verdict import verdict
+from validation.multibody.contact import (
+    Cone,
+    Play,
+    cone_energy,
+    cone_pushes,
+    joint_play,
+)
+from validation.multibody.exudyn_parts import OutOfTime
+from validation.multibody.simulation import simulate_assembly
+
+pytestmark = pytest.mark.exudyn
+
+E, NU = 60e9, 0.3
+ROUND = BeamLink({"radius": 0.04}, E, NU)
+AREA, SECOND = math.pi * 0.04**2, math.pi * 0.04**4 / 4
+DISC = Cone((3, 4), 3e-5, 1e12)
+
+
+def coaxial(error, clearance, length=0.4):
+    """Two beams that miss each other by an error, one of them with play at its end."""
+    frames = (
+        Frame("a", translation=[length, 0, 0], rotation=[0, math.pi / 2, 0],
+              link=ROUND, geometric_error=error, clearance=clearance),
+        Frame("a_tip", "a", rotation=[0, -math.pi / 2, 0]),
+        Frame("wall", translation=[2 * length, 0, 0]),
+        Frame("b", "wall", translation=[-length, 0, 0], link=ROUND),
+    )  # fmt: skip
+    return home_posture(Robot("coaxial", "a_tip", frames, (("a_tip", "b"),)))
+
+
+def push(cone, screw, width):
+    """(6,) all that a contact pushes with."""
+    wrench = np.zeros(6)
+    for row, value in cone_pushes(cone, screw, width):
+        wrench[row] += value
+    return wrench
+
+
+@pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
+def test_the_push_is_the_gradient_of_the_energy(arm):
+    """Central differences of half a nanometre; inside, at the bound, outside.
+
+    With an arm of 40 mm a pin tilted by r / arm touches as one shifted by r does.
+    """
+    disc = replace(DISC, arm=arm)
+    unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
+    for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
+        for width in (3.0, 1e-2):
+            screw = np.array([0.1, -0.2, 0.3, 0.6, 0.8, 0.4]) * r / unit
+            for k in range(6):
+                step = 5e-10 / unit[k] * np.eye(6)[k]
+                more = cone_energy(disc, screw + step, width)
+                less = cone_energy(disc, screw - step, width)
+                slope = (more - less) / (1e-9 / unit[k])
+                scale = disc.stiffness * disc.size * unit[k]
+                found = push(disc, screw, width)[k]
+                assert found == pytest.approx(slope, abs=2e-5 * scale)
+
+
+def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
+    """k (r - c) at first order; c is 30 um, r - c a hundredth of it."""
+    assert push(DISC, [0, 0, 0, 1e-5, 0, 0], 1e-4)[3] < 1e-6 * 1e12 * 3e-5
+    outside = push(DISC, [0, 0, 0, 0, 3.03e-5, 0], 1e-4)
+    assert outside[3] == 0.0
+    assert outside[4] == pytest.approx(1e12 * 3e-7, rel=0.02)
+
+
+def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
+    """Tilted by c / h it just touches both, shifted by c too; both at once presses.
+
+    At z = h the axis is at (TX + h RY, TY - h RX).
+    """
+    play = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
+    bushes = joint_play(Frame("f", clearance=play), bushes=True)
+    assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
+        ((5,), 1e-5, 0.0), ((3, 4), 3e-5, 0.04), ((3, 4), 3e-5, -0.04)
+    ]  # fmt: skip
+    assert bushes.loose == (0, 1, 3, 4, 5)
+    _, far, near = bushes.cones
+    tilted = [0, 7.5e-4, 0, 0, 0, 0]
+    assert far.offsets(tilted) == pytest.approx([3e-5, 0])
+    assert near.offsets(tilted) == pytest.approx([-3e-5, 0])
+    both = push(far, [0, 7.5e-4, 0, 3e-5, 0, 0], 1e-4)
+    assert both[3] > 0
+    assert both[1] == pytest.approx(0.04 * both[3])
+
+
+def test_a_joints_play_follows_the_format():
+    """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
+    play = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
+    fixed = joint_play(Frame("f", clearance=play), scale=0.5)
+    assert [(c.rows, c.size) for c in fixed.cones] == [
+        ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
+    ]  # fmt: skip
+    assert fixed.free == ()
+    pin = Frame("p", joint="revolute", clearance=replace(play, spin=None))
+    assert joint_play(pin).free == (2,)
+    assert sorted(joint_play(pin).loose) == [0, 1, 2, 3, 4]
+    slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
+    assert [c.rows for c in joint_play(slide).cones] == [(3, 4), (5,)]
+    assert joint_play(Frame("none")) == Play((), ())
+
+
+@pytest.mark.parametrize("misfit", [5e-5, 1e-4])
+def test_axial_play_is_taken_off_the_misfit(misfit):
+    """E = (g - c)^2 EA / 2(2L), c = 30 um; play is along the joint's z.
+
+    A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
+    correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
+    """
+    stiffness = E * AREA / 0.8
+    answer = simulate_assembly(
+        coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)), clearances=True
+    )
+    expected = (misfit - 3e-5) ** 2 * stiffness / 2
+    allowed = 2 * 9e-9 / (misfit - 3e-5)
+    assert answer.rigid_energy == pytest.approx(expected, rel=allowed)
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.05])
+def test_a_slow_simulation_ends_in_time_and_says_so(pause, monkeypatch):
+    """Slow by itself, and slow although the processor sleeps: bounded by the clock.
+
+    Unbounded, 0.05 s at each of some 3000 calls of the contact are minutes.
+    """
+    import validation.multibody.exudyn_model
+
+    def slowly(*args):
+        time.sleep(pause)
+        return cone_pushes(*args)
+
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", slowly)
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5, radial=1e-5))
+    limit = 0.3 if pause else 0.03
+    started = time.monotonic()
+    with pytest.raises(OutOfTime, match="time limit was reached while") as error:
+        simulate_assembly(posture, clearances=True, time_limit=limit)
+    assert time.monotonic() - started < limit + 1.0
+    assert error.value.robot == "coaxial"
+
+
+def test_a_time_limit_stays_with_its_simulation():
+    """Exudyn's timer is one for all models: the next one has its own."""
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
+    with pytest.raises(OutOfTime):
+        simulate_assembly(posture, clearances=True, time_limit=1e-3)
+    assert simulate_assembly(posture, clearances=True).rigid_energy > 0
+
+
+def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
+    """Exudyn makes an error of its own of Ctrl-C; it must not be tried again."""
+    import validation.multibody.exudyn_model
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", interrupted)
+    posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
+    with pytest.raises(KeyboardInterrupt):
+        simulate_assembly(posture, clearances=True)
+
+
+def test_play_swallows_a_smaller_misfit():
+    """A lateral misfit of 20 um inside a disc of 30 um: nothing presses."""
+    tight = coaxial([0, 0, 0, 2e-5, 0, 0], None)
+    loose = coaxial([0, 0, 0, 2e-5, 0, 0], Clearance(radial=3e-5))
+    free = simulate_assembly(loose, clearances=True)
+    assert free.rigid_energy < 1e-5 * simulate_assembly(tight).energy
+    assert np.linalg.norm(free.clearance_screws[0, 3:5]) < 3e-5
+
+
+@pytest.fixture(scope="module")
+def irsbot2():
+    """Errors of the paper's size, all positive."""
+    robot = load_robot("irsbot2")
+    rng = np.random.default_rng(3)
+    errors = np.zeros((len(robot.frames), 6))
+    erring = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
+    for i, frame in enumerate(robot.frames):
+        if frame.name.split(".")[-1] in erring:
+            errors[i] = rng.uniform(0, 1, 6) * ([2e-2] * 3 + [2e-4] * 3)
+    return robot.with_errors(errors)
+
+
+@pytest.mark.slow
+def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
+    """Within 2 per cent at no error; the optimality gap falls with the square."""
+    answer = playcheck(place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25))
+    assert answer.passed, answer.checks
+    # contacts of 1e9 N m/rad yield 4e-4 of what links of 1e6 N m/rad do
+    assert answer.limits["spring deformation"].value < 5e-3
+    assert answer.gaps[0] > answer.gaps[1] > answer.gaps[2] > 0
+
+
+def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
+    """Contacts against cones, springs as links, at the paper's full errors.
+
+    Contacts leave 0.3 per cent at most; the linear energy is off by several.
+    """
+    posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
+    answer = playcheck(posture, (1.0, 0.5), links="spring")
+    assert answer.passed, answer.checks
+    assert abs(answer.energies["exact"][0]) < 3e-3
+    assert abs(answer.energies["linear"][0]) > 1e-2
+
+
+@pytest.mark.slow
+def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
+    """Clearances a fifth larger in the linear model move its least energy."""
+    import assembly.linear.closure
+    import validation.crosscheck.playcheck
+
+    right = assembly.linear.closure.clearance_bounds
+    monkeypatch.setattr(
+        assembly.linear.closure, "clearance_bounds", lambda *args: 1.2 * right(*args)
+    )
+    monkeypatch.setattr(
+        validation.crosscheck.playcheck, "exact_answer", lambda *_: None
+    )
+    posture = place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
+    assert not playcheck(posture, (0.5, 0.25)).passed
+
+
+def heavy(length=0.4):
+    """Two beams of 4 kg and 6 kg bodies, 60 um off, one end with play of 20 um."""
+    frames = coaxial(
+        [0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5), length
+    ).robot.frames
+    frames = tuple(
+        replace(
+            f, link=replace(f.link, density=2000.0), mass=6.0,
+            centre_of_mass=[0.0, 0.01, 0.02],
+        ) if f.link is not None else f
+        for f in frames
+    )  # fmt: skip
+    return home_posture(Robot("heavy", "a_tip", frames, (("a_tip", "b"),)))
+
+
+@pytest.mark.parametrize("links", ["beam", "spring"])
+def test_weight_acts_beside_play(links):
+    """A hundredfold weight takes up what the play leaves: energy, springs, gap hold.
+
+    With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
+    """
+    answer = playcheck(heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0])
+    assert answer.passed, answer.text()
+    assert abs(answer.energies["exact"][0]) < 0.02
+    assert (answer.pairs[0].between > 0) == (links == "beam")
+    light = playcheck(heavy(), (1.0, 0.5), links=links)
+    ratio = answer.pairs[0].linear.energy / light.pairs[0].linear.energy
+    assert abs(ratio - 1) > 0.1
+
+
+def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
+    """Five per cent too heavy in the linear model."""
+    import assembly.linear.energy
+
+    right = assembly.linear.energy.weights
+    monkeypatch.setattr(
+        assembly.linear.energy, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
+    )
+    answer = playcheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0])
+    assert not answer.passed
+
+
+def drawn(name, size, pose=None):
+    """A built-in robot with random errors of a millirad and a tenth of a millimetre."""
+    robot = load_robot(name)
+    sources = tolerance_sources(robot, size * np.array([1e-3] * 3 + [1e-4] * 3))
+    errors = sources.errors(sources.draw(0, 1, seed=7))[0]
+    posture = home_posture(robot) if pose is None else place_robot(robot, pose)
+    return replace(posture, robot=robot.with_errors(errors))
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "pose", "said"),
+    [("hexapod", 1.0, None, "no signal"), ("delta", 1.0, None, "no signal"),
+     ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed")],
+)  # fmt: skip
+def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
+    """No load, and errors within the play: any place in the valley, and no energy.
+
+    That says something of the overconstrained robot only: the others close without
+    energy whatever their play.
+    """
+    answer = playcheck(drawn(name, size, pose), (1.0, 0.5))
+    assert answer.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
+    assert answer.pairs[0].simulated.energy < 1e-8
+    assert verdict(answer) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "load"),
+    [("hexapod", [0, 0, 0, 0, 0, -200]), ("delta", [0, 0, 0, 0, 0, -50]),
+     ("five_bar", [0, 0, 0, 0, -20, 0])],
+)  # fmt: skip
+def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):
+    """Without errors, closing costs nothing: the reference is the load's energy.
+
+    Parts of the five-bar stay loose under its load.
+    """
+    answer = playcheck(home_posture(load_robot(name)), (1.0, 0.5), load=load)
+    assert answer.passed
+    assert 0 <= answer.gaps[0] < 0.02

@@ -1,0 +1,148 @@
+"""Scales enough to tell: no false alarm on few, no escape for a wrong term."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from validation.crosscheck.limits import fit_slope, limit_difference, slope_check
+from validation.crosscheck.verdict import Check, compare_scales, verdict
+
+
+@dataclass
+class Scale:
+    """In place of a pair of answers: two numbers at a scale."""
+
+    scale: float
+    ours: float
+    theirs: float
+
+
+@dataclass
+class Found:
+    """In place of a comparison: one limit, one slope."""
+
+    pairs: tuple
+    asked: int
+    checks: dict = field(init=False)
+
+    def __post_init__(self):
+        s = np.array([p.scale for p in self.pairs])
+        ours = np.array([p.ours for p in self.pairs])
+        theirs = np.array([p.theirs for p in self.pairs])
+        self.checks = {
+            "limit": limit_difference(s, ours, theirs, 1, 1e-12),
+            "slope": slope_check(s, np.abs(theirs - ours), 1e-12, 2.0, 0.1),
+        }
+
+
+def compared(scales, wrong, second=0.05, third=0.03):
+    """Ours s, theirs (1 + wrong) s + second s^2 + third s^3: a robot at full errors."""
+
+    def solve(s):
+        return Scale(s, s, (1 + wrong) * s + second * s**2 + third * s**3)
+
+    return compare_scales(scales, solve, Found)
+
+
+def test_two_scales_of_a_right_model_are_not_held_against_it():
+    """Slope 2.17 and limit 0.015 on the two scales alone; two halves more tell."""
+    s = np.array([1.0, 0.5])
+    assert abs(fit_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
+    answer = compared((1.0, 0.5), wrong=0.0)
+    assert verdict(answer) == "passed"
+    assert answer.asked == 2
+    assert [p.scale for p in answer.pairs] == [1, 0.5, 0.25, 0.125][: len(answer.pairs)]
+    assert len(answer.pairs) > 2
+
+
+@pytest.mark.parametrize("wrong", [0.003, -0.003, 0.02, -0.05])
+@pytest.mark.parametrize("scales", [(1.0, 0.5), (1.0, 0.7), (2.0, 1.0, 0.5)])
+def test_a_wrong_term_of_three_thousandths_is_found_on_few_scales(wrong, scales):
+    """Two scales alone leave its limit open by 0.05; it stays when they are halved."""
+    assert verdict(compared(scales, wrong)) == "failed"
+
+
+def test_a_wrong_term_does_not_hide_behind_the_second_order():
+    """At s = 0.5 it is exactly undone by it: -0.025 s + 0.05 s^2."""
+    assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
+
+
+def test_enough_scales_are_left_as_they_are():
+    answer = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
+    assert len(answer.pairs) == 4
+    assert verdict(answer) == "passed"
+
+
+def test_what_six_scales_do_not_tell_is_said():
+    """A check that is never known better than to twice its bound."""
+
+    class Vague(Found):
+        def __post_init__(self):
+            self.checks = {"vague": Check(0.5, 1.0, 2.0)}
+
+    answer = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Vague)
+    assert len(answer.pairs) == 6
+    assert verdict(answer) == "not decided"
+
+
+def test_nothing_but_noise_neither_fails_nor_passes():
+    """Simulations resolve a hundredth of the floor; the extrapolation makes 15 of 1."""
+
+    def solve(s):
+        return Scale(s, 0.0, 1e-14)
+
+    answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
+    assert [check.verdict for check in answer.checks.values()] == ["no signal"] * 2
+    assert verdict(answer) == "no signal"
+    assert len(answer.pairs) == 4
+
+
+def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
+    """Ours is zero: a signal in the other is a difference, however small ours is."""
+
+    def solve(s):
+        return Scale(s, 0.0, 1e-6 * s)
+
+    answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
+    assert answer.checks["limit"].verdict == "fails"
+    assert verdict(answer) == "failed"
+
+
+def test_no_checks_at_all_do_not_pass():
+    class Empty(Found):
+        def __post_init__(self):
+            self.checks = {}
+
+    answer = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
+    assert verdict(answer) == "no signal"
+
+
+def test_a_value_that_is_not_a_number_is_not_known():
+    assert Check(np.nan, 1.0).verdict == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("check", "expected"),
+    [
+        (Check(0.5, 1.0), "ok"),
+        (Check(1.5, 1.0), "fails"),
+        (Check(1.5, 1.0, 0.4), "fails"),
+        (Check(1.5, 1.0, 0.6), "undecided"),
+        (Check(0.5, 1.0, 2.0), "undecided"),
+        (Check(0.5, 1.0, 1.0), "ok"),
+        (Check(0.5, 1.0, signal=False), "no signal"),
+        (Check(np.nan, 1.0, signal=False), "no signal"),
+        (Check(1.5, 1.0, signal=False), "fails"),
+        (Check(0.5, 1.0, 2.0, signal=False), "undecided"),
+    ],
+)
+def test_a_check_knows_what_it_does_not_know(check, expected):
+    assert check.verdict == expected
+
+
+@pytest.mark.parametrize("scales", [(1.0,), (1.0, 1.0), (1.0, -0.5), (1.0, np.inf)])
+def test_scales_that_tell_nothing_are_refused(scales):
+    with pytest.raises(BadInput, match="at least two different factors > 0"):
+        compared(scales, 0.0)

@@ -1,0 +1,262 @@
+"""Registration, refit and the next measurement, on a bar whose answers are known."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+from scipy.stats import binom
+
+from assembly.effects.effect import Unknown
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.inputs.table import BadInput
+from tests.planar_arm_for_tests import SIGMA
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.next_measurement import next_measurement
+from validation.diagnosis.refit import refit
+from validation.diagnosis.registration import register
+from validation.diagnosis.signatures import conditions_of
+
+LENGTH = 0.8
+
+
+def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
+        **covariates):  # fmt: skip
+    """A drive about z and a bar along x, at ``rows`` angles; readings, or zeros."""
+    robot = Robot("bar", "tip", (
+        Frame("drive", joint="revolute", actuated=True, joint_stiffness=spring),
+        Frame("tip", "drive", [LENGTH, 0, 0], link=link),
+    ))  # fmt: skip
+    placed = [
+        place_robot(robot, joints={"drive": q}) for q in np.linspace(0, spread, rows)
+    ]
+    return Campaign(
+        name="bar", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
+        commanded="joints",
+        loads=np.zeros((rows, 6)) if load is None else np.tile(load, (rows, 1)),
+        measured=np.zeros((rows, 6)) if measured is None else measured,
+        sigma=np.tile(SIGMA, (rows, 1)), covariates=covariates,
+        reference_point=np.zeros(3), registration="known",
+        configuration=np.arange(rows), repeat=np.arange(rows),
+    )  # fmt: skip
+
+
+def along(campaign):
+    """(R, 3) direction of the bar."""
+    q = campaign.coordinates[:, 0]
+    return np.column_stack([np.cos(q), np.sin(q), 0 * q])
+
+
+# registration
+
+
+@pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
+@pytest.mark.parametrize("cells", ["all", "points", "one rotation"])
+def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
+    """p' = R p + t and R' = R, noise-free: 1 rad and 3 m, by points or by rotations."""
+    campaign = bar()
+    R, t = Rotation.from_rotvec(turn), np.array([2.0, -2.0, 1.0])
+    p = LENGTH * along(campaign)
+    seen = np.hstack([np.tile(turn, (8, 1)), R.apply(p) + t - p])
+    if cells == "points":
+        seen[:, :3] = np.nan
+    if cells == "one rotation":
+        seen[1:, :3] = np.nan
+    campaign = bar(measured=seen)
+    found = register(campaign, conditions_of(campaign))
+    assert found.base[:3] == pytest.approx(turn, abs=1e-9)
+    assert found.base[3:] == pytest.approx(t, abs=1e-9)
+
+
+def test_a_device_that_cannot_be_located_is_said():
+    """Two positions, and no rotation."""
+    seen = np.zeros((2, 6))
+    seen[:, :3] = np.nan
+    campaign = bar(measured=seen, rows=2)
+    with pytest.raises(BadInput, match="registration is unknown, and there are no"):
+        register(campaign, conditions_of(campaign))
+
+
+# refit
+
+
+def hypothesis(effect, frame, name, unknown):
+    return Hypothesis(effect, (frame,), (Slot((name,), unknown, unknown.start),))
+
+
+BEAM = BeamLink({"radius": 0.03}, 70e9, 0.33)
+LONGER = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4))
+WARMER = hypothesis("thermal_expansion", "tip", "tip", Unknown("", 1e-5, -5e-4, 5e-4))
+TURNED = hypothesis("encoder_offset", "drive", "drive", Unknown("", 1e-4))
+ECCENTRIC = hypothesis(
+    "encoder_eccentricity", "drive", "drive.cosine", Unknown("cosine", 1e-4)
+)
+SOFTER = hypothesis(
+    "drive_compliance", "drive", "drive.compliance", Unknown("compliance", 1e-6, 0, 1)
+)
+
+
+def test_a_length_is_the_mean_of_the_readings_along_the_bar():
+    """And its standard deviation sigma / sqrt(R): rotations have no say."""
+    plain = bar(link=BEAM)
+    noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
+    seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
+    campaign = bar(link=BEAM, measured=seen)
+    fit = refit(campaign, conditions_of(campaign), [LONGER], np.zeros(1))
+    ((name, value, std),) = fit.parameters(0)
+    assert name == "tip"
+    mean = np.einsum("ri,ri->r", seen[:, 3:], along(plain)).mean()
+    assert value == pytest.approx(mean, rel=1e-7)
+    assert std == pytest.approx(SIGMA[3] / np.sqrt(8), rel=1e-6)
+    assert fit.rss == pytest.approx(
+        np.sum(((seen - fit_of(campaign, value)) / SIGMA) ** 2)
+    )
+
+
+def fit_of(campaign, longer):
+    return np.hstack([np.zeros((len(campaign), 3)), longer * along(campaign)])
+
+
+def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
+    """Turn M/k and arc M L/k in every row; std k = k^2 std(1/k)."""
+    M, k = 30.0, 2e5
+    plain = bar()
+    across = np.cross([0, 0, 1], along(plain))
+    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
+    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    fit = refit(campaign, conditions_of(campaign), [SOFTER], np.array([1e-6]))
+    ((name, value, std),) = fit.parameters(0)
+    assert name == "drive"
+    assert value == pytest.approx(k, rel=1e-4)  # arcs are chords to first order
+    J = 8 * ((M / SIGMA[2]) ** 2 + (M * LENGTH / SIGMA[3]) ** 2)
+    assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    """One standard deviation in 68 %, of 60 campaigns."""
+    rng = np.random.default_rng(8)
+    inside = 0
+    shape = fit_of(bar(link=BEAM), 2e-5)
+    here = conditions_of(bar(link=BEAM))
+    for _ in range(60):
+        campaign = bar(link=BEAM, measured=shape + rng.normal(size=(8, 6)) * SIGMA)
+        ((_, value, std),) = refit(campaign, here, [LONGER], np.zeros(1)).parameters(0)
+        inside += abs(value - 2e-5) < std
+    assert 1e-3 < binom.cdf(inside, 60, 0.6827) < 1 - 1e-3
+
+
+def test_a_drive_that_turns_against_its_load_is_rigid():
+    """The compliance stays at its bound."""
+    M = 30.0
+    seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
+    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    fit = refit(campaign, conditions_of(campaign), [SOFTER], np.array([1e-6]))
+    assert fit.values == pytest.approx([0.0], abs=1e-9)
+    assert fit.effects == {"drive_compliance": {}}
+    assert fit.parameters(0) == []
+
+
+def test_an_offset_beside_finite_motions_is_exact():
+    """The drive turns by a where K (a - e) = F L cos(q + a), far from straight."""
+    K, F, e = 2e3, 150.0, 4e-3
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * (a - e) - F * LENGTH * np.cos(b + a), -1, 1)
+        for b in q
+    ])
+    seen = np.zeros((8, 6))
+    seen[:, 2] = turn
+    seen[:, 3] = LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] = LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, spring=spring)
+    here = conditions_of(campaign)
+    finite = Hypothesis("geometric_stiffening", (), ())
+    fit = refit(campaign, here, [TURNED, finite], np.zeros(1))
+    assert fit.values == pytest.approx([e], rel=1e-4)
+    assert np.abs(fit.residual).max() < 0.5  # sigma
+    assert fit.conditions.exact
+    linear = refit(campaign, here, [TURNED], np.zeros(1))
+    assert abs(linear.values[0] - e) > 1e-4
+
+
+# the measurement that would decide
+
+
+def test_another_temperature_tells_heat_from_length():
+    """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
+
+    R readings at T leave the length sigma^2 / R and the expansion that much over
+    (L T)^2; at T + 10 K the latter is open by ((T + 10) / T)^2 / R.
+    """
+    R, T, alpha = 8, 5.0, 2e-5
+    heat = {"temperature": np.full(R, T)}
+    plain = bar(link=BEAM, **heat)
+    campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
+    here = conditions_of(campaign)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    # a rival that is the fit itself, or nothing else, cannot be told from it
+    found = next_measurement(campaign, here, longer, [longer, warmer])
+    assert found.covariates == {"temperature": T + 10}
+    d = alpha * LENGTH * 10 / SIGMA[3]
+    assert found.power == pytest.approx(d**2 / (1 + ((T + 10) / T) ** 2 / R), rel=1e-3)
+    assert set(found.configuration) == {"q.drive"}
+    assert "link_length and thermal_expansion" in found.why
+
+
+def test_nothing_decides_between_one_explanation_and_itself():
+    campaign = bar(link=BEAM)
+    here = conditions_of(campaign)
+    fit = refit(campaign, here, [LONGER], np.zeros(1))
+    assert next_measurement(campaign, here, fit, [fit]) is None
+
+
+def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
+    """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
+
+    Between, they differ by e (1 - cos q) in the direction of either, of information
+    I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
+    """
+    e = 3e-4
+    seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
+    campaign = bar(rows=2, spread=2 * np.pi, measured=seen)
+    here = conditions_of(campaign)
+    turned = refit(campaign, here, [TURNED], np.zeros(1))
+    eccentric = refit(campaign, here, [ECCENTRIC], np.zeros(1))
+    found = next_measurement(campaign, here, turned, [eccentric])
+    q = found.configuration["q.drive"]
+    assert abs(q - np.pi) < 0.2
+    information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
+    power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
+    assert found.power == pytest.approx(power, rel=1e-3)
+
+
+# finite motions on request
+
+
+def test_what_finite_motions_explain_needs_no_effect_once_they_are_declared():
+    """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
+    K, F, rows = 2e3, 150.0, 20
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * a - F * LENGTH * np.cos(b + a), -1, 1) for b in q
+    ])
+    seen = np.random.default_rng(5).normal(size=(rows, 6)) * SIGMA
+    seen[:, 2] += turn
+    seen[:, 3] += LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] += LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, rows=rows, spring=spring)
+    linear, finite = diagnose(campaign), diagnose(campaign, finite=True)
+    assert (linear.verdict, linear.claimed) == ("explained", ("geometric_stiffening",))
+    assert finite.verdict == "none_needed"
+    assert finite.before.normalised == pytest.approx(1.0, abs=0.4)
+    assert linear.before.normalised > 10

@@ -1,0 +1,85 @@
+"""Angles between signatures, against planes whose angles are known."""
+
+import numpy as np
+import pytest
+
+from validation.diagnosis.separability import compare_signatures
+
+
+def columns(*vectors):
+    return 10 * np.array(vectors, dtype=float).T
+
+
+def test_an_angle_is_the_angle():
+    """60 degrees between two lines in a plane."""
+    found = compare_signatures({
+        "a": columns([1, 0, 0]), "b": columns([0.5, np.sqrt(0.75), 0])
+    })  # fmt: skip
+    np.testing.assert_allclose(found.cosine, [[1, 0.5], [0.5, 1]], atol=1e-14)
+    np.testing.assert_allclose(found.shared, [[1, 0.5], [0.5, 1]], atol=1e-14)
+    np.testing.assert_allclose(found.strength, [10, 10])
+    assert found.classes() == found.imitated() == found.overlapping() == []
+
+
+def test_planes_that_share_a_line_overlap_and_a_line_in_a_plane_is_imitated():
+    """Half of the square of (e1, e2) is in the plane (e1, e3)."""
+    found = compare_signatures({
+        "plane": columns([1, 0, 0], [0, 1, 0]),
+        "other": columns([1, 0, 0], [0, 0, 1]),
+        "line": columns([1, 1, 0]),
+    })  # fmt: skip
+    assert found.cosine[0, 1] == pytest.approx(1)
+    assert found.shared[0, 1] == pytest.approx(np.sqrt(0.5))
+    assert found.shared[2, 0] == pytest.approx(1)
+    assert found.imitated() == [("line", "plane")]
+    assert found.overlapping() == [("plane", "other")]
+    assert found.classes() == []
+
+
+def test_what_is_the_same_is_a_class_whatever_its_columns(rng):
+    A = rng.normal(size=(50, 3))
+    found = compare_signatures({
+        "a": A, "b": A @ rng.normal(size=(3, 3)), "c": rng.normal(size=(50, 3))
+    })  # fmt: skip
+    assert found.classes() == [("a", "b")]
+    np.testing.assert_array_equal(found.rank, [3, 3, 3])
+
+
+def test_nuisances_take_what_they_can_imitate(rng):
+    """Without the common column the two are at right angles, and a third is gone."""
+    out = rng.normal(size=(40, 2))
+    Q, _ = np.linalg.qr(np.column_stack([out, rng.normal(size=(40, 2))]))
+    found = compare_signatures(
+        {
+            "a": 30 * Q[:, [2]] + 400 * Q[:, [0]],
+            "b": 30 * Q[:, [3]] + 400 * Q[:, [0]],
+            "gone": 500 * out,
+        },
+        out,
+    )
+    assert found.cosine[0, 1] == pytest.approx(0, abs=1e-12)
+    np.testing.assert_allclose(found.left[:2], 30 / np.hypot(30, 400))
+    assert found.left[2] < 1e-12
+    np.testing.assert_array_equal(found.rank, [1, 1, 0])
+    np.testing.assert_array_equal(found.visible, [True, True, False])
+
+
+def test_what_is_too_small_to_be_seen_may_be_larger_than_thought(rng):
+    """2 sigma in all rows together does not show; a twin it is at any size."""
+    line = rng.normal(size=(30, 1))
+    line /= np.linalg.norm(line)
+    found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
+    np.testing.assert_array_equal(found.visible, [False, True, False])
+    np.testing.assert_array_equal(found.traced, [True, True, False])
+    np.testing.assert_allclose(found.shows_at, [1.5, 0.06, np.inf])
+    assert found.classes() == [("a", "b")]
+
+
+def test_unknowns_that_do_the_same_are_counted_once():
+    found = compare_signatures({"a": columns([1, 0, 0], [2, 0, 0], [0, 0, 0])})
+    assert found.unknowns[0] == 3
+    assert found.rank[0] == 1
+
+
+def test_nothing_to_compare_is_no_mistake():
+    assert compare_signatures({}).classes() == []

@@ -1,0 +1,77 @@
+"""The diagnosis of simulated machines: every effect of the library, and two at once."""
+
+import numpy as np
+import pytest
+
+from assembly.model.robot import BeamLink, Frame, Robot
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis import diagnose
+from validation.synthetic.design import Design
+from validation.synthetic.effects import LIBRARY
+from validation.synthetic.equivalents import SAME, alternatives
+from validation.synthetic.generator import generate_campaign, write_campaign
+
+SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
+TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
+DESIGN = Design(configurations=16, rows=80, load=40.0, reach=0.8)
+WIDE = {"geometric_stiffening": 30.0}  # needs larger errors to show
+
+
+def arm(wider=1.0):
+    """Three elastic drives, none parallel to the next, and two tubes."""
+    rng = np.random.default_rng(1)
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    frames = (
+        Frame("j1", **turning),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=TUBE, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], link=TUBE, **turning),
+        Frame("tool", "j3", [0.3, 0.05, 0.1], link=TUBE, mass=0.8),
+    )
+    errors = rng.uniform(-1, 1, (4, 6)) * np.repeat([1e-4, 5e-5], 3) * wider
+    return Robot("arm", "tool", frames).with_errors(errors)
+
+
+def understood(wanted, seed, tmp_path):
+    """Diagnosis of a fresh campaign, and the sets that its truth allows."""
+    robot = arm(max(WIDE.get(name, 1.0) for name in wanted))
+    made = generate_campaign(
+        robot, wanted, DESIGN, seed=seed, program="springs",
+        reference_point=[0.02, 0.05, 0.03],
+    )  # fmt: skip
+    write_campaign(made, tmp_path / "campaign")
+    same = [one for one in alternatives(made, len(wanted)) if one.left < SAME]
+    allowed = {tuple(sorted(n.partition("(")[0] for n in one.names)) for one in same}
+    found = diagnose(read_campaign(tmp_path / "campaign"))
+    return found, allowed | {tuple(sorted(wanted))}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LIBRARY)
+def test_every_effect_is_found_at_five_times_the_noise(name, tmp_path):
+    """Or a set that the simulation's side says is the same within the noise."""
+    found, allowed = understood({name: 5.0}, 4, tmp_path)
+    if found.verdict == "ambiguous":
+        assert len(allowed) > 1
+        assert {names for names, _ in found.alternatives[:4]} & allowed
+        return
+    assert found.verdict == "explained"
+    assert found.claimed in allowed
+    kept = 6 * int((~found.split.fitted).sum())
+    assert found.after.normalised < 1 + 3 / np.sqrt(2 * kept)
+    assert found.before.normalised > 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {"self_weight": 5.0, "encoder_offset": 4.0},
+        {"thermal_expansion": 4.0, "friction_hysteresis": 4.0},
+        {"load_gain": 5.0, "drift": 3.0},
+    ],
+    ids="+".join,
+)
+def test_two_effects_are_found(wanted, tmp_path):
+    found, allowed = understood(wanted, 5, tmp_path)
+    assert found.verdict == "explained"
+    assert found.claimed in allowed

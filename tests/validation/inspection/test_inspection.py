@@ -1,0 +1,284 @@
+"""What a design can and cannot tell, said of designs made to be so."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.inspection.counts import correlation
+from validation.inspection.design_remarks import remarks_on
+from validation.inspection.design_signatures import design_signatures
+from validation.inspection.inspection import inspect_campaign
+from validation.inspection.measuring_order import revisits
+from validation.inspection.repeats import repeat_noise
+
+BEAM = "link = { beam = { radius = 0.03 }, young = 7e10, poisson = 0.3 }\n"
+ELASTIC = ARM.replace(
+    "translation = [1.0, 0, 0]\n", f"translation = [1.0, 0, 0]\n{BEAM}"
+)
+ELASTIC = ELASTIC.replace("[0.8, 0, 0]\n", f"[0.8, 0, 0]\n{BEAM}")
+CELLS = ("rx", "ry", "rz", "tx", "ty", "tz")
+HEAD = ",".join([
+    "id", "q.one", "q.two", "load.fy", "load.fz", *(f"meas.{c}" for c in CELLS),
+    "cov.temperature", "cov.time", "cov.approach",
+])  # fmt: skip
+
+
+def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
+    """Twelve configurations of an elastic arm under two loads, each twice; noise.
+
+    ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device stands.
+    """
+    q = rng.uniform(-1, 1, (12, 2)) + [0.0, 1.2]
+    lines = []
+    for i, kind in enumerate(np.concatenate([rng.permutation(24) for _ in range(2)])):
+        one, two = q[kind // 2]
+        load = (0, 0) if kind % 2 else (30, -20)
+        tool = np.array([np.cos(one), np.sin(one), 0.0])
+        tool += 0.8 * np.array([np.cos(one + two), np.sin(one + two), 0.0])
+        T = 3 * np.sin(i / 5) if temperature is None else temperature
+        turn, shift = np.zeros(3), heat * T * tool
+        if device is not None:
+            turn = device[0].as_rotvec()
+            shift = device[0].apply(tool + shift) + device[1] - tool
+        reading = np.concatenate([turn, shift])
+        reading += rng.normal(size=6) * ([1e-5] * 3 + [5e-6] * 3)
+        cells = [f"m{i}", one, two, *load, *reading, T, 60 * i, 1 - 2 * (i % 2)]
+        lines.append(",".join(str(c) for c in cells))
+    return read_campaign(write_campaign(folder, HEAD, lines, robot=ELASTIC, **more))
+
+
+def texts(campaign):
+    """All sentences on a campaign's design, by subject and weight."""
+    repeats = revisits(campaign, campaign.repeat)
+    visits = revisits(campaign, campaign.configuration)
+    noise = repeat_noise(campaign)
+    found = remarks_on(campaign, repeats, visits, noise)
+    return [f"{r.about} {r.weight}: {r.text}" for r in found]
+
+
+def sound(rng, **changes):
+    """A design with nothing to say against it, changed by name."""
+    rows = 60
+    kinds = np.concatenate([rng.permutation(20) for _ in range(3)])
+    loads = np.zeros((rows, 6))
+    loads[:, 3:] = rng.integers(-2, 3, (20, 3))[kinds] * 10
+    given = {
+        "measured": rng.normal(size=(rows, 6)) * 1e-5,
+        "sigma": 1e-5,
+        "repeat": kinds,
+        "loads": loads,
+        "time": np.arange(rows) * 60.0,
+        "temperature": rng.uniform(-3, 3, rows),
+        "approach": rng.permutation(np.tile([-1.0, 1.0], 30)),
+    } | changes
+    return campaign_of(**{k: v for k, v in given.items() if v is not None})
+
+
+STILL = np.zeros((60, 6))
+ALWAYS = np.tile([0, 0, 0, 0, 0, -50.0], (60, 1))
+SAYINGS = {
+    "no load": ({"loads": STILL}, "load lost: No load was ever applied"),
+    "one load": ({"loads": ALWAYS}, "load lost: One load in every row"),
+    "no thermometer": ({"temperature": None}, "temperature lost: No cov.temperature"),
+    "constant": ({"temperature": np.full(60, 6.0)},
+        "temperature lost: The temperature stayed at +6 K in every row: thermal "
+        "expansion looks exactly like longer links."),
+    "calibrated": ({"temperature": np.zeros(60)},
+        "stayed at +0 K in every row: thermal expansion leaves no trace."),
+    "too even": ({"temperature": np.linspace(0, 0.1, 60)},
+        "temperature careful: The temperature varied by 0.1 K: even aluminium would "
+        "move the platform by 2.4e-06 m at most, less than one sigma."),
+    "no side": ({"approach": None}, "approach lost: No cov.approach"),
+    "one side": ({"approach": np.ones(60)}, "approach lost: Every row was approached"),
+    "no clock": ({"time": None}, "time lost: No cov.time"),
+    "never rotations": ({"measured": np.c_[np.full((60, 3), np.nan), STILL[:, :3]]},
+        "readings lost: Never measured: rx, ry, rz."),
+    "stuck": ({"measured": STILL}, "readings careful: rx reads the same in every row"),
+    "nothing twice": ({"repeat": np.arange(60)}, "repeats lost: Nothing was measured"),
+    "in a row": ({"repeat": np.repeat(np.arange(20), 3)},
+        "repeats careful: Repeats were measured in a row"),
+    "in one go": ({"repeat": np.repeat(np.arange(20), 3)},
+        "configurations lost: Every configuration was measured in one go"),
+    "one configuration": ({"repeat": np.zeros(60, dtype=int)},
+        "configurations lost: One configuration only"),
+    "few repeats": ({"repeat": np.r_[np.arange(58), 0, 1]},
+        "repeats careful: Few repeats: 12 degrees of freedom in all."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SAYINGS)
+def test_what_is_lost_is_said(case, rng):
+    changes, sentence = SAYINGS[case]
+    assert any(sentence in text for text in texts(sound(rng, **changes)))
+
+
+def test_a_sound_design_is_called_sound(rng):
+    """The post has no joints and each configuration one load here: said, no more."""
+    found = [t for t in texts(sound(rng)) if " fine: " not in t]
+    assert found == [
+        "load careful: No configuration was measured under two loads: what the load "
+        "does and what the configuration does are told apart by the model alone."
+    ]
+
+
+def test_noise_beside_the_stated_sigma_is_said(rng):
+    noisy = sound(rng, measured=rng.normal(size=(60, 6)) * 2e-5)
+    assert any("repeats careful: Repeats scatter 2.0" in t or "Repeats scatter 1.9" in t
+               for t in texts(noisy))  # fmt: skip
+    quiet = sound(rng, measured=rng.normal(size=(60, 6)) * 5e-6)
+    assert any("Repeats scatter only 0." in t for t in texts(quiet))
+
+
+def test_suspects_in_a_row_are_hardly_mistakes(rng):
+    """Six readings 30 sigma off at once, or spread over the session."""
+    for rows, sentence in (
+        (range(10, 16), "suspects careful: Readings far from their repeats follow"),
+        (range(3, 60, 10), None),
+    ):
+        measured = rng.normal(size=(60, 6)) * 1e-5
+        measured[list(rows), 4] += 3e-4 * rng.choice([1, -1], 6)
+        found = [t for t in texts(sound(rng, measured=measured)) if "suspects" in t]
+        assert [t.startswith(sentence or "?") for t in found] == [True] * bool(sentence)
+
+
+def test_rounded_readings_are_seen(rng):
+    rounded = (
+        np.round(rng.normal(size=(60, 6)) * 1e-5, 4)
+        + 1e-4 * (np.arange(60) % 2)[:, None]
+    )
+    text = "is rounded to 0.0001, more than twice its sigma 1e-05"
+    assert any(text in t for t in texts(sound(rng, measured=rounded)))
+
+
+def test_deviations_in_millimetres_are_asked_about(rng):
+    """30 mm on a post of 1 m."""
+    large = rng.uniform(-0.03, 0.03, (60, 6))
+    assert any("is the unit m, and is" in t for t in texts(sound(rng, measured=large)))
+
+
+def test_covariates_that_rise_together_are_named(rng):
+    warm = np.arange(60) / 10 + rng.normal(size=60) / 10
+    found = texts(sound(rng, temperature=warm))
+    assert any(
+        "time and temperature vary together (correlation +1.00)" in t for t in found
+    )
+
+
+def test_a_correlation_is_that_of_numpy(rng):
+    x, y = rng.normal(size=(2, 30))
+    assert correlation(x, y) == pytest.approx(np.corrcoef(x, y)[0, 1], rel=1e-12)
+    assert correlation(x, np.ones(30)) == 0.0
+
+
+def test_at_one_temperature_heat_and_length_are_one(tmp_path, rng):
+    """Both lengthen the same beams; while it varies they are told apart."""
+    constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
+    assert ("thermal_expansion", "link_length") in constant.separability.classes()
+    varied = inspect_campaign(elastic_campaign(tmp_path / "b", rng))
+    assert not any("thermal_expansion" in c for c in varied.separability.classes())
+    at_calibration = inspect_campaign(
+        elastic_campaign(tmp_path / "c", rng, temperature=0.0)
+    )
+    why = at_calibration.signatures.untestable["thermal_expansion"]
+    assert why == "needs cov.temperature, not 0 in every row"
+
+
+def test_an_encoder_offset_at_the_base_turns_the_measuring_frame(tmp_path, rng):
+    """Turning the first joint about the base's z is what base.rz does."""
+    known = inspect_campaign(elastic_campaign(tmp_path / "a", rng)).separability
+    i = known.names.index("encoder_offset")
+    assert known.rank[i] == 2
+    unknown = inspect_campaign(
+        elastic_campaign(tmp_path / "b", rng, toml={"registration": '"unknown"'})
+    ).separability
+    assert unknown.rank[i] == 1
+    assert unknown.names == known.names
+    assert 0 < unknown.left[i] < 0.9 < known.left[i]
+
+
+def test_a_device_that_cannot_be_located_is_said(tmp_path):
+    """One angle in two rows: inspected all the same."""
+    rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
+    folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
+                            toml={"registration": '"unknown"'})  # fmt: skip
+    first = inspect_campaign(read_campaign(folder)).remarks[0]
+    assert (first.about, first.weight) == ("registration", "lost")
+    assert "The registration cannot be found." in first.text
+
+
+def test_a_signature_is_the_derivative_by_hand(tmp_path, rng):
+    """The second encoder 1e-5 rad off: the tool turns about the elbow by so much."""
+    campaign = elastic_campaign(tmp_path, rng)
+    found = design_signatures(campaign).columns["encoder_offset"]
+    elbow, tool = (campaign.transforms[:, campaign.robot.index(n), :3, 3]
+                   for n in ("two", "tool"))  # fmt: skip
+    arm = tool - elbow
+    by_hand = np.zeros((len(campaign), 6))
+    by_hand[:, 2] = 1.0
+    by_hand[:, 3], by_hand[:, 4] = -arm[:, 1], arm[:, 0]
+    whitened = (by_hand / campaign.sigma).reshape(-1)
+    column = found[:, 1]
+    np.testing.assert_allclose(
+        column / np.linalg.norm(column), whitened / np.linalg.norm(whitened), atol=2e-4
+    )
+
+
+@pytest.mark.parametrize("registration", ["known", "unknown"])
+def test_heat_is_kept_out_of_the_noise_wherever_the_device_stands(
+    registration, tmp_path, rng
+):
+    """12 sigma of expansion, told in the axes of a device turned by 2 rad, 5 m away."""
+    device = None
+    if registration == "unknown":
+        device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])
+    toml = {"registration": f'"{registration}"'}
+    campaign = elastic_campaign(tmp_path, rng, heat=2e-5, device=device, toml=toml)
+    noise = inspect_campaign(campaign).noise
+    assert noise.plain > 3
+    assert 0.8 < noise.ratio < 1.2
+    assert noise.taken_out["temperature"] < 1e-9
+
+
+def test_the_command_writes_everything(tmp_path, rng, run):
+    elastic_campaign(tmp_path / "arm", rng, temperature=6.0)
+    status, out, _ = run("validation", "inspect", tmp_path / "arm", "--json", "-")
+    assert status == 0
+    found = json.loads(out)
+    assert found["rows"] == 48
+    assert found["configurations"]["count"] == 12
+    assert found["configurations"]["order"] == "interleaved"
+    assert found["loads"]["levels"] == 2
+    assert found["loads"]["configurations_under_several"] == 12
+    assert found["repeats"] | {"span": 0} == {
+        "sets": 24, "rows": 48, "others": 0, "span": 0, "order": "interleaved",
+        "adjacent": found["repeats"]["adjacent"],
+    }  # fmt: skip
+    low, high = found["noise"]["interval"]
+    assert low < found["noise"]["ratio"] < high
+    assert ["thermal_expansion", "link_length"] in found["inseparable"]
+    assert found["effects"]["geometric_stiffening"]["testable"] is False
+    assert len(found["cosines"]["shared"]) == len(found["cosines"]["effects"])
+    status, out, _ = run("validation", "inspect", tmp_path / "arm")
+    assert status == 0
+    assert "cannot be told apart: thermal_expansion, link_length" in out
+    assert "What this campaign cannot tell:" in out
+
+
+def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
+    status, out, err = run("validation", "inspect", tmp_path, "--json", "-")
+    assert status == 2
+    assert out == ""
+    assert "campaign.toml: cannot be read" in err
+    assert "Traceback" not in err
+
+
+def test_a_dh_table_without_alpha_is_told(tmp_path):
+    flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
+    assert flat != ARM
+    campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))
+    found = [r for r in inspect_campaign(campaign).remarks if r.about == "robot"]
+    assert [r.text for r in found] == ['dh without alpha, taken as 0: "two"']

@@ -1,0 +1,78 @@
+"""Inspections of campaigns that another, geometrically exact program simulated.
+
+The truth it wrote down has, for each effect of the library, the cosine between what the
+hidden effect did and what that effect could have done: both worked out by that program.
+"""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from examples.campaign_folder import data_folder
+from forcefit.inputs.table import BadInput
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.signatures import Tangents, conditions_of
+from validation.inspection.inspection import inspect_campaign
+
+try:
+    PRACTICE = data_folder("practice")
+except BadInput as error:
+    pytest.skip(str(error), allow_module_level=True)
+TRUTH = json.loads((PRACTICE / "truth_practice.json").read_text())
+NAMES = sorted(TRUTH)
+
+
+@pytest.fixture(scope="module")
+def inspections():
+    """All of them, each once."""
+    return {n: inspect_campaign(read_campaign(PRACTICE / n)) for n in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_noise_from_repeats_is_the_noise_that_was_drawn(name, inspections):
+    """The truth's is 1: chi-square's tails of 1/1000 each, six campaigns."""
+    noise = inspections[name].noise
+    squares = noise.degrees * noise.ratio**2
+    assert 1e-3 < chi2.cdf(squares, noise.degrees) < 1 - 1e-3
+    assert noise.suspects == ()
+    assert inspections[name].repeats.order == "interleaved"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_signatures_have_the_angles_of_the_exact_program(name, inspections):
+    """To 4e-4, what finite motions and secants differ by; where the unknowns are the
+    same: contacts have another exponent there, moduli may be grouped."""
+    hidden = {
+        e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
+        for e in TRUTH[name]["effects"]
+        if not e["name"].startswith("_")
+    }
+    campaign = inspections[name].campaign
+    columns = inspections[name].signatures.columns
+    tangents = Tangents(campaign, conditions_of(campaign))
+    done = tangents.model(hidden) - tangents.declared if hidden else None
+    compared = 0
+    for other in TRUTH[name]["alternatives"] if hidden else ():
+        if not set(other["names"]) <= set(columns):
+            continue
+        if "contact_stiffening" in other["names"]:
+            continue
+        A = np.hstack([columns[n] for n in other["names"]])
+        if A.shape[1] != other["parameters"]:
+            continue
+        x, *_ = np.linalg.lstsq(A / np.linalg.norm(A, axis=0), done, rcond=1e-6)
+        fit = A / np.linalg.norm(A, axis=0) @ x
+        cosine = np.linalg.norm(fit) / np.linalg.norm(done)
+        assert cosine == pytest.approx(other["cosine"], abs=4e-4), other["names"]
+        compared += 1
+    assert compared >= 7 or not hidden
+
+
+def test_heat_at_a_constant_temperature_is_a_longer_link(inspections):
+    classes = inspections["p06_confounded"].separability.classes()
+    assert ("thermal_expansion", "link_length") in classes
+    for name in ("p02_self_weight", "p03_thermal_expansion"):
+        found = inspections[name].separability.classes()
+        assert not any("thermal_expansion" in c for c in found)

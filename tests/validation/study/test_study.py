@@ -1,0 +1,330 @@
+"""Study files, the folder a study writes, and every message of a bad one."""
+
+import html
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.report.results import pose_error_of
+from assembly.robots import BUILT_IN
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+from validation.study.headline import worst_play
+from validation.study.report import report_page, results_table, verdict, write_study
+from validation.study.study import read_study, run_study
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "irsbot2.toml"
+SMALL = """
+robot = "irsbot2"
+title = "small <study>"
+grid = "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1"
+[errors]
+frames = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
+least = [1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6]
+most = [2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4]
+seed = 1
+[pose]
+tx = 0.0
+tz = -0.5
+"""
+
+
+def study_file(tmp_path, text):
+    path = tmp_path / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = read_study(study_file(folder, SMALL), folder / "out")
+    steps = []
+    found = run_study(study, lambda *step: steps.append(step))
+    write_study(found)
+    return found, folder / "out", steps
+
+
+@pytest.mark.exudyn
+def test_a_study_answers_as_the_reference_does(results):
+    found, _, steps = results
+    point = NUMBERS["cases"][0]["points"][0]
+    assert found.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
+    zone = found.solution["zone"]
+    assert zone["margin_free"] == pytest.approx(point["t_compliant_free"], rel=1e-9)
+    assert found.reference["relative_difference"]["energy"] < 1e-8
+    assert found.crosscheck.slope == pytest.approx(2.0, abs=0.1)
+    assert found.passed
+    assert ("maps", 6, 6) in steps
+    assert verdict(found).startswith(
+        "It goes together only by force: 1.926 J, its play"
+    )
+
+
+@pytest.mark.exudyn
+def test_results_show_themselves_on_a_few_lines(results):
+    found, _, _ = results
+    assert all(len(repr(thing)) < 1500 for thing in (found, found.crosscheck))
+
+
+@pytest.mark.exudyn
+def test_the_folder_holds_a_self_contained_report_and_results(results):
+    found, folder, _ = results
+    names = {p.name for p in folder.iterdir()}
+    assert names == {"report.html", "results.json", "results.nc"}
+    page = (folder / "report.html").read_text()
+    assert "small &lt;study&gt;" in page
+    assert len(re.findall(r"src='data:image/png;base64,", page)) == 4
+    assert not re.search(r"(src|href)=['\"](?!data:)", page)
+    assert "displacement" in page or "exaggeration" in page
+    table = json.loads((folder / "results.json").read_text())
+    assert table["passed"] is True
+    assert table["solution"]["energy"] == found.solution["energy"]
+    assert np.array(table["solution"]["platform_screw"]).shape == (6,)
+    assert table["maps"]["status"] == {"ok": 6}
+    with xarray.open_dataset(folder / "results.nc") as data:
+        assert data.energy.shape == (3, 2)
+
+
+def test_a_study_of_a_robot_file_with_explicit_errors(tmp_path):
+    write_robot(coaxial_beams(np.zeros(6)), tmp_path / "beams.toml")
+    text = (
+        'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
+        "[checks]\ncrosscheck = false\npicture = false\n"
+    )
+    found = run_study(read_study(study_file(tmp_path, text)))
+    assert found.solution["energy"] == pytest.approx(0.5e6 * 4e-8 / 2)
+    assert found.crosscheck is None
+    assert found.maps is None
+    assert found.passed
+    assert results_table(found)["errors"] == "geometric errors given in the study file"
+
+
+ODD = "$l_1 <b>&amp; \\$"
+
+
+def test_a_report_shows_a_links_name_as_it_is_written(tmp_path):
+    robot = coaxial_beams(np.zeros(6))
+    write_robot(robot, tmp_path / "beams.toml")
+    text = (tmp_path / "beams.toml").read_text().replace('"two"', f"'{ODD}'")
+    (tmp_path / "beams.toml").write_text(text)
+    study = f"robot = \"beams.toml\"\n[errors.explicit]\n'{ODD}' = [0,0,0,2e-4,0,0]\n"
+    study += "[checks]\ncrosscheck = false\npicture = false\n"
+    found = run_study(read_study(study_file(tmp_path, study), tmp_path / "out"))
+    write_study(found)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"<td>{html.escape(ODD)}</td>" in page
+    assert "<b>" not in page
+
+
+SLOW = pytest.mark.slow
+QUIET = "[checks]\npicture = false\n"
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in {"four_bar", "3rrr"} else pytest.param(name, marks=SLOW)
+        for name in BUILT_IN
+    ],
+)
+def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
+    tmp_path, name
+):
+    """Every built-in robot; it once ended in a division by zero, or passed."""
+    text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
+    if name == "irsbot2":
+        text += "[pose]\ntx = 0.0\ntz = -0.5\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
+    assert not found.passed
+    assert "No independent check of these numbers could be made" in verdict(found)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "What could not be checked" in page
+    assert "the robot has no geometric errors" in page
+    table = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert table["passed"] is False
+    assert set(table["unchecked"]) == {"reference", "crosscheck"}
+
+
+JUST_CONSTRAINED = """
+robot = "hexapod"
+scales = [1.0, 0.5]
+[errors]
+seed = 1
+least = [0, 0, 0, 0, 0, 0]
+most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
+"""
+
+
+@pytest.mark.exudyn
+def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
+    """Its errors cost neither energy nor play: the simulation alone has a say."""
+    text = JUST_CONSTRAINED + QUIET
+    found = run_study(read_study(study_file(tmp_path, text)))
+    assert found.verdicts == {"reference": "no signal", "crosscheck": "passed"}
+    assert set(found.unchecked) == {"reference"}
+    assert found.passed  # nobody asked for the reference by name
+    said = verdict(found)
+    assert "checks of these numbers: 1; they passed. Not checked: reference." in said
+    text += "reference = true\ncrosscheck = false\n"
+    found = run_study(read_study(study_file(tmp_path, text)))
+    assert not found.passed
+
+
+def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
+    text = SMALL.replace("tz=-0.5:-0.4:0.1", "tz=-5:-4:0.5") + QUIET
+    text += "crosscheck = false\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "passed"}
+    assert found.unchecked == {"maps": "none of the grid's points has an answer"}
+    assert not found.passed
+    assert "No point has an answer" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
+    import assembly.linear.reference
+
+    def lost(*_):
+        raise RuntimeError("cvxpy: the problem is unbounded")
+
+    monkeypatch.setattr(assembly.linear.reference, "reference_energy", lost)
+    text = SMALL + QUIET + "crosscheck = false\nmaps = false\n"
+    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(found)
+    assert found.verdicts == {"reference": "no answer"}
+    assert not found.passed
+    assert "Not compared: cvxpy: the problem" in report_page(found)
+
+
+def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
+    """A five-bar's play, free: least energy rests it in the middle.
+
+    The bound at a pose is that of ``assembly error``, over the map the largest of the
+    bounds there; a pose error with another play says which.
+    """
+    text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
+    text += QUIET + "crosscheck = false\nreference = false\n"
+    text += "[pose]\ntx = 0.0\nty = 0.15\n"
+    found = run_study(read_study(study_file(tmp_path, text)))
+    worst = worst_play(found)
+    bounds = pose_error_of(place_robot(found.robot, found.study.pose), ["frozen"])
+    here = bounds["error"]["frozen"]["translation"]["upper"]
+    assert worst["pose"]["translation"] == pytest.approx(here, abs=1e-6)
+    upper = found.maps["translation_error"].sel(bound="upper").values
+    assert worst["map"]["translation"] == np.nanmax(upper)
+    least = np.linalg.norm(found.solution["platform_screw"][3:])
+    assert worst["pose"]["translation"] > 2e-5 > 10 * least
+    said = verdict(found)
+    assert f"at most {1e3 * here:.3g} mm" in said
+    assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in said
+    assert "certified bounds of (27), reading frozen" in said
+    assert "with play resting at least energy it is 0 mm" in said
+    lost = verdict(replace(found, error={}, maps=None))
+    assert "could not be bounded; with play resting at least energy" in lost
+    page = report_page(found)
+    assert page.count("play at least energy") >= 6  # a row for each component
+    assert "anywhere while no deformation changes" in page
+    assert "[mm], play anywhere" in page
+
+
+def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path):
+    from assembly.model.robot import Frame, Robot
+
+    frames = (Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0]))
+    write_robot(Robot("stuck", "a", frames, (("a", "b"),)), tmp_path / "stuck.toml")
+    found = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
+    assert found.solution["status"] == "cannot assemble"
+    assert not found.passed
+    found.study.folder.joinpath("x")
+    assert verdict(found).startswith("No answer at this pose: cannot assemble, a rigid")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('robot = "irsbot2"', 'robot = "nowhere.toml"', "nowhere.toml\", neither a"),
+        ('robot = "irsbot2"', "", "robot: missing; expected a built-in robot or a"),
+        ("seed = 1", "", "errors.seed: missing; expected a whole number >= 0"),
+        ("seed = 1", "seed = -1", "errors.seed: found -1, expected a whole number"),
+        ("seed = 1", "seed = 1\nsigns = 'up'", "errors.signs: found 'up', expected"),
+        ("[pose]", "[pose]\nx = 1", 'pose: unknown key "x"'),
+        ("tx = 0.0", "tx = nan", "pose.tx: found nan, expected a finite number"),
+        ("tz=-0.5:-0.4:0.1", "tz=-0.5:-0.4", 'grid tz: found "-0.5:-0.4", expected'),
+        ("[pose]", "[poze]", 'unknown key "poze"; did you mean "pose"?'),
+        ('"link_a"', '"link_q"', 'no frame "link_q"'),
+        ("least = [1e-4,", "least = [1e-1,", "least: expected 0 <= least <= most"),
+        ("least = [1e-4,", "least = [-1e308,", "errors.least: expected 0 <= least"),
+        ("least = [1e-4,", "least = [", "errors.least: found"),
+        ("[pose]", "[links]\nsource = 'fea'\n[pose]", "links.surface: missing"),
+        ("[pose]", "[links]\nsurface = 'no.stl'\n[pose]", "surface: no such file"),
+        ("[pose]", "[checks]\nstiffness = true\n[pose]", "stiffness: this check"),
+        ("[pose]", "[checks]\nmaps = 1\n[pose]", "checks.maps: found 1, expected true"),
+        ("title", "scales = 3\ntitle", "scales: expected a list of factors"),
+        ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
+        ("title", "scales = [1.0]\ntitle", "expected at least two different factors"),
+        ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
+        ("title", "scales = [[1]]\ntitle", "scales: found [1] as number 1, expected"),
+        ("title", "title = 1 #", "title: found 1, expected a string"),
+        ("title", "title", None),
+    ],
+)  # fmt: skip
+def test_every_mistake_in_a_study_file_is_one_message(tmp_path, old, new, message):
+    path = study_file(tmp_path, SMALL.replace(old, new, 1))
+    if message is None:
+        assert read_study(path).robot.name == "irsbot2"
+        return
+    with pytest.raises(BadInput) as error:
+        read_study(path)
+    said = str(error.value)
+    assert message in said
+    assert "\n" not in said
+    assert str(tmp_path) in said
+    assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_an_output_that_is_a_file_is_refused_before_the_work(tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    path = study_file(tmp_path, SMALL)
+    with pytest.raises(BadInput, match="found a file, expected a folder or nothing"):
+        read_study(path, tmp_path / "taken")
+
+
+def test_a_pose_out_of_reach_is_refused_before_the_work(tmp_path):
+    path = study_file(tmp_path, SMALL.replace("tz = -0.5", "tz = -0.9"))
+    seen = []
+    with pytest.raises(BadInput, match="cannot be reached"):
+        run_study(read_study(path), lambda *step: seen.append(step))
+    assert seen == []
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+def test_the_example_runs_with_finite_elements(tmp_path):
+    """K_RX of the solid cylinder by finite elements is 1 032 277 N m/rad, converged;
+    its beam, without shear, 1 067 585.
+    """
+    study = read_study(EXAMPLE, tmp_path / "out")
+    found = run_study(study)
+    write_study(found)
+    assert found.passed
+    (first, *_) = found.stiffness.values()
+    error = first["fea"][1, 1] / 1_032_277 - 1
+    assert abs(error) < 0.005
+    assert abs(error) < 5 * first["relative_error_estimate"]
+    assert first["euler"][1, 1] == pytest.approx(1_067_585.468, rel=1e-9)
+    assert first["timoshenko"][1, 1] == pytest.approx(1_015_962.169, rel=1e-9)
+    assert len(found.stiffness) == 4
+    assert irsbot2_with(NUMBERS["cases"][0]).errors == pytest.approx(
+        found.robot.errors, abs=0
+    )

@@ -1,0 +1,293 @@
+"""Synthetic campaigns: each effect against a closed form worked out beforehand.
+
+The robot of most tests is one drive that turns a beam about z: L = 0.5 m, tip at
+(L cos q, L sin q, 0).  What is to come out stands in each test, first order in what is
+small unless it says exact.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.model.robot import BeamLink, Frame, Robot
+from validation.synthetic.design import Design
+from validation.synthetic.effects import Row
+from validation.synthetic.generator import generate_campaign
+from validation.synthetic.machine import Hidden, simulate_readings
+
+pytestmark = pytest.mark.exudyn
+
+L, E, NU, RHO = 0.5, 70e9, 0.33, 2700.0
+RADIUS, BORE = 0.02, 0.015
+AREA = math.pi * (RADIUS**2 - BORE**2)
+SECOND = math.pi * (RADIUS**4 - BORE**4) / 4
+M2 = (BORE / RADIUS) ** 2
+KAPPA = (
+    6 * (1 + NU) * (1 + M2) ** 2 / ((7 + 6 * NU) * (1 + M2) ** 2 + (20 + 12 * NU) * M2)
+)
+SHEAR = KAPPA * E / (2 * (1 + NU)) * AREA  # kappa G A
+DRIVE = 2e4  # [N m/rad]
+CONDITIONS = {"temperature": 5.0, "time": 300.0, "approach": -1.0, "humidity": 50.0}
+
+
+def one_link(mass=0.0, error=None, drive=DRIVE):
+    K = np.diag([np.inf, np.inf, drive, np.inf, np.inf, np.inf])
+    frames = (
+        Frame("drive", joint="revolute", actuated=True, joint_stiffness=K,
+              geometric_error=np.zeros(6) if error is None else error),
+        Frame("tip", "drive", translation=[L, 0, 0], mass=mass, link=BeamLink(
+            {"radius": RADIUS, "inner_radius": BORE}, E, NU, density=RHO)),
+    )  # fmt: skip
+    return Robot("one_link", "tip", frames)
+
+
+def row(q=0.0, load=(0, 0, 0, 0, 0, 0), **conditions):
+    wrench = np.array(load, dtype=float)
+    return Row({"drive": q, "tip": 0.0}, wrench, CONDITIONS | conditions)
+
+
+@pytest.fixture(params=["multibody", "springs"])
+def added(request):
+    """What an effect adds to the reading of a row, by either program."""
+
+    def difference(name, parameters, where, robot=None, program=request.param):
+        case = robot or one_link(), np.zeros(3), [where]
+        without = simulate_readings(*case, program=program)
+        effects = [Hidden(name, parameters)]
+        return (simulate_readings(*case, effects, program) - without)[0]
+
+    return difference
+
+
+def close(found, expected, relative, floor=1e-11):
+    np.testing.assert_allclose(found, expected, rtol=relative, atol=floor)
+
+
+@pytest.mark.parametrize("point", [(0, 0, 0), (0.1, -0.2, 0.05)])
+def test_a_perfect_robot_without_load_deviates_by_nothing(point):
+    readings = simulate_readings(one_link(), np.array(point), [row(0.4), row(-1.2)])
+    assert np.abs(readings).max() < 1e-12
+
+
+def test_a_declared_error_is_in_the_reading_exactly():
+    """A turn by e about the drive's axis: the tip goes to L (cos, sin)(q + e)."""
+    q, e = 0.3, 0.02
+    found = simulate_readings(
+        one_link(error=np.array([0, 0, e, 0, 0, 0])), np.zeros(3), [row(q)]
+    )[0]
+    dx, dy = math.cos(q + e) - math.cos(q), math.sin(q + e) - math.sin(q)
+    close(found, [0, 0, e, L * dx, L * dy, 0], 1e-12)
+
+
+@pytest.mark.parametrize("g", [9.81, 3.0])
+def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
+    """w L^4/8EI + w L^2/2kGA of the beam, m g L^3/3EI + m g L/kGA of the body.
+
+    A bent beam is also shorter, by less than s^2/L = 2.4e-8 m: second order.
+    """
+    w, m = RHO * AREA * g, 1.3
+    sag = w * L**4 / (8 * E * SECOND) + w * L**2 / (2 * SHEAR)
+    sag += m * g * (L**3 / (3 * E * SECOND) + L / SHEAR)
+    slope = w * L**3 / (6 * E * SECOND) + m * g * L**2 / (2 * E * SECOND)
+    found = added("self_weight", {"g.z": -g}, row(), one_link(mass=m))
+    close(found, [0, slope, 0, 0, 0, -sag], 1e-5, 2.4e-8)
+
+
+def test_a_warm_beam_is_longer_along_itself(added):
+    """Alpha T L = 2e-5 x 5 x 0.5 m, exact."""
+    q = 0.7
+    found = added("thermal_expansion", {"tip": 2e-5}, row(q))
+    close(found, [0, 0, 0, 5e-5 * math.cos(q), 5e-5 * math.sin(q), 0], 1e-9)
+
+
+def test_a_longer_beam_is_longer_along_itself(added):
+    found = added("link_length", {"tip": 3e-4}, row(-0.4))
+    close(found, [0, 0, 0, 3e-4 * math.cos(0.4), -3e-4 * math.sin(0.4), 0], 1e-9)
+
+
+def test_a_longer_beam_also_bends_more(added):
+    """P (L + d)^3 / 3EI + P (L + d) / kGA beside the same with d = 0, across."""
+    P, d = 1.0, 1e-2
+    found = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
+    more = ((L + d) ** 3 - L**3) / (3 * E * SECOND) + d / SHEAR
+    assert found[5] == pytest.approx(-P * more, rel=1e-4)
+
+
+def test_an_elastic_drive_turns_under_the_moment_it_holds(added):
+    """F L / k, beside the declared spring and not instead of it."""
+    F, k = 10.0, 5e4
+    found = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
+    close(found[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
+
+
+def test_a_foundation_shifts_and_tilts(added):
+    """A force F along y at (L, 0, 0): F/k_t along y, F L / k_r about z."""
+    F = 10.0
+    springs = {"rx": 1e6, "ry": 1e6, "rz": 2e5, "tx": 1e8, "ty": 4e6, "tz": 1e8}
+    given = {f"stiffness.{k}": v for k, v in springs.items()}
+    found = added("base_compliance", given, row(load=(0, 0, 0, 0, F, 0)))
+    close(found[[2, 4]], [F * L / 2e5, F / 4e6 + F * L**2 / 2e5], 1e-4)
+
+
+@pytest.mark.parametrize("name", ["offset", "eccentricity", "wobble"])
+def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
+    """Exact: the tip is at L (cos, sin)(q + d)."""
+    q, size, phase = 0.6, 2e-3, 0.9
+    given = {"drive.amplitude": size, "drive.phase": phase}
+    cases = {
+        "offset": ("encoder_offset", {"drive": size}, size),
+        "eccentricity": ("encoder_eccentricity", given, size * math.sin(q + phase)),
+        "wobble": ("_second_harmonic", given, size * math.sin(2 * q + phase)),
+    }
+    effect, parameters, d = cases[name]
+    found = added(effect, parameters, row(q))
+    dx, dy = math.cos(q + d) - math.cos(q), math.sin(q + d) - math.sin(q)
+    close(found, [0, 0, d, L * dx, L * dy, 0], 1e-9)
+
+
+def test_the_measuring_frame_stands_off_and_the_target_too(added):
+    """Exact: B R and B (p + R tool); a turn by b about z, then a shift."""
+    q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
+    given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
+    given |= {"base.tz": shift[2], "tool.tx": tool[0], "tool.tz": tool[2]}
+    found = added("registration", given, row(q))
+    out = L + tool[0]
+    x = out * math.cos(q + b) + shift[0] - L * math.cos(q)
+    y = out * math.sin(q + b) + shift[1] - L * math.sin(q)
+    close(found, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
+
+
+def test_a_softer_beam_bends_more(added):
+    """(1/f - 1) (P L^3/3EI + P L/kGA): G falls with E."""
+    P, f = 1.0, 0.8
+    found = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
+    bend = P * L**3 / (3 * E * SECOND) + P * L / SHEAR
+    assert found[5] == pytest.approx((1 / f - 1) * bend, rel=1e-7)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_load_takes_up_play(added, side):
+    """A force along x shifts the beam by the radial play, towards the force."""
+    play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
+    found = added("joint_clearance", play, row(load=(0, 0, 0, 20 * side, 0, 0)))
+    close(found, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
+
+
+def test_play_that_no_load_takes_up_moves_nothing(added):
+    play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
+    assert np.abs(added("joint_clearance", play, row())).max() < 1e-9
+
+
+@pytest.mark.parametrize("approach", [1.0, -1.0])
+def test_friction_holds_an_elastic_joint_back(added, approach):
+    """- tau x approach / k about the joint's axis."""
+    tau = 0.5
+    found = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
+    close(found[[2, 4]], np.array([1, L]) * -tau * approach / DRIVE, 1e-4)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
+@pytest.mark.parametrize("force", [10.0, -0.1])
+def test_a_contact_yields_as_its_law_says(added, exponent, force):
+    """F L = c d^n beside all else that yields."""
+    c = 2e7
+    given = {"drive.coefficient": c, "drive.exponent": exponent}
+    found = added("contact_stiffening", given, row(load=(0, 0, 0, 0, force, 0)))
+    d = math.copysign((abs(force) * L / c) ** (1 / exponent), force)
+    close(found[[2, 4]], [d, d * L], 1e-4)
+
+
+def test_a_load_that_is_not_the_one_recorded(added):
+    """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
+    P, f, more = 2.0, 1.1, 0.3
+    given = {"factor": f, "offset.fz": more}
+    found = added("load_gain", given, row(load=(0, 0, 0, 0, 0, P)))
+    bend = L**3 / (3 * E * SECOND) + L / SHEAR
+    assert found[5] == pytest.approx(((f - 1) * P + more) * bend, rel=1e-7)
+
+
+def test_the_reading_drifts(added):
+    given = {"amplitude.ry": 2e-5, "amplitude.tz": -1e-5, "time_constant": 150.0}
+    rise = 1 - math.exp(-2.0)  # at 300 s
+    close(added("drift", given, row()), [0, 2e-5 * rise, 0, 0, 0, -1e-5 * rise], 1e-12)
+
+
+def test_what_a_linear_model_misses_is_added(added):
+    """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
+    e = 0.02
+    robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
+    design = Design(configurations=2, rows=2, load=0.0)
+    wanted = [(Hidden("geometric_stiffening", {}), 5.0)]
+    campaign = generate_campaign(robot, wanted, design, seed=3)
+    for i, where in enumerate(campaign.plan.rows):
+        q = where.coordinates["drive"]
+        c, s = math.cos(q), math.sin(q)
+        along, across = L * (math.cos(e) - 1), L * (math.sin(e) - e)
+        expected = [0, 0, 0, c * along - s * across, s * along + c * across, 0]
+        close(campaign.added[i], expected, 1e-4, 1e-9)
+    assert campaign.strength["geometric_stiffening"] == pytest.approx(5.0, rel=1e-9)
+
+
+def test_effects_outside_the_library(added):
+    """A drive's softness (1 + cos 3q)/2, swelling, T^2, a stand, a sagging target."""
+    q, F = 0.3, 10.0
+    pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
+    turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2
+    found = added("_pose_stiffness", {"drive": 1e5}, pushed)
+    assert found[2] == pytest.approx(turn, rel=1e-4)
+    assert added("_humidity", {"tip": 1e-5}, row())[3] == pytest.approx(10e-5 * L)
+    warm = added("_quadratic_temperature", {"tip": 1e-6}, row())
+    assert warm[3] == pytest.approx(25e-6 * L)
+    heavy = row(load=(0, 0, 0, 30, 40, 0))
+    stand = added("_stand", {"c.tx": 4e-6, "c.rz": -8e-6}, heavy)
+    close(stand, [0, 0, -2e-6, 1e-6, 0, 0], 1e-12)
+    close(added("_sag", {"rate": 1e-7}, heavy), [0, 0, 0, 0, 0, -5e-6], 1e-12)
+
+
+def two_walls():
+    """A point between two equal beams on sliding drives, all on the x axis."""
+    link = BeamLink({"radius": 0.01}, E, NU)
+    along = [0, math.pi / 2, 0]  # z of a slide along x
+    back = [0, -math.pi / 2, 0]
+    frames = (
+        Frame("left", rotation=along, joint="prismatic", actuated=True),
+        Frame("a", "left", [0, 0, L], back,
+              link=replace(link, length=L, axis=(1, 0, 0))),
+        Frame("right", translation=[2 * L, 0, 0], rotation=along, joint="prismatic",
+              actuated=True),
+        Frame("b", "right", [0, 0, -L], back,
+              link=replace(link, length=L, axis=(-1, 0, 0))),
+    )  # fmt: skip
+    return Robot("walls", "a", frames, (("a", "b"),))
+
+
+def test_a_closed_loop_shares_what_does_not_fit(added):
+    """Equal springs: half of a length, of an offset, of a strain; F / (k1 + k2)."""
+    robot = two_walls()
+    rest = {f.name: 0.0 for f in robot.frames}
+    where = Row(rest, np.zeros(6), CONDITIONS)
+    for name, given, expected in (
+        ("link_length", {"a": 1e-4}, 0.5e-4),
+        ("link_length", {"b": 1e-4}, -0.5e-4),
+        ("encoder_offset", {"left": 1e-4}, 0.5e-4),
+        ("thermal_expansion", {"a": 2e-5, "b": 2e-5}, 0.0),
+    ):
+        found = added(name, given, where, robot)
+        close(found, [0, 0, 0, expected, 0, 0], 1e-3, 1e-10)
+    F, k = 100.0, E * math.pi * 0.01**2 / L
+    pulled = replace(where, load=np.array([0, 0, 0, F, 0, 0]))
+    soft = added("modulus_scale", {"a": 0.5, "b": 0.5}, pulled, robot)
+    assert soft[3] == pytest.approx(F / (2 * k), rel=1e-5)
+
+
+def test_errors_of_the_declared_robot_and_an_effect_add_up(added):
+    """First order: what an effect adds does not depend on small declared errors."""
+    rng = np.random.default_rng(3)
+    wrong = one_link(error=1e-4 * rng.normal(size=6))
+    for name, given in (
+        ("encoder_offset", {"drive": 1e-4}), ("thermal_expansion", {"tip": 2e-5}),
+    ):  # fmt: skip
+        perfect, real = (added(name, given, row(0.4), r) for r in (None, wrong))
+        close(real, perfect, 0, 3e-8)

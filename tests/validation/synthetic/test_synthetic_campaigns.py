@@ -1,0 +1,311 @@
+"""Synthetic campaigns as a whole: plans, strengths, files, truths, rivals, command."""
+
+import csv
+import json
+import subprocess
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import Posture, place_many_joints
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import plain
+from validation.campaign.campaign_file import read_campaign
+from validation.multibody.simulation import without_clearance
+from validation.synthetic.design import Design, plan_campaign
+from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
+from validation.synthetic.effects import LIBRARY, Row
+from validation.synthetic.equivalents import alternatives
+from validation.synthetic.generator import Noise, generate_campaign, write_campaign
+from validation.synthetic.machine import Hidden, simulate_readings
+from validation.synthetic.outside import OUTSIDE
+from validation.synthetic.truth import truth_of
+
+CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))
+SMALL = Design(configurations=8, rows=40, load=20.0)
+TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
+SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
+
+
+def two_axes(spring=SPRING):
+    """An arm of two joints at right angles."""
+    rng = np.random.default_rng(1)
+    frames = (
+        Frame("j1", joint="revolute", actuated=True, joint_stiffness=spring),
+        Frame("j2", "j1", [0.3, 0, 0.1], [np.pi / 2, 0, 0], joint="revolute",
+              actuated=True, joint_stiffness=spring, link=TUBE),
+        Frame("tool", "j2", [0.25, 0.1, 0], link=TUBE, mass=0.5),
+    )  # fmt: skip
+    errors = rng.uniform(-1, 1, (3, 6)) * np.repeat([1e-4, 5e-5], 3)
+    return Robot("two_axes", "tool", frames).with_errors(errors)
+
+
+def quick(wanted, robot=None, **given):
+    design = given.pop("design", SMALL)
+    robot = robot or two_axes()
+    return generate_campaign(robot, wanted, design, program="springs", **given)
+
+
+def test_a_plan_is_interleaved_with_repeats_and_rests():
+    """Each pass visits every configuration once; some loads come again, some are 0."""
+    plan = plan_campaign(two_axes(), SMALL, np.random.default_rng(0))
+    passes = plan.configuration.reshape(5, 8)
+    assert all(sorted(p) == list(range(8)) for p in passes.tolist())
+    loads = np.array([row.load for row in plan.rows])
+    conditions = np.column_stack([plan.configuration, loads])
+    assert len(np.unique(conditions, axis=0)) < len(loads)
+    assert (np.abs(loads).max(axis=1) == 0).any()
+    assert np.linalg.norm(loads[:, 3:], axis=1).max() <= 20.0 + 1e-3
+    assert all(np.diff([row.covariates["time"] for row in plan.rows]) > 0)
+    assert {row.covariates["approach"] for row in plan.rows} == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("name", [*LIBRARY, *OUTSIDE])
+def test_every_effect_reaches_its_strength(name):
+    design = replace(SMALL, humidity=True, temperature="around")
+    campaign = quick({name: 5.0}, design=design, seed=4)
+    assert campaign.strength[name] == pytest.approx(5.0, rel=0.05)
+
+
+def test_noise_is_what_was_asked_for():
+    """240 x 6 readings: their rms is 1 within 3/sqrt(2 x 1440) = 0.06 at 3 sigma."""
+    design = replace(SMALL, rows=240)
+    campaign = quick({}, design=design, noise=Noise(3e-5, 2e-6), seed=2)
+    noise = (campaign.readings - campaign.exact) / np.repeat([3e-5, 2e-6], 3)
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(1.0, abs=0.06)
+    assert np.abs(campaign.added).max() == 0.0
+
+
+def test_two_effects_add_up_to_first_order():
+    both = quick({"encoder_offset": 5.0, "thermal_expansion": 5.0}, seed=3)
+    alone = sum(
+        quick([(effect, both.strength[effect.name])], seed=3).added
+        for effect in both.effects
+    )
+    np.testing.assert_allclose(both.added, alone, rtol=0, atol=5e-8)
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
+def test_both_programs_agree(name):
+    """Beams and springs differ by what a beam's own bending adds: second order."""
+    rng = np.random.default_rng(5)
+    robot = without_clearance(load_robot(name))
+    robot = robot.with_errors(5e-5 * rng.uniform(-1, 1, (len(robot.frames), 6)))
+    design = Design(configurations=2, rows=2, reach=0.1, load=20.0)
+    rows = plan_campaign(robot, design, rng).rows
+    drives = {f.name: 2e-5 for f in robot.frames if f.actuated}
+    effects = [Hidden("encoder_offset", drives), Hidden("self_weight", {"g.z": -9.81})]
+    point = np.array([0.0, 0.02, 0.01])
+    beams = simulate_readings(robot, point, rows, effects)
+    springs = simulate_readings(robot, point, rows, effects, "springs")
+    assert np.abs(beams).max() > 5e-5
+    np.testing.assert_allclose(springs, beams, rtol=0, atol=5e-8)
+
+
+@pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
+def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
+    """Two programs, one model: finite motions, a load that goes with its point."""
+    rng = np.random.default_rng(6)
+    robot = without_clearance(load_robot(name))
+    robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
+    design = Design(configurations=3, rows=3, reach=0.1, load=80.0)
+    rows = plan_campaign(robot, design, rng).rows
+    point = np.array([0.03, 0.05, 0.02])
+    springs = simulate_readings(robot, point, rows, (), "springs")
+    commands = [
+        [row.coordinates[f.name] if f.actuated else np.nan for f in robot.frames]
+        for row in rows
+    ]
+    placed, _ = place_many_joints(robot, commands)
+    postures = Posture(
+        robot, np.array([p.coordinates for p in placed]),
+        np.array([p.transforms for p in placed]), 0.0,
+    )  # fmt: skip
+    here = as_declared(postures, np.array([row.load for row in rows]), point=point)
+    exact = predict(replace(here, exact=True)).deviation
+    assert np.abs(exact - predict(here).deviation).max() > 1e-5
+    np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
+
+
+def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):
+    noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
+    campaign = quick({"drift": 5.0}, seed=7, noise=noise, reference_point=[0, 0, 0.1])
+    write_campaign(campaign, tmp_path / "c")
+    texts = [p.read_text() for p in (tmp_path / "c").iterdir()]
+    assert len(texts) == 3
+    assert not any("drift" in text or "amplitude" in text for text in texts)
+    table = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
+    assert table["registration"] == "unknown"
+    assert table["noise"] == {"rotation": 1e-5, "position": 5e-6}
+    with open(tmp_path / "c" / "measurements.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 40
+    assert (
+        sum(row["meas.tx"] == "" for row in rows)
+        == np.isnan(campaign.readings[:, 3]).sum()
+    )
+    robot = read_robot(tmp_path / "c" / "robot.toml")
+    np.testing.assert_array_equal(robot.errors, campaign.robot.errors)
+    read = read_campaign(tmp_path / "c")
+    np.testing.assert_allclose(read.measured, campaign.readings, rtol=1e-8, atol=0)
+    expected = [list(row.coordinates.values()) for row in campaign.plan.rows]
+    np.testing.assert_allclose(read.coordinates, expected, rtol=0, atol=1e-9)
+    with pytest.raises(BadInput, match="expected a new folder"):
+        write_campaign(campaign, tmp_path / "c")
+
+
+def test_a_pose_can_be_commanded(tmp_path):
+    robot = without_clearance(load_robot("hexapod"))
+    design = Design(configurations=3, rows=3, reach=0.1, command="pose")
+    campaign = quick({}, robot, design=design)
+    write_campaign(campaign, tmp_path / "c")
+    read = read_campaign(tmp_path / "c")
+    names = [frame.name for frame in robot.frames]
+    own = [names.index(f"leg{k}.strut") for k in range(1, 7)]
+    expected = [list(row.coordinates.values()) for row in campaign.plan.rows]
+    found = read.coordinates[:, own]
+    np.testing.assert_allclose(found, np.array(expected)[:, own], rtol=0, atol=1e-9)
+
+
+def test_the_truth_has_what_the_practice_campaigns_have():
+    campaign = quick({"drive_compliance": 5.0, "link_length": 3.0}, seed=1)
+    truth = json.loads(json.dumps(plain(truth_of(campaign))))
+    assert truth["verdict"] == "explained"
+    assert truth["accept_effects"] == [["drive_compliance", "link_length"]]
+    drive = truth["effects"][0]
+    assert drive["where"] == [p["frame"] for p in drive["parameters"]]
+    assert {p["unit"] for p in drive["parameters"]} == {"N·m/rad"}
+    total = np.hypot(*truth["contribution_rms"].values())
+    assert truth["normalised_before"] == pytest.approx(np.hypot(total, 1), rel=0.2)
+    assert truth["normalised_perfect"] == pytest.approx(1.0, abs=0.2)
+    assert truth_of(quick({}))["verdict"] == "none_needed"
+    outside = truth_of(quick({"_sag": 5.0}))
+    assert outside["verdict"] == "outside_library"
+    assert outside["accept_effects"] == [[]]
+
+
+@pytest.mark.parametrize("name", sorted(TRUTH))
+def test_committed_campaigns_are_what_their_truth_says(name):
+    """Made by the multibody simulation, explained by springs: the noise is left.
+
+    Its rms is the truth's within 1e-3, and without the hidden effects it is the one
+    before within 1e-3 of it.
+    """
+    truth, campaign = TRUTH[name], read_campaign(CAMPAIGNS / name)
+    names = [frame.name for frame in campaign.robot.frames]
+    rows = [
+        Row(
+            dict(zip(names, campaign.coordinates[i].tolist(), strict=True)),
+            campaign.loads[i],
+            {k: float(v[i]) for k, v in campaign.covariates.items()},
+        )
+        for i in range(len(campaign))
+    ]
+    hidden = [
+        Hidden(e["name"], {p["name"]: p["value"] for p in e["parameters"]})
+        for e in truth["effects"]
+    ]
+    for effects, key in ((hidden, "normalised_perfect"), ((), "normalised_before")):
+        found = simulate_readings(
+            campaign.robot, campaign.reference_point, rows, effects, "springs"
+        )
+        rms = np.sqrt(np.mean(((campaign.measured - found) / campaign.sigma) ** 2))
+        assert rms == pytest.approx(truth[key], rel=1e-3)
+
+
+def left(campaign):
+    """What each effect leaves of 240 readings at 5 sigma, 6000; second order: < 0.1."""
+    return {one.names[0]: one.left for one in alternatives(campaign)}
+
+
+def test_a_warm_link_is_a_long_one_only_while_the_temperature_stays():
+    hidden = [(Hidden("thermal_expansion", {"tool": 2e-5}), 5.0)]
+    steady = left(quick(hidden, design=replace(SMALL, temperature="constant")))
+    assert steady["thermal_expansion"] < 0.1
+    assert steady["link_length"] < 0.1
+    swinging = left(quick(hidden))
+    assert swinging["thermal_expansion"] < 0.1
+    assert swinging["link_length"] > 100
+
+
+def test_softer_links_are_a_larger_load_if_nothing_else_yields():
+    rigid = left(quick({"load_gain": 5.0}, two_axes(spring=None), seed=2))
+    assert rigid["modulus_scale"] < 0.1
+    elastic = left(quick({"load_gain": 5.0}, seed=2))
+    assert elastic["modulus_scale"] > 100
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in LIBRARY if n not in ("joint_clearance", "geometric_stiffening")]
+)
+def test_an_effect_is_its_own_best_explanation(name):
+    found = alternatives(quick({name: 5.0}, seed=6))
+    own = min(one.left for one in found if one.names[0].startswith(name))
+    bound = 60.0 if name in ("drift", "contact_stiffening") else 1.0
+    assert own < bound  # a time constant and contacts beside springs are not linear
+    assert own <= min(one.left for one in found) + 1.0
+
+
+def test_what_cannot_be_hidden_is_refused():
+    rng = np.random.default_rng(0)
+    with pytest.raises(NotApplicable):
+        draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
+    # loads too small to show it; a drive none reaches is the same
+    away = Design(configurations=8, rows=40, load=1e-3)
+    with pytest.raises(NotApplicable, match="hardly show it"):
+        quick({"drive_compliance": 5.0}, design=away)
+    with pytest.raises(BadInput, match='found "gravity"'):
+        draw_effect("gravity", two_axes(), 1.0, rng)
+    with pytest.raises(BadInput, match="configurations"):
+        Design(configurations=5, rows=4)
+    with pytest.raises(BadInput, match="temperature"):
+        Design(temperature="warm")
+
+
+def test_stronger_effects_keep_their_shape():
+    """Springs softer, errors larger; phases, exponents and time constants stay."""
+    given = {"a.coefficient": 1e6, "a.exponent": 1.5}
+    stronger = strengthened(Hidden("contact_stiffening", given), 4.0).parameters
+    assert stronger == {"a.coefficient": 1e6 / 8, "a.exponent": 1.5}
+    given = {"a.amplitude": 1e-4, "a.phase": 1.0}
+    eccentric = strengthened(Hidden("encoder_eccentricity", given), 2.0).parameters
+    assert eccentric == {"a.amplitude": 2e-4, "a.phase": 1.0}
+    gain = strengthened(Hidden("load_gain", {"factor": 0.9, "offset.fz": 1.0}), 2.0)
+    assert gain.parameters == pytest.approx({"factor": 0.8, "offset.fz": 2.0})
+    softer = strengthened(Hidden("modulus_scale", {"a": 0.8}), 2.0).parameters
+    assert softer == pytest.approx({"a": 1 / 1.5})
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_campaign_or_says_why_not(tmp_path):
+    def run(*words):
+        command = [sys.executable, "-m", "forcefit", "validation", "generate", *words]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+
+    small = ["--rows", "6", "--configurations", "3", "--program", "springs"]
+    made = run("arm6", "c", "--truth", "t.json", "--effect", "drift=2", *small)
+    assert made.returncode == 0, made.stderr
+    truth = json.loads((tmp_path / "t.json").read_text())["c"]
+    assert truth["contribution_rms"]["drift"] == pytest.approx(2.0, rel=0.05)
+    for words, said in (
+        (["arm6", "c", "--truth", "t.json", *small], "expected a new folder"),
+        (["arm6", "d", "--truth", "t.json", "--effect", "foo"], 'found "foo"'),
+        (["arm6", "d", "--truth", "d/t.json"], "no folder d"),
+        (["arm6", "d", "--truth", "t.json", "--program", "x"], "multibody | springs"),
+        (["arm6", "d", "--truth", "t.json", "--point", "1,2"], "three numbers"),
+    ):
+        refused = run(*words)
+        assert refused.returncode == 2, refused.stdout
+        assert said in refused.stderr
+    assert not (tmp_path / "d").exists()

@@ -1,0 +1,132 @@
+"""All four assumptions of ``validity.py`` at one posture, as a table."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.model.robot import BeamLink, beam_axis
+from assembly.solvers.conic import SolverFailed
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness
+from validation.assumptions.spread_weight import energy_between_ends
+from validation.assumptions.validity import (
+    ENERGY_LIMIT,
+    POSITION_LIMIT,
+    Cost,
+    bush_cost,
+    closure_cost,
+    link_cost,
+    spread_cost,
+)
+from validation.multibody.simulation import without_clearance
+
+NOTHING = "nothing to compare: without errors and load neither model moves"
+
+
+def assumption_costs(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    solids: bool = False,
+) -> dict[str, Cost | str]:
+    """Costs of all four assumptions at one posture.
+
+    Closures are compared without clearances, where the pose is unique.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes; none if absent.
+        solids: whether beams of full round section are meshed, which takes minutes.
+
+    Returns:
+        By assumption its cost, or why it is not known.
+    """
+    tight = replace(posture, robot=without_clearance(posture.robot))
+    asked: dict[str, Callable[[], Cost]] = {
+        "linear closures": lambda: closure_cost(tight, load),
+        "beams, not solids": lambda: _solid_cost(posture, load, solids),
+        "weight at the links' ends": lambda: _weight_cost(posture, gravity, load),
+        "disc and cone, not two bushes": lambda: bush_cost(posture, load),
+    }
+    found: dict[str, Cost | str] = {}
+    for name, cost in asked.items():
+        try:
+            known = cost()
+            found[name] = known if known.known else NOTHING
+        except (CannotAssemble, FreeMotion, SolverFailed, _NotAsked) as error:
+            found[name] = str(error)
+    return found
+
+
+class _NotAsked(Exception):
+    """An assumption that says nothing here."""
+
+
+def _weight_cost(
+    posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
+) -> Cost:
+    """Of weights at the links' ends, if there are any."""
+    if gravity is None or not energy_between_ends(posture, gravity):
+        raise _NotAsked("no gravity, or no beam with a density")
+    return spread_cost(posture, gravity, load)
+
+
+def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
+    """Of round beams, if they are to be meshed."""
+    known: dict[tuple[float, float], NDArray] = {}
+    found = {}
+    for frame in posture.robot.frames:
+        link = frame.link
+        if not isinstance(link, BeamLink) or set(link.section) != {"radius"}:
+            continue
+        if not solids:
+            raise _NotAsked("not meshed; --solids does, in minutes")
+        key = (beam_axis(frame)[0] / link.section["radius"], link.poisson)
+        key = (round(key[0], 6), key[1])
+        if key not in known:
+            known[key] = bar_compliance(*key)
+        found[frame.name] = bar_stiffness(frame, known[key])
+    if not found:
+        raise _NotAsked("no beam of full round section")
+    return link_cost(posture, found, load)
+
+
+def costs_table(posture: Posture, costs: Mapping[str, Cost | str]) -> dict[str, Any]:
+    """Costs for machines: [rad], [m], [-]; where not known, the reason."""
+    rows: dict[str, dict[str, Any]] = {}
+    for name, cost in costs.items():
+        if isinstance(cost, Cost):
+            rows[name] = {**vars(cost), "matters": cost.matters}
+        else:
+            rows[name] = {"reason": cost}
+    limits = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
+    robot = posture.robot.name
+    return {"robot": robot, "pose": posture.pose(), "limits": limits, "costs": rows}
+
+
+def costs_text(posture: Posture, costs: Mapping[str, Cost | str]) -> str:
+    """Costs for people, one line each."""
+    lines = [f"{posture.robot.name}: what assumptions cost"]
+    for name, cost in costs.items():
+        if isinstance(cost, str):
+            lines.append(f"{name:>30}: {cost}")
+            continue
+        mark = "  beyond 20 um or 1 %" if cost.matters else ""
+        lines.append(
+            f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
+            f"urad  {_energy_text(cost.energy)}{mark}"
+        )
+    return "\n".join(lines)
+
+
+def _energy_text(share: float) -> str:
+    """A relative difference of energies; without any there is none."""
+    if math.isnan(share):
+        return "no energy is stored"
+    return f"{100 * share:8.3g} % of the energy"

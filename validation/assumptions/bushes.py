@@ -1,0 +1,89 @@
+"""Pins held in two bushes each, instead of a disc for shifts and a cone for tilts.
+
+The paper bounds a pin's radial play |(TX, TY)| <= c and its tilt |(RX, RY)| <= t apart
+from each other.  A pin in two bushes of play c, at z = +-h with h = c / t, touches
+where its axis is at their places:
+
+    |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
+
+two discs again, in other coordinates: shifted by c it cannot tilt at all.  With all
+play halved, disc and cone lie inside the two bushes; the two bushes lie inside disc and
+cone.  So bushes cost at least as much energy as disc and cone, at most as much as these
+with half the play, and the zone's margin is at most doubled.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from assembly.linear.energy import Assembly, solve_with
+from assembly.linear.load import forces_on
+from assembly.linear.zone import Zone, margin_with
+
+
+def bush_joints(joints: VirtualJoints) -> VirtualJoints:
+    """Two bushes for every pin that has both radial play and tilt.
+
+    Args:
+        joints: what may move, with discs and cones.
+
+    Returns:
+        The same with other columns in place of each such disc and cone.
+    """
+    cones = joints.cones.copy()
+    # each column of bounded play has one entry, its bound
+    rows = np.abs(joints.cones).argmax(axis=0)
+    column = {int(row): k for k, row in enumerate(rows)}
+    for i in range(len(joints.robot.frames)):
+        if not all(6 * i + r in column for r in (0, 1, 3, 4)):
+            continue
+        tilt_x, tilt_y, shift_x, shift_y = (column[6 * i + r] for r in (0, 1, 3, 4))
+        c, t = joints.cones[6 * i + 3, shift_x], joints.cones[6 * i, tilt_x]
+        for first, second, side in ((shift_x, shift_y, 1.0), (tilt_x, tilt_y, -1.0)):
+            cones[:, [first, second]] = 0.0
+            cones[6 * i + 3, first] = cones[6 * i + 4, second] = c / 2
+            cones[6 * i + 1, first] = side * t / 2
+            cones[6 * i, second] = -side * t / 2
+    return replace(joints, cones=cones)
+
+
+def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
+    """Close a manipulator with pins in two bushes each at least energy.
+
+    Args:
+        posture: where the robot stands; bounds of passive joints' own motion are left
+            out.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The assembled manipulator; its ``clearance_excess`` is against disc and cone.
+
+    Raises:
+        CannotAssemble: a closure is open that nothing can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    joints = bush_joints(virtual_joints(posture.robot))
+    return solve_with(linearise(posture), joints, wrench, forces_on(posture, wrench))
+
+
+def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
+    """Factor on all clearances at which a rigid manipulator on bushes just assembles.
+
+    Args:
+        posture: where the robot stands.
+        compliant: ``"rigid"`` or ``"free"``, as for
+            ``assembly.linear.zone.zone_margin``.
+
+    Returns:
+        The margin with a certified lower bound.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
+    joints = bush_joints(virtual_joints(posture.robot, compliant))
+    return margin_with(linearise(posture), joints)[0]

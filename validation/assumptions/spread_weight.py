@@ -1,0 +1,124 @@
+"""Weight spread over a beam, and what is lost when it acts at the beam's ends.
+
+The virtual-joint model knows a link by its two ends.  Half of the weight at either end,
+with the moments of a beam clamped at both (:func:`assembly.linear.load.weights`),
+leaves the ends as they are; what the beam stores between them is missing.  Half of the
+weight alone, without the moments, also moves the ends: a cantilever's by a third too
+far.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.load import weights
+from assembly.model.robot import BeamLink, beam_axis
+from stiffness.beam.beam import section_axes
+from stiffness.beam.sections import Section, declared_section
+
+
+@dataclass(frozen=True, eq=False)
+class HeavyBeam:
+    """A beam under its weight.
+
+    Attributes:
+        index: of its frame.
+        link: its material.
+        section: its constants.
+        length: [m].
+        line: (3,) [m] from its base to its tip, base axes.
+        weight: (3,) [N/m] across its section's x, y, z.
+        total: (3,) [N] base axes.
+    """
+
+    index: int
+    link: BeamLink
+    section: Section
+    length: float
+    line: NDArray
+    weight: NDArray
+    total: NDArray
+
+
+def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
+    """All beams of a robot that have a density.
+
+    Args:
+        posture: where the robot stands.
+        gravity: (3,) [m/s^2] base axes.
+
+    Yields:
+        Each with its weight.
+    """
+    g = np.asarray(gravity, dtype=float)
+    for index, frame in enumerate(posture.robot.frames):
+        link = frame.link
+        if not isinstance(link, BeamLink) or link.density is None:
+            continue
+        length, axis = beam_axis(frame)
+        section = declared_section(link.section, link.poisson)
+        R = posture.transforms[index, :3, :3]
+        q = link.density * section.area * g
+        own = (R @ section_axes(axis, link.up)).T @ q
+        yield HeavyBeam(
+            index, link, section, length, R @ (length * axis), own, q * length
+        )
+
+
+def energy_between_ends(
+    posture: Posture, gravity: ArrayLike, pieces: float = np.inf
+) -> float:
+    """What beams store under their own weight although both of their ends are held.
+
+    For the weight across, q^2 L^5 / 1440 EI in bending and q^2 L^3 / 24 GA in shear;
+    q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.
+
+    Args:
+        posture: where the robot stands.
+        gravity: (3,) [m/s^2] base axes.
+        pieces: number of equal ones at whose ends the weight acts, with the moments of
+            a clamped piece: what these store within themselves is then left out, the
+            share 1 / pieces^4 of bending and 1 / pieces^2 of shear and stretching.
+
+    Returns:
+        [J] the sum over all beams with a density.
+
+    Sources:
+        Timoshenko & Gere, Mechanics of Materials: beam with built-in ends under a
+        uniform load, M = q (6 L x - 6 x^2 - L^2) / 12, V = q (L / 2 - x).
+    """
+    total = 0.0
+    for beam in heavy_beams(posture, gravity):
+        link, section, L = beam.link, beam.section, beam.length
+        E, G = link.young, link.young / (2 * (1 + link.poisson))
+        x, y, z = beam.weight**2
+        bending = (z / section.I_y + y / section.I_z) * L**5 / (1440 * E)
+        slip = x / (E * section.area)
+        if link.theory == "timoshenko":
+            slip += (y / section.shear_y + z / section.shear_z) / (G * section.area)
+        total += bending * (1 - pieces**-4.0) + slip * L**3 / 24 * (1 - pieces**-2.0)
+    return total
+
+
+def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Half of each beam's weight at either end, without the moments.
+
+    Args:
+        posture: where the robot stands, of n frames.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        ``bodies`` and ``carried`` (n, 6) [N m, N] of
+        :func:`assembly.linear.load.forces_on`.
+    """
+    own, carried = weights(posture, gravity)
+    for beam in heavy_beams(posture, gravity):
+        clamp = np.cross(beam.line, beam.total) / 12
+        own[beam.index, :3] += clamp
+        parent = posture.robot.parents[beam.index]
+        if parent >= 0:
+            carried[parent, :3] -= clamp
+    return own, carried

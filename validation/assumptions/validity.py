@@ -1,0 +1,209 @@
+"""What each assumption of the virtual-joint model costs a robot at a posture.
+
+Four assumptions, each against a model without it, all else being equal:
+
+==================  ==================================================================
+assumption          instead of
+==================  ==================================================================
+linear closures     closures that hold with finite motions, :mod:`assembly.exact.exact`
+beams               solids with held ends, by finite elements
+loads at the ends   a weight spread over its link
+disc and cone       a pin in two bushes, :mod:`validation.assumptions.bushes`
+==================  ==================================================================
+
+A cost is a difference of the platform's pose and a relative difference of the energy.
+It counts where it exceeds one per cent or 20 um, the paper's robot's own target.
+Where neither model stores energy or moves the platform there is nothing to compare.
+
+Poses are compared at the solution of least energy.  Where play that no load takes up
+leaves a flat valley, that pose is one of many; ``docs/validity.md`` says where.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.exact import ExactAssembly, solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import linearise, virtual_joints
+from assembly.linear.energy import Assembly, solve_assembly, solve_with
+from assembly.linear.load import forces_on
+from assembly.model.robot import MatrixLink
+from validation.assumptions.bushes import solve_bushes
+from validation.assumptions.spread_weight import energy_between_ends, half_weights
+from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
+
+POSITION_LIMIT = 20e-6  # [m]
+ENERGY_LIMIT = 0.01  # [-]
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What an assumption costs; NaN where both models give nothing but rounding.
+
+    Attributes:
+        rotation: [rad] by which the platform's orientation is off.
+        position: [m] by which its origin is off.
+        energy: [-] by which the elastic energy is off, relative to the better model's.
+    """
+
+    rotation: float
+    position: float
+    energy: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether it costs more than one per cent or 20 um."""
+        return self.position > POSITION_LIMIT or self.energy > ENERGY_LIMIT
+
+    @property
+    def known(self) -> bool:
+        """Whether there was anything to compare."""
+        return not (math.isnan(self.position) and math.isnan(self.energy))
+
+
+def cost_between(
+    model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
+) -> Cost:
+    """What one answer gets wrong, by another.
+
+    Args:
+        model: the answer with the assumption.
+        better: the one without.
+        missing: [J] energy that neither counts but the better one has.
+
+    Returns:
+        The cost.  Without loads, energies below 1e-6 of what closing without play
+        would take count as that: inside an assembly zone both are rounding.
+    """
+    energy = better.energy + missing
+    least = 0.0 if model.forces else 1e-6 * model.energy_without_play
+    stored = max(energy, model.energy, 1e6 * least) > energy_floor(model.posture.robot)
+    moved = np.abs([model.platform_screw, better.platform_screw]).max(axis=0)
+    turn, shift = (
+        float(np.linalg.norm((model.platform_screw - better.platform_screw)[half]))
+        for half in HALVES.values()
+    )
+    nothing = not stored and all(
+        (moved[half] < FLOOR[name]).all() for name, half in HALVES.items()
+    )
+    return Cost(
+        math.nan if nothing else turn,
+        math.nan if nothing else shift,
+        abs(model.energy - energy) / max(energy, least) if stored else math.nan,
+    )
+
+
+def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
+    """What closures linear in the screws cost, against finite motions.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no answer was found.
+    """
+    exact = solve_exact(posture, load)
+    return cost_between(exact.linear, exact)
+
+
+def link_cost(
+    posture: Posture,
+    stiffness: Mapping[str, NDArray],
+    load: ArrayLike | None = None,
+) -> Cost:
+    """What it costs that links are beams.
+
+    Args:
+        posture: where the robot stands.
+        stiffness: by frame, the K_E (6, 6) [N m/rad .. N/m] they should have.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no answer was found.
+    """
+    links = {name: MatrixLink(K) for name, K in stiffness.items()}
+    other = replace(posture, robot=posture.robot.with_links({**links}))
+    return cost_between(solve_assembly(posture, load), solve_assembly(other, load))
+
+
+def spread_cost(
+    posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
+) -> Cost:
+    """What it costs that weights act at the links' ends.
+
+    The ends' equivalents of :mod:`assembly.linear.load` leave the pose as it is, and
+    miss what the beams store between their ends.
+
+    Args:
+        posture: where the robot stands.
+        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost; no pose difference to first order.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no answer was found.
+    """
+    ends = solve_assembly(posture, load, gravity=gravity)
+    return cost_between(ends, ends, missing=energy_between_ends(posture, gravity))
+
+
+def halves_cost(
+    posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
+) -> Cost:
+    """What it would cost to put half of each weight at either end, without couples.
+
+    Args:
+        posture: where the robot stands.
+        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost, against the weight spread over the links.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no answer was found.
+    """
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    own, carried = half_weights(posture, gravity)
+    halves = solve_with(
+        linearise(posture),
+        virtual_joints(posture.robot),
+        wrench,
+        forces_on(posture, wrench, own, carried),
+    )
+    ends = solve_assembly(posture, load, gravity=gravity)
+    return cost_between(halves, ends, energy_between_ends(posture, gravity))
+
+
+def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
+    """What disc and cone cost, against pins in two bushes.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no answer was found.
+    """
+    return cost_between(solve_assembly(posture, load), solve_bushes(posture, load))

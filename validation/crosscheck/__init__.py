@@ -1,0 +1,4 @@
+"""Model and simulation compared number by number, over several scales.
+
+Begin at ``crosscheck.py``; ``playcheck.py`` keeps the clearances.
+"""

@@ -1,0 +1,197 @@
+"""What two models agree on as imperfections vanish: limits, slopes, and how sure.
+
+======  ===================  ==========================================================
+symbol  code                 meaning
+======  ===================  ==========================================================
+s       ``scale``            factor on geometric errors, clearances and load
+slope   ``fit_slope``        of log difference over log scale, as s goes to 0
+limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
+======  ===================  ==========================================================
+
+A limit is known to what leaving out the largest scale changes, twice.  Nothing is asked
+below :data:`FLOOR`, which simulations do not resolve.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.model.robot import Robot
+from validation.crosscheck.link_models import link_stiffness
+from validation.crosscheck.pair import Pair, sprung
+from validation.crosscheck.verdict import Check
+
+LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to no error
+FLOOR = {"rotation": 1e-10, "translation": 1e-11}  # [rad], [m] what simulations resolve
+HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
+
+
+def spring_limits(
+    robot: Robot, pairs: Sequence[Pair], spread: bool = False
+) -> dict[str, Check]:
+    """Differences of springs and energy, extrapolated to no error.
+
+    Args:
+        robot: whose links and joint springs are looked at.
+        pairs: both answers at several scales.
+        spread: loads act between the links' ends: what links carry there is not in
+            the linear model, and links' wrenches are left out.
+
+    Returns:
+        By name, relative to the largest among all links or all joints; see
+        :func:`limit_difference`.
+    """
+    scales = np.array([pair.scale for pair in pairs])
+    stiff = _stiffest(robot)
+    screw = np.array(list(FLOOR.values()))
+    limits = {}
+    for kind, part in (("link", "link"), ("joint", "joint_stiffness")):
+        rows = [getattr(frame, part) is not None for frame in robot.frames]
+        if not any(rows):
+            continue
+        wrench = "wrenches" if kind == "link" else "joint_wrenches"
+        compared = [("screws", f"{kind}_screws", screw, ("rotation", "translation"))]
+        if kind == "joint" or not spread:
+            compared.append(("wrenches", wrench, stiff * screw, ("moment", "force")))
+        for what, linear, floor, labels in compared:
+            name = f"{kind}_{what}"
+            known = sprung(robot)[rows] if name == "joint_wrenches" else 1.0
+            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs]) * known
+            theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
+            theirs = theirs * known
+            for label, half, least in zip(labels, HALVES.values(), floor, strict=True):
+                limits[f"{kind} {label}"] = limit_difference(
+                    scales, ours[..., half], theirs[..., half], 1, least
+                )
+    ours = np.array([pair.linear_energy for pair in pairs])
+    theirs = np.array([pair.simulated.rigid_energy for pair in pairs])
+    least = energy_floor(robot)
+    return limits | {"energy": limit_difference(scales, ours, theirs, 2, least)}
+
+
+def energy_floor(robot: Robot) -> float:
+    """[J] energies below it are noise: :data:`FLOOR` in the stiffest spring."""
+    return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
+
+
+def limit_difference(
+    scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float,
+    bound: float = LIMIT_TOLERANCE, least_size: float = 0.0,
+) -> Check:  # fmt: skip
+    """Largest difference as the scale goes to 0, relative to the largest value.
+
+    Args:
+        scales: (k,) all different, largest first.
+        ours: (k, ...) values that fall as a power of the scale.
+        theirs: (k, ...) values to compare.
+        power: of the scale.
+        floor: differences below it, in the values' unit, are noise.
+        bound: on the relative difference.
+        least_size: relative to which, at least, in the unit of the values at scale 1.
+
+    Returns:
+        [-] the difference; at most the bound if only noise is left.  There is a signal
+        where the bound on our largest value is above the noise.
+    """
+    weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
+    limit, change = limit_of(scales, (theirs - ours) * weight)
+    largest = np.abs(ours * weight).max()
+    size = max(largest, floor / bound, least_size, 1e-300)
+    unsure = max(0.0, change - 2 * floor) / size
+    return Check(limit / size, bound, unsure, signal=not largest < size)
+
+
+def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
+    """Largest component at scale 0, and what it is not known to.
+
+    Args:
+        scales: (k,) all different, largest first.
+        values: (k, ...) at these scales.
+
+    Returns:
+        Its size, and twice the most that leaving out the largest scale changes.
+    """
+    limit = extrapolate(scales, values)
+    change = limit - extrapolate(scales[1:], values[1:])
+    return float(np.abs(limit).max()), 2 * float(np.abs(change).max())
+
+
+def _stiffest(robot: Robot) -> NDArray:
+    """(2,) [N m/rad, N/m] the largest stiffness of any spring to turns and shifts."""
+    diagonals = [np.zeros(6)]
+    links = [frame for frame in robot.frames if frame.link is not None]
+    diagonals += [np.diag(link_stiffness(frame)) for frame in links]
+    joints = [f.joint_stiffness for f in robot.frames if f.joint_stiffness is not None]
+    diagonals += [np.diag(np.where(np.isfinite(K), K, 0.0)) for K in joints]
+    return np.max(diagonals, axis=0).reshape(2, 3).max(axis=1)
+
+
+def fit_slope(scales: ArrayLike, values: ArrayLike, floor: float) -> float:
+    """Slope of a log-log line as the scale goes to 0.
+
+    Of three values and more, a power of the scale times ``exp(k scale)`` is fitted:
+    where a second-order term happens to be small, the third-order one bends the line
+    at large scales, and the power alone would be off by 0.1 and more.
+
+    Args:
+        scales: (k,) > 0.
+        values: (k,) >= 0.
+        floor: values below it are noise and are left out.
+
+    Returns:
+        d log value / d log scale, NaN if fewer than two values are left.
+    """
+    scales, values = np.asarray(scales), np.asarray(values)
+    clear = values > floor
+    scales, values = scales[clear], values[clear]
+    if len(values) < 2:
+        return math.nan
+    columns = [np.log(scales), np.ones(len(scales)), scales][: len(scales)]
+    fit = np.linalg.lstsq(np.transpose(columns), np.log(values))
+    return float(fit[0][0])
+
+
+def slope_check(
+    scales: NDArray, values: NDArray, floor: float, expected: float, bound: float
+) -> Check:
+    """How far a slope is from what it should be.
+
+    Args:
+        scales: (k,) largest first.
+        values: (k,) >= 0.
+        floor: values below it are noise and are left out.
+        expected: slope.
+        bound: on the difference.
+
+    Returns:
+        The difference, not known to what leaving out the largest scale changes; from
+        two scales alone nothing can be held against it.  Without two values above the
+        floor there is no slope, and no signal.
+    """
+    slope = fit_slope(scales, values, floor)
+    if math.isnan(slope):
+        return Check(math.nan, bound, signal=False)
+    fewer = fit_slope(scales[1:], values[1:], floor)
+    change = abs(slope - fewer) if not math.isnan(fewer) else math.inf
+    value = abs(slope - expected)
+    return Check(value, bound, change if value > bound else 0.0)
+
+
+def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
+    """Value at scale 0 of the polynomial through all points, by Neville's scheme.
+
+    Args:
+        scales: (k,) all different.
+        values: (k, ...) at these scales.
+
+    Returns:
+        (...) the limit; its error is of the order of the product of the scales.
+    """
+    table = [np.asarray(v, dtype=float) for v in values]
+    for step in range(1, len(table)):
+        for i in range(len(table) - step):
+            near, far = scales[i + step], scales[i]
+            table[i] = (far * table[i + 1] - near * table[i]) / (far - near)
+    return table[0]

@@ -1,0 +1,78 @@
+"""How a simulation models a robot's links: as beams, as springs or as solids."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.links import link_compliance
+from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.inputs.table import BadInput
+from validation.crosscheck.solids import mesh_bodies
+from validation.multibody.exudyn_parts import MeshBody
+
+KINDS = ("beam", "spring", "fem")
+
+
+@dataclass(frozen=True, eq=False)
+class LinkModels:
+    """How a simulation models links, ready for ``simulate_assembly``.
+
+    Attributes:
+        links: ``"beam"`` or ``"spring"``.
+        stiffness: K_E of springs by frame.
+        meshes: solids by frame.
+    """
+
+    links: str
+    stiffness: Mapping[str, NDArray]
+    meshes: Mapping[str, MeshBody]
+
+
+def link_models(robot: Robot, kind: str) -> LinkModels:
+    """What a simulation needs to model a robot's links in one of three ways.
+
+    Args:
+        robot: any.
+        kind: ``"beam"``: beams as beams, all others as springs; ``"spring"``: all as
+            springs; ``"fem"``: meshed links as solids, the others as with ``"beam"``.
+
+    Returns:
+        Stiffnesses and solids.
+
+    Raises:
+        BadInput: an unknown kind, or a mesh is not usable.
+    """
+    if kind not in KINDS:
+        raise BadInput(f"links: found {kind!r}, expected one of {', '.join(KINDS)}")
+    meshes = mesh_bodies(robot) if kind == "fem" else {}
+    stiffness = {
+        name: K
+        for name, K in link_stiffnesses(robot, kind).items()
+        if name not in meshes
+    }
+    return LinkModels("spring" if kind == "spring" else "beam", stiffness, meshes)
+
+
+def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
+    """K_E of the links that a simulation will model as springs.
+
+    Args:
+        robot: any.
+        links: ``"spring"``, or anything else, where beams need none.
+
+    Returns:
+        By frame, (6, 6) [N m/rad .. N/m] in its axes.
+    """
+    return {
+        frame.name: link_stiffness(frame)
+        for frame in robot.frames
+        if frame.link is not None
+        and (links == "spring" or not isinstance(frame.link, BeamLink))
+    }
+
+
+def link_stiffness(frame: Frame) -> NDArray:
+    """(6, 6) [N m/rad .. N/m] K_E of a frame's link."""
+    return np.linalg.inv(link_compliance(frame))

@@ -1,0 +1,160 @@
+"""Two answers side by side at one scale of a robot's imperfections."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.exact import ExactAssembly, solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import Assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.solvers.conic import SolverFailed
+from validation.multibody.simulation import MultibodyAssembly
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Both answers at one scale.
+
+    Attributes:
+        scale: factor on errors and load.
+        linear: the virtual-joint model's answer.
+        simulated: the simulation's.
+        exact: the virtual-joint model with finite rotations, None if it gave up.
+        between: [J] what weights store in the simulation's beams between their ends,
+            where the linear model knows nothing.
+    """
+
+    scale: float
+    linear: Assembly
+    simulated: MultibodyAssembly
+    exact: ExactAssembly | None
+    between: float = 0.0
+
+    @property
+    def linear_energy(self) -> float:
+        """[J] of the linear model, and what it cannot have between links' ends."""
+        return self.linear.energy + self.between
+
+    @property
+    def screw_difference(self) -> NDArray:
+        """(6,) [rad, m] platform screw, simulated minus linear."""
+        return self.simulated.platform_screw - self.linear.platform_screw
+
+    def table(self, robot: Robot) -> dict[str, Any]:
+        """Both answers and their differences, by name; see the public format."""
+        linear, simulated = self.linear, self.simulated
+        vjm = {
+            "platform_screw": linear.platform_screw,
+            "energy": linear.energy,
+            "energy_between_ends": self.between,
+            "links": _named(robot, "link", linear.wrenches),
+            "joints": _named(robot, "joint_stiffness", linear.joint_wrenches),
+        }
+        multibody = {
+            "platform_screw": simulated.platform_screw,
+            "energy": simulated.energy,
+            "links": _named(robot, "link", simulated.link_wrenches),
+            "joints": _named(robot, "joint_stiffness", simulated.joint_wrenches),
+        }
+        joints = simulated.joint_wrenches - linear.joint_wrenches
+        difference = {
+            "platform_screw": self.screw_difference,
+            "energy": simulated.energy - linear.energy,
+            "links": _named(robot, "link", simulated.link_wrenches - linear.wrenches),
+            "joints": _named(robot, "joint_stiffness", joints * sprung(robot)),
+        }
+        check = {
+            "closure_gap": simulated.gap,
+            "free_motions_held": simulated.held,
+            "seconds": simulated.seconds,
+        }
+        exact = self.exact and {
+            "platform_screw": self.exact.platform_screw,
+            "energy": self.exact.energy,
+            "links": _named(robot, "link", self.exact.wrenches),
+            "joints": _named(robot, "joint_stiffness", self.exact.wrenches),
+        }
+        return {
+            "scale": self.scale,
+            "vjm": vjm,
+            "exact_vjm": exact,
+            "multibody": multibody | check,
+            "difference": difference,
+        }
+
+
+def sprung(robot: Robot) -> NDArray:
+    """Where joints have springs: in rigid directions the simulation has no wrench.
+
+    Args:
+        robot: of n frames.
+
+    Returns:
+        (n, 6) 1 where K_B is finite, else 0.
+    """
+    rows = np.zeros((len(robot.frames), 6))
+    for row, frame in zip(rows, robot.frames, strict=True):
+        if frame.springs is not None:
+            row[:] = np.isfinite(np.diag(frame.springs))
+    return rows
+
+
+def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
+    """Rows of the frames that have a part, by name."""
+    return {
+        frame.name: row
+        for frame, row in zip(robot.frames, rows, strict=True)
+        if getattr(frame, part) is not None
+    }
+
+
+def exact_answer(
+    linear: Assembly, gravity: ArrayLike | None = None
+) -> ExactAssembly | None:
+    """The answer with finite rotations near a linear one; None if none was found.
+
+    Args:
+        linear: the answer to start from.
+        gravity: (3,) [m/s^2] base axes, the one of the linear answer.
+
+    Returns:
+        The exact answer or None.  The load's moment is a couple of dead forces on the
+        platform, as in the simulation.
+    """
+    joints, robot = linear.joints, linear.posture.robot
+    if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):
+        return None  # nothing can move
+    couple = np.zeros((len(robot.frames), 6))
+    couple[robot.index(robot.platform), :3] = linear.load[:3]
+    force = np.concatenate([np.zeros(3), linear.load[3:]])
+    try:
+        return solve_exact(linear.posture, force, linear, couple, gravity)
+    except (SolverFailed, FreeMotion):
+        return None
+
+
+def scaled(posture: Posture, scale: float) -> Posture:
+    """The same posture with all imperfections times a factor.
+
+    Args:
+        posture: nominal.
+        scale: on geometric errors and clearances.
+
+    Returns:
+        A posture of another robot.
+    """
+
+    def smaller(frame: Frame) -> Frame:
+        given = frame.clearance
+        if given is not None:
+            bounds = {k: v if v is None else scale * v for k, v in vars(given).items()}
+            given = Clearance(**bounds)
+        error = scale * frame.geometric_error
+        return replace(frame, geometric_error=error, clearance=given)
+
+    frames = tuple(smaller(frame) for frame in posture.robot.frames)
+    return replace(posture, robot=replace(posture.robot, frames=frames))

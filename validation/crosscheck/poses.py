@@ -1,0 +1,94 @@
+"""A cross-check at every pose of a grid; one that fails says so and stops nothing."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import POSE, Posture, place_many
+from assembly.model.robot import Robot
+from validation.crosscheck.crosscheck import Crosscheck, attempt
+from validation.crosscheck.playcheck import PlayCheck
+
+Answer = Crosscheck | PlayCheck
+_VERDICTS = {
+    "passed": "passed",
+    "not decided": "NOT DECIDED",
+    "no signal": "NOT CHECKED, nothing stands out of the noise",
+}
+
+
+def check_poses(
+    robot: Robot,
+    axes: Mapping[str, NDArray],
+    check: Callable[[Posture], Answer],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[dict[str, Any]]:
+    """Run a check at every reachable pose of a grid.
+
+    Args:
+        robot: with its errors.
+        axes: values [m or rad] by pose component; components not named are free.
+        check: what to run at a posture.
+        progress: called after each pose with the number done and the total.
+
+    Returns:
+        For each pose what was ``asked``, ``passed``, ``status`` and the check's table;
+        poses out of reach have the status ``"out of reach"`` and ``passed`` None.
+
+    Raises:
+        BadInput: the robot's closures do not hold in its home pose.
+    """
+    mesh = np.meshgrid(*axes.values(), indexing="ij")
+    poses = np.full((mesh[0].size, 6), np.nan)
+    for name, values in zip(axes, mesh, strict=True):
+        poses[:, POSE.index(name)] = values.ravel()
+    postures, reasons = place_many(robot, poses)
+    rows = []
+    for i, (posture, reason) in enumerate(zip(postures, reasons, strict=True)):
+        asked = {name: float(poses[i, POSE.index(name)]) for name in axes}
+        rows.append({"asked": asked} | _row(robot, posture, reason, check))
+        progress(i + 1, len(poses))
+    return rows
+
+
+def _row(
+    robot: Robot,
+    posture: Posture | None,
+    reason: str,
+    check: Callable[[Posture], Answer],
+) -> dict[str, Any]:
+    """What was found at one pose."""
+    if posture is None:
+        return {"status": "out of reach", "reason": reason, "passed": None}
+    answer, failure = attempt(robot.name, lambda: check(posture))
+    return failure if answer is None else {"status": "ok"} | answer.table()
+
+
+def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """All poses for machines: ``passed`` if every reachable one did, and one did."""
+    reached = [row for row in rows if row["passed"] is not None]
+    passed = bool(reached) and all(row["passed"] for row in reached)
+    return {"poses": rows, "passed": passed, "reached": len(reached)}
+
+
+def poses_text(rows: list[dict[str, Any]]) -> str:
+    """A line for each pose, and the verdict."""
+    lines = []
+    for row in rows:
+        where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())
+        slope = row.get("slope")
+        known = slope is not None and np.isfinite(slope)
+        said = f"slope {slope:.4f}, " if known else ""
+        verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
+        if row["passed"] is None:
+            verdict = "not checked"
+        status = "" if row["status"] == "ok" else f" ({row['status']})"
+        lines.append(f"{where}: {said}{verdict}{status}")
+    found = poses_table(rows)
+    lines.append(
+        f"{sum(row['passed'] is True for row in rows)} of {found['reached']} reachable "
+        f"poses passed"
+    )
+    return "\n".join(lines)

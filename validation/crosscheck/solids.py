@@ -1,0 +1,66 @@
+"""Meshed links as solids for a simulation: the mesh K_E comes from, and its matrix."""
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+
+from assembly.model.mesh_link import mesh_turn
+from assembly.model.robot import MeshLink, Robot
+from forcefit.inputs.table import BadInput
+from validation.multibody.exudyn_parts import MeshBody, Solid
+
+
+def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
+    """Solids of the links that a robot gives by a mesh, for a simulation.
+
+    Args:
+        robot: any.
+
+    Returns:
+        By frame, the finest mesh from which the linear model's K_E comes too; links of
+        one shape and material share one solid.
+
+    Raises:
+        BadInput: a surface or an interface is not usable, or an interface is not
+            rigid, the only kind a floating frame has here.
+    """
+    known: dict[tuple[object, ...], Solid] = {}
+    bodies = {}
+    for frame in robot.frames:
+        link = frame.link
+        if not isinstance(link, MeshLink):
+            continue
+        if link.interface != "rigid":
+            raise BadInput(
+                f'frame "{frame.name}".link.mesh.interface: found "{link.interface}", '
+                'expected "rigid" for a simulation with solids'
+            )
+        key = (link.surface, link.unit, repr(link.base), repr(link.tip),
+               link.young, link.poisson)  # fmt: skip
+        if key not in known:
+            known[key] = _solid(link)
+        solid = known[key]
+        reach = solid.centers[1] - solid.centers[0]
+        bodies[frame.name] = MeshBody(solid, mesh_turn(frame, reach))
+    return bodies
+
+
+def _solid(link: MeshLink) -> Solid:
+    """The finest mesh of a link, with its stiffness matrix."""
+    from stiffness.fem.elements import assemble
+    from stiffness.fem.fea import solve_link
+    from stiffness.fem.material import Material
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
+
+    base, tip = parse_interface(link.base), parse_interface(link.tip)
+    material = (Material(link.young, link.poisson, link.density or 0.0),)
+    found = solve_link(read_surface(link.surface, link.unit), base, tip, material)
+    mesh, constants = found.level.mesh, found.level.material
+    upper = assemble(mesh, constants[:, 0], constants[:, 1])
+    return Solid(
+        nodes=mesh.nodes,
+        stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
+        base=np.unique(mesh.faces[mesh.patch == 0]),
+        tip=np.unique(mesh.faces[mesh.patch == 1]),
+        centers=found.centers,
+    )

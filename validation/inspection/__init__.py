@@ -1,0 +1,4 @@
+"""What measured data can and cannot tell, before any diagnosis.
+
+Begin at ``inspection.py``.
+"""

@@ -1,0 +1,227 @@
+"""What a campaign's design can and cannot tell, in plain words."""
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import quoted
+from validation.campaign.campaign import LOAD, READING, Campaign
+from validation.campaign.checks import extent_of
+from validation.inspection.counts import correlation
+from validation.inspection.measuring_order import Revisits
+from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
+from validation.inspection.repeat_remarks import on_repeats
+from validation.inspection.repeats import RepeatNoise
+
+_EXPANSION = 2.4e-5  # [1/K] aluminium, about the most a machine's body expands
+_TOGETHER = 0.9  # correlation above which two covariates tell one story
+_UNIT = 0.02  # of the robot: larger deviations are hardly manufacturing errors
+
+
+def remarks_on(
+    campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
+) -> list[Remark]:
+    """All remarks, those on what is lost first.
+
+    Args:
+        campaign: of R rows.
+        repeats: how its repeats lie in the session.
+        visits: how its configurations lie in the session.
+        noise: as the repeats show it, None if there are none.
+
+    Returns:
+        Remarks.
+    """
+    found = [
+        *_on_readings(campaign), *_on_configurations(campaign, visits),
+        *_on_loads(campaign), *_on_temperature(campaign), *_on_approach(campaign),
+        *_on_time(campaign), *_on_covariates(campaign),
+        *on_repeats(campaign, repeats, noise),
+    ]  # fmt: skip
+    return sorted(found, key=lambda r: (LOST, CAREFUL, FINE).index(r.weight))
+
+
+def _on_readings(campaign: Campaign) -> list[Remark]:
+    """Components never measured, stuck, rounded, or suspiciously large."""
+    found = []
+    measured, sigma = campaign.measured, campaign.sigma
+    absent = [n for n, c in zip(READING, campaign.cells.T, strict=True) if not c.any()]
+    if absent:
+        text = (
+            f"Never measured: {', '.join(absent)}. What only they would show is lost."
+        )
+        found.append(Remark("readings", LOST, text))
+    for k, name in enumerate(READING):
+        column = measured[campaign.cells[:, k], k]
+        if len(column) < 3 or np.isnan(sigma[campaign.cells[:, k], k]).all():
+            continue
+        values = np.unique(column)
+        typical = float(np.median(sigma[campaign.cells[:, k], k]))
+        if len(values) == 1:
+            text = f"{name} reads the same in every row: is the device connected?"
+            found.append(Remark("readings", CAREFUL, text))
+        elif len(values) < len(column) / 2 and np.diff(values).min() > 2 * typical:
+            step = np.diff(values).min()
+            text = f"{name} is rounded to {step:.2g}, more than twice its sigma " \
+                   f"{typical:.2g}: the noise is that of the rounding."  # fmt: skip
+            found.append(Remark("readings", CAREFUL, text))
+    extent = extent_of(campaign.transforms, np.zeros((1, 3)))
+    largest = np.nanmax(np.abs(measured[:, 3:]), initial=0.0)
+    if campaign.registration == "known" and largest > _UNIT * extent:
+        text = (
+            f"The largest deviation is {largest:.3g} m, the robot {extent:.3g} m "
+            'across: is the unit m, and is the registration really "known"?'
+        )
+        found.append(Remark("readings", CAREFUL, text))
+    return found
+
+
+def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
+    """Joints that never moved, and configurations measured in one go."""
+    found = []
+    robot = campaign.robot
+    still = [
+        f.name
+        for i, f in enumerate(robot.frames)
+        if f.actuated and np.ptp(campaign.coordinates[:, i]) < 1e-9
+    ]
+    count = len(np.unique(campaign.configuration))
+    if count == 1:
+        text = (
+            "One configuration only: errors of geometry, offsets and a wrong "
+            "registration all look alike."
+        )
+        found.append(Remark("configurations", LOST, text))
+    elif still:
+        text = f"Never moved: {', '.join(quoted(s) for s in still[:6])}. An offset " \
+               "there looks like a link of another length or angle."  # fmt: skip
+        found.append(Remark("configurations", LOST, text))
+    if visits.order == "back to back" and count > 1:
+        text = (
+            "Every configuration was measured in one go: whatever changes with time "
+            "looks like an effect of the configuration."
+        )
+        found.append(Remark("configurations", LOST, text))
+    return found
+
+
+def _on_loads(campaign: Campaign) -> list[Remark]:
+    """Load levels, and whether load and configuration vary separately."""
+    loads = campaign.loads
+    if not loads.any():
+        text = (
+            "No load was ever applied: compliance and play show at most through the "
+            "machine's own weight and inner forces, a wrong load not at all."
+        )
+        return [Remark("load", LOST, text)]
+    found = []
+    both = np.column_stack([campaign.configuration, campaign.repeat])
+    kinds = np.unique(both, axis=0)[:, 0]
+    twice = int((np.bincount(kinds) > 1).sum())
+    if len(np.unique(loads.round(9), axis=0)) == 1:
+        text = (
+            "One load in every row: what it does cannot be told from errors that are "
+            "there without it, nor a compliance that hardens from one that does not."
+        )
+        found.append(Remark("load", LOST, text))
+    elif twice == 0:
+        text = (
+            "No configuration was measured under two loads: what the load does and "
+            "what the configuration does are told apart by the model alone."
+        )
+        found.append(Remark("load", CAREFUL, text))
+    else:
+        rank = np.linalg.matrix_rank(loads[:, 3:], 1e-6 * np.abs(loads).max())
+        if rank == 1:
+            text = "The load always acts along one line: compliance is known along it."
+            found.append(Remark("load", CAREFUL, text))
+        else:
+            text = f"{twice} configurations were measured under more than one load."
+            found.append(Remark("load", FINE, text))
+    return found
+
+
+def _on_temperature(campaign: Campaign) -> list[Remark]:
+    """Whether thermal expansion could show at all."""
+    temperature = campaign.covariates.get("temperature")
+    if temperature is None:
+        text = (
+            "No cov.temperature: thermal expansion can be neither found nor excluded."
+        )
+        return [Remark("temperature", LOST, text)]
+    span = float(np.ptp(temperature))
+    if span == 0.0:
+        value = float(temperature[0])
+        what = (
+            "thermal expansion looks exactly like longer links"
+            if value
+            else "thermal expansion leaves no trace"
+        )
+        text = f"The temperature stayed at {value:+.3g} K in every row: {what}."
+        return [Remark("temperature", LOST, text)]
+    extent = extent_of(campaign.transforms, np.zeros((1, 3)))
+    most = _EXPANSION * span * extent
+    sigma = campaign.sigma[:, 3:][campaign.cells[:, 3:]]
+    if sigma.size and most < np.median(sigma):
+        text = (
+            f"The temperature varied by {span:.2g} K: even aluminium would move the "
+            f"platform by {most:.2g} m at most, less than one sigma."
+        )
+        return [Remark("temperature", CAREFUL, text)]
+    text = f"The temperature varied by {span:.2g} K."
+    return [Remark("temperature", FINE, text)]
+
+
+def _on_approach(campaign: Campaign) -> list[Remark]:
+    """Whether friction could show at all."""
+    side = campaign.covariates.get("approach")
+    if side is None:
+        text = "No cov.approach: friction can be neither found nor excluded."
+        return [Remark("approach", LOST, text)]
+    if np.ptp(side) == 0.0:
+        text = "Every row was approached from one side: friction looks like an offset."
+        return [Remark("approach", LOST, text)]
+    both = _in_both(campaign.configuration, side)
+    if not both:
+        text = (
+            "No configuration was approached from both sides: friction and the "
+            "configuration are told apart by the model alone."
+        )
+        return [Remark("approach", CAREFUL, text)]
+    return [
+        Remark("approach", FINE, f"{both} configurations approached on both sides.")
+    ]
+
+
+def _on_time(campaign: Campaign) -> list[Remark]:
+    """Whether a drift could show at all."""
+    if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
+        text = (
+            "No cov.time, or the same in every row: a drift can be neither found nor "
+            "excluded; the order of the file is taken as that of measurement."
+        )
+        return [Remark("time", LOST, text)]
+    return []
+
+
+def _on_covariates(campaign: Campaign) -> list[Remark]:
+    """Covariates that rise and fall together."""
+    columns = dict(campaign.covariates)
+    for name, values in zip(LOAD, campaign.loads.T, strict=True):
+        columns[f"load.{name}"] = values
+    found = []
+    for (a, x), (b, y) in combinations(columns.items(), 2):
+        together = correlation(x, y)
+        if abs(together) > _TOGETHER:
+            text = (
+                f"{a} and {b} vary together (correlation {together:+.2f}): what one "
+                "does looks much like what the other does."
+            )
+            found.append(Remark("covariates", CAREFUL, text))
+    return found
+
+
+def _in_both(configuration: NDArray, side: NDArray) -> int:
+    """Number of configurations approached from both sides."""
+    return len(np.intersect1d(configuration[side > 0], configuration[side < 0]))

@@ -1,0 +1,151 @@
+"""What each effect of the library would do to a campaign's readings."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY
+from assembly.effects.registration import BASE
+from forcefit.inputs.table import BadInput
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.registration import register
+from validation.diagnosis.signatures import Tangents, conditions_of, loaded_components
+from validation.inspection.repeats import slow_changes
+
+# finite motions have no unknown, and their exact model takes seconds a row
+_NOT_COMPARED = ("geometric_stiffening",)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignSignatures:
+    """Changes of the readings over sigma, each unknown at a plausible size.
+
+    Attributes:
+        columns: (N, k) by effect; every frame has unknowns of its own, but play is the
+            same in all joints (in each it takes another branch with the load).
+        nuisance: (N, p) what an unknown registration does.
+        untestable: why an effect has no columns, by effect.
+        unregistered: why an unknown registration cannot be found; empty if it can.
+    """
+
+    columns: dict[str, NDArray]
+    nuisance: NDArray
+    untestable: dict[str, str]
+    unregistered: str
+
+
+def design_signatures(
+    campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
+) -> DesignSignatures:
+    """Signatures of all effects of the library on a campaign.
+
+    An unknown registration is fitted first, so that signatures are read in the axes of
+    the measuring device; where it cannot be found they are read in the base's.
+
+    Args:
+        campaign: of N measured cells.
+        progress: called with effects done and their number.
+
+    Returns:
+        The signatures.
+    """
+    here, unregistered = conditions_of(campaign), ""
+    if campaign.registration == "unknown":
+        try:
+            here = register(campaign, here)
+        except BadInput as error:
+            unregistered = str(error)
+    tangents = Tangents(campaign, here)
+    shown = _one_each(hypotheses(here, loaded_components(campaign)))
+    columns, untestable = {}, {}
+    for done, name in enumerate(LIBRARY):
+        progress(done, len(LIBRARY))
+        if name in _NOT_COMPARED:
+            untestable[name] = "finite motions are compared by the diagnosis itself"
+        elif name not in shown:
+            needs = LIBRARY[name].needs
+            lacking = [f"cov.{n}" for n in needs if not _given(campaign, n)]
+            untestable[name] = (
+                f"needs {', '.join(lacking)}, not 0 in every row"
+                if lacking
+                else "the robot has no place where it could act"
+            )
+        else:
+            found = _at_plausible_sizes(tangents, shown[name])
+            if np.isfinite(found).all():
+                columns[name] = found
+            else:
+                untestable[name] = "the model has no answer in some rows"
+    progress(len(LIBRARY), len(LIBRARY))
+    nuisance = np.zeros((int(campaign.cells.sum()), 0))
+    if campaign.registration == "unknown":
+        names = [n for slot in shown["registration"].slots for n in slot.names]
+        base = [k for k, n in enumerate(names) if n in BASE]
+        nuisance = columns["registration"][:, base]
+        columns["registration"] = np.delete(columns["registration"], base, axis=1)
+    return DesignSignatures(columns, nuisance, untestable, unregistered)
+
+
+def changes_between_repeats(
+    campaign: Campaign, signatures: DesignSignatures
+) -> dict[str, NDArray]:
+    """Columns for :func:`validation.inspection.repeats.repeat_noise`.
+
+    Args:
+        campaign: of N measured cells.
+        signatures: of the library on it.
+
+    Returns:
+        Those of :func:`validation.inspection.repeats.slow_changes`, with what heat and
+        friction do in each configuration.
+    """
+    slow = slow_changes(campaign)
+    acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
+    for covariate, effect in acts.items():
+        if covariate in slow and effect in signatures.columns:
+            slow[covariate] = np.hstack([slow[covariate], signatures.columns[effect]])
+    return slow
+
+
+def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
+    """One hypothesis for each effect; of shapes looked at, the middle one."""
+    found: dict[str, Hypothesis] = {}
+    for name in dict.fromkeys(h.effect for h in every):
+        of = [h for h in every if h.effect == name]
+        most = max(len(h.slots) for h in of)
+        full = [h for h in of if len(h.slots) == most]
+        if name == "joint_clearance":
+            wide = max(len(h.where) for h in of)
+            alike = [h for h in of if len(h.where) == wide]
+            full = [min(alike, key=lambda h: len(h.slots))]
+        found[name] = full[len(full) // 2]
+    return found
+
+
+def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
+    """(N, k) change of the readings with one unknown at a time at its size."""
+    effect = LIBRARY[hypothesis.effect]
+    shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
+    rest = {
+        n: 0.0
+        for s in hypothesis.slots
+        if not s.shape and s.start == 0.0
+        for n in s.names
+    }
+    columns = []
+    for slot in hypothesis.slots:
+        if not slot.shape:
+            scale = slot.unknown.scale
+            size = slot.start + scale if effect.linear else scale
+            values = {**rest, **shapes, **dict.fromkeys(slot.names, size)}
+            public = effect.public(tangents.here.robot, values)
+            columns.append(tangents.model({effect.name: public}) - tangents.declared)
+    return np.column_stack(columns)
+
+
+def _given(campaign: Campaign, covariate: str) -> bool:
+    """Whether a covariate is there and not zero throughout."""
+    return bool(np.any(campaign.covariates.get(covariate, 0.0)))

@@ -1,0 +1,159 @@
+"""A campaign looked at before any diagnosis: what is there, and what it can tell."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+from numpy.typing import NDArray
+
+from assembly.measurement.predict import predict
+from forcefit.inputs.display import html_table, short_repr
+from validation.campaign.campaign import READING, Campaign
+from validation.diagnosis.separability import Separability, compare_signatures
+from validation.diagnosis.signatures import conditions_of
+from validation.inspection.counts import (
+    covariate_counts,
+    load_counts,
+    reading_counts,
+    row_counts,
+)
+from validation.inspection.design_remarks import remarks_on
+from validation.inspection.design_signatures import (
+    DesignSignatures,
+    changes_between_repeats,
+    design_signatures,
+)
+from validation.inspection.measuring_order import Revisits, revisits
+from validation.inspection.remark import CAREFUL, LOST, Remark
+from validation.inspection.repeats import RepeatNoise, repeat_noise
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What a campaign's design can and cannot tell.
+
+    Attributes:
+        campaign: of R rows.
+        repeats: how rows of the same configuration and load lie in the session.
+        visits: how rows of the same configuration lie in it.
+        noise: as the repeats show it, None if nothing was measured twice.
+        signatures: of the library's effects.
+        separability: their angles.
+        remarks: sentences, those on what is lost first.
+        open: (R,) bool, rows where the robot's declared play leaves its pose free.
+    """
+
+    campaign: Campaign
+    repeats: Revisits
+    visits: Revisits
+    noise: RepeatNoise | None
+    signatures: DesignSignatures
+    separability: Separability
+    remarks: tuple[Remark, ...]
+    open: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def table(self) -> dict:
+        """Everything, in plain values for JSON."""
+        c = self.campaign
+        return {
+            "campaign": c.name,
+            "robot": c.robot.name,
+            "rows": len(c),
+            "commanded": c.commanded,
+            "registration": c.registration,
+            "reference_point": c.reference_point,
+            "configurations": row_counts(c.configuration) | asdict(self.visits)
+            | {"order": self.visits.order},
+            "loads": load_counts(c),
+            "readings": reading_counts(c),
+            "covariates": covariate_counts(c),
+            "repeats": asdict(self.repeats) | {"order": self.repeats.order},
+            "noise": _noise_table(c, self.noise),
+            "effects": self._effect_table(),
+            "inseparable": self.separability.classes(),
+            "imitated": self.separability.imitated(),
+            "overlapping": self.separability.overlapping(),
+            "cosines": {
+                "effects": self.separability.names,
+                "smallest_angle": self.separability.cosine,
+                "shared": self.separability.shared,
+            },
+            "remarks": [asdict(r) for r in self.remarks],
+            "open": [i for i, free in zip(c.ids, self.open, strict=True) if free],
+        }  # fmt: skip
+
+    def _effect_table(self) -> dict:
+        """Each effect: how much of it would show."""
+        found: dict[str, dict] = {
+            name: {"testable": False, "why": why}
+            for name, why in self.signatures.untestable.items()
+        }
+        s = self.separability
+        for i, name in enumerate(s.names):
+            found[name] = {
+                "testable": bool(s.traced[i]),
+                "shows": bool(s.visible[i]),
+                "shows_at": s.shows_at[i],
+                "strength": s.strength[i],
+                "left_by_registration": s.left[i],
+                "unknowns": s.unknowns[i],
+                "rank": s.rank[i],
+            }
+        return found
+
+
+def inspect_campaign(
+    campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
+) -> Inspection:
+    """Look at a campaign's design.
+
+    Args:
+        campaign: as read.
+        progress: called with effects done and their number.
+
+    Returns:
+        What it can and cannot tell.
+    """
+    signatures = design_signatures(campaign, progress)
+    noise = repeat_noise(campaign, changes_between_repeats(campaign, signatures))
+    repeats = revisits(campaign, campaign.repeat)
+    visits = revisits(campaign, campaign.configuration)
+    remarks = remarks_on(campaign, repeats, visits, noise)
+    remarks += [Remark("robot", CAREFUL, text) for text in campaign.robot.remarks]
+    if signatures.unregistered:
+        text = f"The registration cannot be found. {signatures.unregistered}"
+        remarks.insert(0, Remark("registration", LOST, text))
+    return Inspection(
+        campaign=campaign,
+        repeats=repeats,
+        visits=visits,
+        noise=noise,
+        signatures=signatures,
+        separability=compare_signatures(signatures.columns, signatures.nuisance),
+        remarks=tuple(remarks),
+        open=predict(conditions_of(campaign)).open,
+    )
+
+
+def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
+    """Noise from repeats against the stated one, suspects by their labels."""
+    if noise is None:
+        return None
+    return {
+        "ratio": noise.ratio,
+        "degrees": noise.degrees,
+        "interval": noise.interval,
+        "ratio_with_slow_changes": noise.plain,
+        "chance_without_change": noise.taken_out,
+        "component": dict(zip(READING, noise.component.tolist(), strict=True)),
+        "component_degrees": dict(
+            zip(READING, noise.component_degrees.tolist(), strict=True)
+        ),
+        "component_interval": dict(
+            zip(READING, noise.component_interval.tolist(), strict=True)
+        ),
+        "suspects": [
+            asdict(s) | {"rows": [c.ids[i] for i in s.rows]} for s in noise.suspects
+        ],
+    }

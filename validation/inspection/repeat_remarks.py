@@ -1,0 +1,91 @@
+"""What the repeats of a campaign say about its noise, in plain words."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from validation.campaign.campaign import Campaign
+from validation.inspection.measuring_order import Revisits, session_clock
+from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
+from validation.inspection.repeats import MOST, RepeatNoise
+
+_FEW = 20  # degrees of freedom below which noise is known worse than to +-30 %
+_SELDOM = 1e-3  # chance below which something is no coincidence
+_SEVERAL = 4  # suspects that may form a pattern
+
+
+def on_repeats(
+    campaign: Campaign, repeats: Revisits, noise: RepeatNoise | None
+) -> list[Remark]:
+    """What the repeats say about the noise.
+
+    Args:
+        campaign: of R rows.
+        repeats: how its repeats lie in the session.
+        noise: as they show it, None if there are none.
+
+    Returns:
+        Remarks.
+    """
+    if noise is None:
+        text = (
+            "Nothing was measured twice: the noise cannot be checked, and whether the "
+            "best model fits is judged by the stated sigma alone."
+        )
+        return [Remark("repeats", LOST, text)]
+    found = []
+    if repeats.order == "back to back":
+        text = (
+            "Repeats were measured in a row: slow drift does not show in them, the "
+            "noise looks too small and a sound model then looks wrong."
+        )
+        found.append(Remark("repeats", CAREFUL, text))
+    elif repeats.order == "mixed":
+        text = "Only some repeats are spread over the session: drift shows in part."
+        found.append(Remark("repeats", CAREFUL, text))
+    elif repeats.order == "interleaved":
+        found.append(Remark("repeats", FINE, "Repeats are spread over the session."))
+    if noise.degrees < _FEW:
+        text = f"Few repeats: {noise.degrees} degrees of freedom in all."
+        found.append(Remark("repeats", CAREFUL, text))
+    low, high = noise.interval
+    size = f"{noise.ratio:.2f} times the stated sigma ({low:.2f} ... {high:.2f})"
+    squares = noise.degrees * noise.ratio**2
+    if chi2.sf(squares, noise.degrees) < _SELDOM:
+        text = (
+            f"Repeats scatter {size}: sigma is stated too small, or something changes "
+            "in between that is neither time, temperature nor approach."
+        )
+        found.append(Remark("repeats", CAREFUL, text))
+    elif chi2.cdf(squares, noise.degrees) < _SELDOM:
+        text = (
+            f"Repeats scatter only {size}: sigma is stated too large, or repeats share "
+            "an error."
+        )
+        found.append(Remark("repeats", CAREFUL, text))
+    for name, chance in noise.taken_out.items():
+        if chance < _SELDOM:
+            text = f"Repeats change with {name}, more than noise does."
+            found.append(Remark("repeats", CAREFUL, text))
+    return found + _on_suspects(campaign, noise)
+
+
+def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
+    """Whether readings far from their repeats look like single mistakes."""
+    suspects = noise.suspects
+    if len(suspects) < _SEVERAL:
+        return []
+    order = np.argsort(np.argsort(session_clock(campaign), kind="stable"))
+    rows = sorted({int(order[i]) for s in suspects for i in s.rows})
+    if 2 * np.count_nonzero(np.diff(rows) == 1) >= len(rows) - 1:
+        text = (
+            "Readings far from their repeats follow each other in time: something "
+            "changed quickly then, they are hardly single mistakes."
+        )
+        return [Remark("suspects", CAREFUL, text)]
+    if len(suspects) == MOST:
+        text = (
+            f"{MOST} readings and perhaps more lie far from their repeats: the scatter "
+            "is not that of a normal distribution."
+        )
+        return [Remark("suspects", CAREFUL, text)]
+    return []

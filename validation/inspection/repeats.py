@@ -1,0 +1,271 @@
+"""Repeats: what a machine and its measuring device scatter when nothing changes.
+
+Rows of the same configuration and load share a mean; what is left is noise, plus
+whatever changed between them.  Slow changes (time, temperature, side of approach) are
+fitted to all sets at once and taken out, so that drift does not count as noise.
+
+======  =============  =========  ================================================
+symbol  code           shape      meaning
+======  =============  =========  ================================================
+z       ``whitened``   (N,)       readings / stated sigma, measured cells row by row
+B       ``slow``       (N, p)     columns of slow changes / sigma
+e       ``rest``       (N,)       z less its set's mean and the best B x
+h       ``leverage``   (N,)       what a cell has contributed to its own fit
+======  =============  =========  ================================================
+
+Sources:
+    Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual
+    e / (s sqrt(1 - h)), s without the cell, is Student's t; the largest of N is judged
+    by Bonferroni's bound.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.stats import chi2, f, t
+
+from validation.campaign.campaign import READING, Campaign
+from validation.inspection.measuring_order import session_clock
+
+_LEVEL = 0.01  # chance that a sound campaign has a suspect row
+MOST = 20  # suspects that are looked for
+_RANK = 1e-9  # relative singular value below which columns are one
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A reading too far from its repeats.
+
+    Attributes:
+        rows: its row; both rows of a set of two, which cannot tell which is wrong.
+        component: of the reading.
+        size: [-] deleted residual, Student's t.
+        chance: that noise alone gives one so large anywhere in the campaign.
+    """
+
+    rows: tuple[int, ...]
+    component: str
+    size: float
+    chance: float
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatNoise:
+    """Noise as the repeats show it.  Intervals are of 90 %.
+
+    Attributes:
+        ratio: [-] scatter over stated sigma, all components together.
+        degrees: of freedom behind it.
+        interval: of the ratio.
+        plain: the ratio if slow changes are left in.
+        taken_out: slow changes that were fitted and taken out, by name: the chance
+            that noise alone looks so much like them.
+        component: (6,) [rad, m] one standard deviation; NaN where nothing repeats.
+        component_degrees: (6,) of freedom.
+        component_interval: (6, 2) [rad, m].
+        suspects: readings too far from their repeats, left out of all the above.
+    """
+
+    ratio: float
+    degrees: int
+    interval: tuple[float, float]
+    plain: float
+    taken_out: dict[str, float]
+    component: NDArray
+    component_degrees: NDArray
+    component_interval: NDArray
+    suspects: tuple[Suspect, ...]
+
+
+def repeat_noise(
+    campaign: Campaign, slow: Mapping[str, NDArray] | None = None
+) -> RepeatNoise | None:
+    """Noise from the repeats of a campaign, slow changes taken out.
+
+    They are left in where they would use up more than half of what the repeats can
+    tell.
+
+    Args:
+        campaign: of N measured cells.
+        slow: (N, p) columns by name, over sigma, of what may change between repeats;
+            those of :func:`slow_changes` if absent.
+
+    Returns:
+        The noise; None if nothing was measured twice.
+    """
+    slow = slow_changes(campaign) if slow is None else slow
+    suspects: list[Suspect] = []
+    out: set[int] = set()
+    while True:
+        cells = _repeated_cells(campaign, out)
+        if not cells.any():
+            return None
+        fit = _Fit(campaign, cells, slow)
+        suspect = fit.suspect()
+        if suspect is None or len(suspects) == MOST:
+            return fit.noise(suspects)
+        suspects.append(suspect)
+        out.update(suspect.rows)
+
+
+def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
+    """What may change between repeats, alike in every configuration.
+
+    Args:
+        campaign: of N measured cells.
+
+    Returns:
+        (N, p) columns over sigma by name: a settling and a cubic in time (in the order
+        of the file if no time is given), and a shift with temperature and with the side
+        of approach where they vary; for each component its own.
+    """
+    clock = 2 * session_clock(campaign) - 1
+    shapes = {
+        "time": np.column_stack([
+            np.exp(-5 * (clock + 1)),
+            legendre.legvander(clock, 3)[:, 1:],
+        ])
+    }
+    for name in ("temperature", "approach"):
+        values = campaign.covariates.get(name, np.zeros(len(campaign)))
+        if np.ptp(values) > 0:
+            shapes[name] = (values - values.mean())[:, None] / np.ptp(values)
+    return {name: for_each_component(campaign, v) for name, v in shapes.items()}
+
+
+def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
+    """Columns that shift the components one by one.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        shapes: (R, p) how the shift changes from row to row.
+
+    Returns:
+        (N, 6 p) over sigma.
+    """
+    cells = campaign.cells
+    row, component = np.nonzero(cells)
+    apart = np.eye(6)[component] / campaign.sigma[cells][:, None]
+    return (shapes[row][:, :, None] * apart[:, None, :]).reshape(len(row), -1)
+
+
+def _sets(campaign: Campaign) -> NDArray:
+    """(N,) number of the set of repeats of each measured cell."""
+    row, component = np.nonzero(campaign.cells)
+    return campaign.repeat[row] * 6 + component
+
+
+def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
+    """(N,) bool: measured cells with another of their set, rows left out aside."""
+    row, _ = np.nonzero(campaign.cells)
+    kept = ~np.isin(row, list(out))
+    sets = _sets(campaign)
+    count = np.bincount(sets[kept], minlength=sets.max(initial=0) + 1)
+    return kept & (count[sets] > 1)
+
+
+class _Fit:
+    """Set means and slow changes fitted to repeated cells."""
+
+    def __init__(
+        self, campaign: Campaign, cells: NDArray, slow: Mapping[str, NDArray]
+    ) -> None:
+        row, component = np.nonzero(campaign.cells)
+        self.row, self.component = row[cells], component[cells]
+        self.campaign = campaign
+        self.sigma = campaign.sigma[campaign.cells][cells]
+        _, self.set = np.unique(_sets(campaign)[cells], return_inverse=True)
+        self.count = np.bincount(self.set)
+        self.z = self._centred(
+            campaign.measured[campaign.cells][cells][:, None] / self.sigma[:, None]
+        )[:, 0]
+        self.plain_degrees = int((self.count - 1).sum())
+        self.slow = {name: self._centred(B[cells]) for name, B in slow.items()}
+        self.basis = _basis(self.slow.values(), len(self.z))
+        if self.basis.shape[1] > self.plain_degrees / 2:
+            self.slow, self.basis = {}, np.zeros((len(self.z), 0))
+        self.degrees = self.plain_degrees - self.basis.shape[1]
+        self.rest = self.z - self.basis @ (self.basis.T @ self.z)
+        self.leverage = 1 / self.count[self.set] + (self.basis**2).sum(axis=1)
+        self.rss = float(self.rest @ self.rest)
+
+    def _centred(self, columns: NDArray) -> NDArray:
+        """Columns less their mean in every set."""
+        sums = np.zeros((len(self.count), columns.shape[1]))
+        np.add.at(sums, self.set, columns)
+        return columns - (sums / self.count[:, None])[self.set]
+
+    def suspect(self) -> Suspect | None:
+        """The reading farthest from its repeats, if noise hardly gives such a one."""
+        if self.degrees < 2 or self.rss == 0.0:
+            return None
+        free = np.maximum(1 - self.leverage, 1e-12)
+        others = np.maximum(self.rss - self.rest**2 / free, 1e-300)
+        size = self.rest * np.sqrt((self.degrees - 1) / (others * free))
+        i = int(np.argmax(np.abs(size)))
+        chance = float(2 * t.sf(abs(size[i]), self.degrees - 1) * len(size))
+        if chance >= _LEVEL:
+            return None
+        pair = self.count[self.set[i]] == 2
+        rows = self.row[self.set == self.set[i]] if pair else self.row[[i]]
+        return Suspect(
+            tuple(rows.tolist()), READING[self.component[i]], float(size[i]), chance
+        )
+
+    def noise(self, suspects: list[Suspect]) -> RepeatNoise:
+        """The answer."""
+        free, rest = 1 - self.leverage, self.rest**2
+        degrees = np.bincount(self.component, free, 6)
+        cells = np.maximum(np.bincount(self.component, minlength=6), 1)
+        size = np.bincount(self.component, self.sigma**2, 6) / cells
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.sqrt(np.bincount(self.component, rest, 6) / degrees)
+            known = degrees > 0.5
+            component = np.where(known, ratio * np.sqrt(size), np.nan)
+        factors = np.array([
+            _interval(d) if d > 0.5 else (np.nan,) * 2 for d in degrees
+        ])
+        whole = np.sqrt(self.rss / self.degrees)
+        low, high = _interval(self.degrees)
+        return RepeatNoise(
+            ratio=float(whole),
+            degrees=self.degrees,
+            interval=(float(whole * low), float(whole * high)),
+            plain=float(np.sqrt(self.z @ self.z / self.plain_degrees)),
+            taken_out={name: self._chance(name) for name in self.slow},
+            component=component,
+            component_degrees=np.where(known, degrees, 0.0),
+            component_interval=component[:, None] * factors,
+            suspects=tuple(suspects),
+        )
+
+    def _chance(self, name: str) -> float:
+        """That noise alone looks so much like one slow change, the others known."""
+        others = [B for key, B in self.slow.items() if key != name]
+        basis = _basis(others, len(self.z))
+        rest = self.z - basis @ (basis.T @ self.z)
+        more = self.basis.shape[1] - basis.shape[1]
+        if more == 0 or self.rss == 0.0:
+            return 1.0
+        size = (float(rest @ rest) - self.rss) / more / (self.rss / self.degrees)
+        return float(f.sf(size, more, self.degrees))
+
+
+def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
+    """(rows, rank) orthonormal basis of all columns."""
+    columns = np.column_stack([np.zeros((rows, 0)), *blocks])
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns[:, size > 0] / size[size > 0]
+    if not columns.size:
+        return np.zeros((rows, 0))
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return U[:, s > _RANK * s[0]]
+
+
+def _interval(degrees: float) -> tuple[float, float]:
+    """90 % interval of a standard deviation, as factors on its estimate."""
+    low, high = chi2.ppf([0.05, 0.95], degrees)
+    return float(np.sqrt(degrees / high)), float(np.sqrt(degrees / low))

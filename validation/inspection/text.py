@@ -1,0 +1,142 @@
+"""An inspection of a campaign in words and lines."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.campaign.campaign import READING, Campaign
+from validation.inspection.counts import (
+    covariate_counts,
+    load_counts,
+    reading_counts,
+    row_counts,
+)
+from validation.inspection.inspection import Inspection
+from validation.inspection.remark import CAREFUL, LOST
+from validation.inspection.repeats import RepeatNoise
+
+
+def inspection_text(found: Inspection) -> str:
+    """An inspection for people."""
+    c = found.campaign
+    kinds = row_counts(c.configuration)
+    lines = [
+        f"{c.name}: {len(c)} rows of {c.robot.name}, {kinds['count']} "
+        f"configurations commanded by {c.commanded}, registration {c.registration}",
+        *_reading_lines(c),
+        *_load_lines(c),
+        *_covariate_lines(c),
+        f"repeats: {found.repeats.sets} sets of {found.repeats.rows} rows, "
+        f"{found.repeats.order}",
+        *_noise_lines(c, found.noise),
+        *([open_text(found.open)] if found.open.any() else []),
+        "",
+        *_separability_lines(found),
+    ]
+    heads = {LOST: "What this campaign cannot tell:", CAREFUL: "Be careful:"}
+    for weight, head in heads.items():
+        said = [f"  {r.text}" for r in found.remarks if r.weight == weight]
+        lines += ["", head, *said] if said else []
+    return "\n".join(lines)
+
+
+def open_text(open_: NDArray) -> str:
+    """In which rows play leaves the pose free, and what is then predicted.
+
+    Args:
+        open_: (R,) bool, by row.
+
+    Returns:
+        One line.
+    """
+    return (
+        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
+        "(marked open): of the poses of least energy one is predicted there, in a "
+        "closed chain the nearest to nominal, in an open one that of play in the middle"
+    )
+
+
+def _separability_lines(inspection: Inspection) -> list[str]:
+    """Which effects would show, and which look alike."""
+    s = inspection.separability
+    lines = ["Effects, at plausible sizes, in this design:"]
+    shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
+    lines.append(f"  would show: {', '.join(shown) or 'none'}")
+    small = s.traced & ~s.visible
+    weak = [
+        f"{n} (at {s.shows_at[i]:.2g} times that size)"
+        for i, n in enumerate(s.names)
+        if small[i]
+    ]
+    if weak:
+        lines.append(f"  would show only if larger: {', '.join(weak)}")
+    none = [n for n, traced in zip(s.names, s.traced, strict=True) if not traced]
+    if none:
+        lines.append(f"  leaves no trace: {', '.join(none)}")
+    for name, why in inspection.signatures.untestable.items():
+        lines.append(f"  not testable: {name}: {why}")
+    for group in s.classes():
+        lines.append(f"  cannot be told apart: {', '.join(group)}")
+    for a, b in s.imitated():
+        lines.append(f"  whatever {a} does, {b} can do as well")
+    by_first: dict[str, list[str]] = {}
+    for a, b in s.overlapping():
+        by_first.setdefault(a, []).append(b)
+    for a, others in by_first.items():
+        lines.append(f"  some of what {a} does looks like: {', '.join(others)}")
+    return lines
+
+
+def _reading_lines(c: Campaign) -> list[str]:
+    """One line for each component measured."""
+    lines = []
+    for name, entry in reading_counts(c).items():
+        if entry["measured"]:
+            unit = "rad" if name[0] == "r" else "m"
+            low, high = entry["sigma"]
+            sigma = f"{low:.3g}" if low == high else f"{low:.3g} ... {high:.3g}"
+            missing = f", {entry['missing']} missing" if entry["missing"] else ""
+            lines.append(
+                f"  {name}: rms {entry['rms']:.3g} {unit}, sigma {sigma}{missing}"
+            )
+    return lines
+
+
+def _load_lines(c: Campaign) -> list[str]:
+    """Levels and sizes of the load."""
+    t = load_counts(c)
+    return [
+        f"load: {t['levels']} levels, up to {t['force'][1]:.4g} N and "
+        f"{t['moment'][1]:.4g} N m, {t['unloaded_rows']} rows without"
+    ]
+
+
+def _covariate_lines(c: Campaign) -> list[str]:
+    """Range of each covariate."""
+    return [
+        f"{name}: {t['range'][0]:.4g} ... {t['range'][1]:.4g}, {t['levels']} levels"
+        for name, t in covariate_counts(c).items()
+    ]
+
+
+def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
+    """Noise from repeats over the stated one, by component, and suspects."""
+    if noise is None:
+        return []
+    low, high = noise.interval
+    lines = [
+        f"noise from repeats: {noise.ratio:.2f} ({low:.2f} ... {high:.2f}, 90 %) times "
+        f"the stated sigma, {noise.degrees} degrees of freedom; "
+        f"{noise.plain:.2f} with slow changes left in"
+    ]
+    for k, name in enumerate(READING):
+        if np.isfinite(noise.component[k]):
+            a, b = noise.component_interval[k]
+            unit = "rad" if k < 3 else "m"
+            lines.append(
+                f"  {name}: {noise.component[k]:.3g} ({a:.2g} ... {b:.2g}) {unit}, "
+                f"{noise.component_degrees[k]:.0f} degrees of freedom"
+            )
+    for s in noise.suspects:
+        who = " or ".join(c.ids[i] for i in s.rows)
+        lines.append(f"  suspect: {who}, {s.component}, {abs(s.size):.1f} deviations")
+    return lines

@@ -1,0 +1,4 @@
+"""The main job: every check of a study file, one report.
+
+Begin at ``study.py``.
+"""

@@ -1,0 +1,78 @@
+"""Problems (21) and (22) as the paper prints them, in cvxpy, beside our answers."""
+
+import math
+from typing import Any
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import Assembly
+from validation.crosscheck.verdict import Check
+
+TOLERANCE = 1e-6  # relative, of energies and margins
+# what cvxpy's solver leaves open: [J], and [-] of a margin
+_NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
+
+
+def compare_printed(
+    posture: Posture, answer: Assembly, zone: dict[str, Any]
+) -> dict[str, Any]:
+    """Solve the printed problems, and compare energy and margins with ours.
+
+    Args:
+        posture: where the robot stands.
+        answer: our assembly, without loads.
+        zone: our ``margin`` and ``margin_free``.
+
+    Returns:
+        Their ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; by name
+        the ``relative_difference``, NaN where there is nothing to compare; ``checks``,
+        the verdict on each; ``verdict`` and ``passed``.  Where cvxpy found no answer,
+        the ``reason`` instead of all that.
+    """
+    from assembly.linear.reference import reference_energy, reference_margin
+
+    try:
+        energy, screw = reference_energy(posture)
+        margin, free = (reference_margin(posture, key) for key in ("rigid", "free"))
+    except RuntimeError as error:
+        return {"verdict": "no answer", "passed": False, "reason": str(error)}
+    checks = {
+        "energy": _energy_check(answer, energy),
+        "margin": _margin_check(zone["margin"], margin),
+        "margin_free": _margin_check(zone["margin_free"], free),
+    }
+    found = {check.verdict for check in checks.values()}
+    bad, some = bool(found & {"fails", "undecided"}), "ok" in found
+    return {
+        "energy": energy,
+        "platform_screw": screw,
+        "margin": margin,
+        "margin_free": free,
+        "relative_difference": {
+            name: check.value if check.verdict != "no signal" else math.nan
+            for name, check in checks.items()
+        },
+        "tolerance": TOLERANCE,
+        "checks": {name: check.verdict for name, check in checks.items()},
+        "verdict": "failed" if bad else "passed" if some else "no signal",
+        "passed": some and not bad,
+    }
+
+
+def _energy_check(answer: Assembly, energy: float) -> Check:
+    """Energies; inside an assembly zone both are rounding of that without play."""
+    play = answer.energy_without_play
+    scale = max(answer.energy, 1e-6 * play, _NOISE_ENERGY / TOLERANCE)
+    return Check(
+        abs(energy - answer.energy) / scale, TOLERANCE,
+        signal=max(answer.energy, play) >= _NOISE_ENERGY / TOLERANCE,
+    )  # fmt: skip
+
+
+def _margin_check(ours: float | None, theirs: float | None) -> Check:
+    """Margins; nothing to compare where neither exists, or no play is taken up."""
+    if ours is None or theirs is None:
+        value = 0.0 if ours is theirs else math.inf
+        return Check(value, TOLERANCE, signal=False)
+    scale = max(abs(ours), abs(theirs), _NOISE_MARGIN / TOLERANCE)
+    signal = scale > _NOISE_MARGIN / TOLERANCE
+    return Check(abs(ours - theirs) / scale, TOLERANCE, signal=signal)
