@@ -178,7 +178,7 @@ def make(folder: Path, seed: int) -> None:
 def answer(folder: Path, seed: int) -> None:
     """Diagnose a case and write the answer, unless it is there."""
     from validation.campaign.campaign_file import read_campaign
-    from validation.diagnosis import diagnose
+    from validation.diagnosis.diagnose import diagnose
     from validation.diagnosis.results import table
 
     name = f"c{seed:04d}"

@@ -16,7 +16,7 @@ from random_robots import draw_robot
 
 from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import diagnose
+from validation.diagnosis.diagnose import diagnose
 from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.design import Design
 from validation.synthetic.generator import Noise, generate_campaign, write_campaign

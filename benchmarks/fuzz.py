@@ -30,7 +30,7 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
-from forcefit.commands import app as command
+from forcefit.commands import app as forcefit_command
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
@@ -65,7 +65,7 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
                 if p.param_type_name == "option"
             ]
 
-    walk(typer.main.get_command(command.app), ())
+    walk(typer.main.get_command(forcefit_command.app), ())
     return found
 
 
@@ -121,7 +121,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
     )
     sys.argv = ["forcefit", *words]
     try:
-        command.main()
+        forcefit_command.main()
         status: object = 0
     except SystemExit as done:
         status = done.code

@@ -34,7 +34,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
-from forcefit.commands import app as command
+from forcefit.commands import app as forcefit_command
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
@@ -149,7 +149,7 @@ def start(words: list[str], limit: int | None = None) -> int:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
         sys.stdout, sys.stderr = io.StringIO(), said
         sys.argv = ["forcefit", *words]
-        command.main()
+        forcefit_command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
         if status not in {0, 130} and limit is None:  # or it may not write that
@@ -170,7 +170,7 @@ def run_here(words: list[str]) -> None:
         io.StringIO(),
     )
     try:
-        command.main()
+        forcefit_command.main()
     except SystemExit as done:
         if done.code:
             raise RuntimeError(

@@ -14,7 +14,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import solve_assembly
 from validation.assumptions.bushes import solve_bushes
-from validation.assumptions.spread_weight import energy_between_ends
+from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import simulate_assembly
 
 ELEMENTS = 8  # of each beam under its weight

@@ -1,5 +1,6 @@
-"""``python -m forcefit``: the same command."""
+"""``python -m forcefit`` is the command ``forcefit``."""
 
 from forcefit.commands.app import main
 
-main()
+if __name__ == "__main__":
+    main()

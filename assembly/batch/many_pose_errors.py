@@ -59,8 +59,8 @@ class PoseErrors:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.report.tables`."""
-        from assembly.report.tables import points_dataset
+        """Over ``point``; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import points_dataset
 
         return points_dataset({
             "rotation_error": self.rotation_error,
@@ -73,7 +73,7 @@ class PoseErrors:
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each point, columns (variable, component)."""
-        from assembly.report.tables import frame_table
+        from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 

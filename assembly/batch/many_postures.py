@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.files.joint_file import LARGEST_LENGTH
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
@@ -30,6 +29,7 @@ from assembly.linear.rounding import (
 )
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import clearance_bounds
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
 from forcefit.inputs.display import html_table, short_repr
@@ -88,8 +88,8 @@ class Energies:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.report.tables`."""
-        from assembly.report.tables import points_dataset
+        """Over ``point``; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import points_dataset
 
         return points_dataset({
             "energy": self.energy,
@@ -104,7 +104,7 @@ class Energies:
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each point, columns (variable, component)."""
-        from assembly.report.tables import frame_table
+        from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 
@@ -260,8 +260,8 @@ class Margins:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.report.tables`."""
-        from assembly.report.tables import points_dataset
+        """Over ``point``; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import points_dataset
 
         return points_dataset({
             "margin": self.margin,
@@ -271,7 +271,7 @@ class Margins:
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each point, columns (variable, component)."""
-        from assembly.report.tables import frame_table
+        from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 

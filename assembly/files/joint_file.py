@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, Clearance
 from forcefit.inputs.table import Table, find_fault, number_array
 
-LARGEST_LENGTH = 1e6  # [m] beyond any machine; also bounds angles and directions
-LARGEST = 1e40  # in SI: beyond any stiffness, section or density; its inverse below
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
 

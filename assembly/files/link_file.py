@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from assembly.files.joint_file import LARGEST, LARGEST_LENGTH, definite
+from assembly.files.joint_file import definite
+from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import (
     BeamLink,
     LibraryLink,

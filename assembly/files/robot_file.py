@@ -10,13 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.files.effect_file import read_effects
-from assembly.files.joint_file import (
-    LARGEST_LENGTH,
-    read_clearance,
-    read_joint_stiffness,
-)
+from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
 from assembly.kinematics.posture import home_posture
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.link_span import with_spans
 from assembly.model.robot import (
     BASE,

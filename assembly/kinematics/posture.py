@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.files.joint_file import LARGEST_LENGTH
 from assembly.kinematics.nominal import NOT_CLOSED, Target, Track, follow
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from forcefit.inputs.display import Figures, brief, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput, nearest

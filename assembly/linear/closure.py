@@ -24,10 +24,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.joint_file import LARGEST_LENGTH
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.links import compliance_factor, joint_compliances, link_compliances
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr

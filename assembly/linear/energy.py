@@ -117,14 +117,14 @@ class Assembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Frames, closures and platform; see :mod:`assembly.report.tables`."""
-        from assembly.report.tables import assembly_dataset
+        """Frames, closures and platform; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each frame, columns (variable, component)."""
-        from assembly.report.tables import frame_table
+        from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
 

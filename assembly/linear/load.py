@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.files.joint_file import LARGEST_LENGTH
 from assembly.kinematics.posture import Posture
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BeamLink, beam_axis
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import declared_section

@@ -144,8 +144,8 @@ def error(
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
     from assembly.effects.acting import act
-    from assembly.files.joint_file import LARGEST_LENGTH
     from assembly.linear.reach import READINGS
+    from assembly.model.largest import LARGEST_LENGTH
     from assembly.report.results import pose_error_of, pose_error_text
 
     for name in reading or ():

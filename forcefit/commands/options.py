@@ -91,7 +91,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
     """
     if not texts:
         return None
-    from assembly.files.joint_file import LARGEST
+    from assembly.model.largest import LARGEST
     from stiffness.screws import WRENCH
 
     names = [name.lower() for name in WRENCH]
@@ -133,7 +133,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     """
     if not texts:
         return None
-    from assembly.files.joint_file import LARGEST_LENGTH
+    from assembly.model.largest import LARGEST_LENGTH
 
     pass
 
@@ -158,7 +158,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     """
     if not texts:
         return None
-    from assembly.files.joint_file import LARGEST_LENGTH
+    from assembly.model.largest import LARGEST_LENGTH
     from stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
@@ -201,8 +201,8 @@ def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
     """The posture asked for, of the robot without the effects of its file."""
-    from assembly.files.joint_file import LARGEST_LENGTH
     from assembly.kinematics.posture import place_robot
+    from assembly.model.largest import LARGEST_LENGTH
     from assembly.robots import load_robot
 
     return place_robot(

@@ -4,7 +4,6 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from forcefit.commands.library import library
@@ -330,6 +329,8 @@ def stress(
 
     With a section, the beam formula stands beside it.
     """
+    import numpy as np
+
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_load
     from forcefit.inputs.errors import checked

@@ -13,7 +13,6 @@ from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, beam_axis
 from assembly.solvers.conic import SolverFailed
 from validation.assumptions.round_bars import bar_compliance, bar_stiffness
-from validation.assumptions.spread_weight import energy_between_ends
 from validation.assumptions.validity import (
     ENERGY_LIMIT,
     POSITION_LIMIT,
@@ -23,6 +22,7 @@ from validation.assumptions.validity import (
     link_cost,
     spread_cost,
 )
+from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import without_clearance
 
 NOTHING = "nothing to compare: without errors and load neither model moves"

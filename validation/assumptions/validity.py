@@ -33,8 +33,8 @@ from assembly.linear.energy import Assembly, solve_assembly, solve_with
 from assembly.linear.load import forces_on
 from assembly.model.robot import MatrixLink
 from validation.assumptions.bushes import solve_bushes
-from validation.assumptions.spread_weight import energy_between_ends, half_weights
 from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
+from validation.crosscheck.spread_weight import energy_between_ends, half_weights
 
 POSITION_LIMIT = 20e-6  # [m]
 ENERGY_LIMIT = 0.01  # [-]

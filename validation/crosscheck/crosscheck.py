@@ -32,7 +32,6 @@ from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
-from validation.assumptions.spread_weight import energy_between_ends
 from validation.crosscheck.limits import (
     FLOOR,
     HALVES,
@@ -43,6 +42,7 @@ from validation.crosscheck.limits import (
 )
 from validation.crosscheck.link_models import link_models
 from validation.crosscheck.pair import Pair, exact_answer, scaled
+from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
     SCALES,
     Check,

@@ -25,11 +25,11 @@ from assembly.linear.reduction import reduce_problem
 from assembly.model.links import link_compliance
 from assembly.solvers.conic import into_cones
 from forcefit.inputs.display import html_table, short_repr
-from validation.assumptions.spread_weight import energy_between_ends
 from validation.crosscheck.crosscheck import ELEMENTS
 from validation.crosscheck.limits import extrapolate, limit_difference, limit_of
 from validation.crosscheck.link_models import link_models
 from validation.crosscheck.pair import Pair, exact_answer, scaled
+from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
     SCALES,
     Check,

@@ -4,12 +4,13 @@ import math
 from dataclasses import asdict, replace
 from typing import Any
 
+from numpy.typing import NDArray
+
 from assembly.effects import LIBRARY
 from assembly.model.robot import Robot
 from validation.diagnosis.diagnose import Diagnosis, Errors
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.verdict import Calibration
-from validation.inspection.text import open_text
 
 
 def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
@@ -215,3 +216,19 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
 def _number(value: float) -> str:
     """Three digits, or a dash where nothing was measured."""
     return f"{value:.3g}" if math.isfinite(value) else "-"
+
+
+def open_text(open_: NDArray) -> str:
+    """In which rows play leaves the pose free, and what is then predicted.
+
+    Args:
+        open_: (R,) bool, by row.
+
+    Returns:
+        One line.
+    """
+    return (
+        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
+        "(marked open): of the poses of least energy one is predicted there, in a "
+        "closed chain the nearest to nominal, in an open one that of play in the middle"
+    )

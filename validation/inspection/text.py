@@ -1,9 +1,9 @@
 """An inspection of a campaign in words and lines."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validation.campaign.campaign import READING, Campaign
+from validation.diagnosis.results import open_text
 from validation.inspection.counts import (
     covariate_counts,
     load_counts,
@@ -37,22 +37,6 @@ def inspection_text(found: Inspection) -> str:
         said = [f"  {r.text}" for r in found.remarks if r.weight == weight]
         lines += ["", head, *said] if said else []
     return "\n".join(lines)
-
-
-def open_text(open_: NDArray) -> str:
-    """In which rows play leaves the pose free, and what is then predicted.
-
-    Args:
-        open_: (R,) bool, by row.
-
-    Returns:
-        One line.
-    """
-    return (
-        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
-        "(marked open): of the poses of least energy one is predicted there, in a "
-        "closed chain the nearest to nominal, in an open one that of play in the middle"
-    )
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.joint_file import LARGEST_LENGTH
 from assembly.kinematics.posture import POSE, Posture, place_robot
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.reach import READINGS
+from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named

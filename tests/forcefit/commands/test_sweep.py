@@ -55,10 +55,10 @@ def messages(err):
 
 def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
     """A log file shows it before the work ends, not only the bars after it."""
-    import forcefit.commands.assembly
+    import forcefit.commands.progress
 
-    monkeypatch.setattr(forcefit.commands.options, "_MOMENT", 0.0)
-    with forcefit.commands.options.progress_bars() as update:
+    monkeypatch.setattr(forcefit.commands.progress, "_MOMENT", 0.0)
+    with forcefit.commands.progress.progress_bars() as update:
         update("points", 3, 12)
         said = ""
         while "points: 3 of 12" not in said:  # from a thread of its own

@@ -21,7 +21,6 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.assumptions.assumptions import assumption_costs
 from validation.assumptions.bushes import bush_joints, bush_margin, solve_bushes
 from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
-from validation.assumptions.spread_weight import energy_between_ends
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
@@ -30,6 +29,7 @@ from validation.assumptions.validity import (
     link_cost,
     spread_cost,
 )
+from validation.crosscheck.spread_weight import energy_between_ends
 
 E, NU, RHO = 60e9, 0.3, 2700.0
 FLAT = BeamLink({"width": 0.02, "height": 0.05}, E, NU, density=RHO)

@@ -26,7 +26,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measure, measured
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import diagnose
+from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.holdout import Split
 from validation.diagnosis.report import report_page
 from validation.diagnosis.results import corrected, effects, sentence, table, text

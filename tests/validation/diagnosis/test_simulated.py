@@ -5,7 +5,7 @@ import pytest
 
 from assembly.model.robot import BeamLink, Frame, Robot
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import diagnose
+from validation.diagnosis.diagnose import diagnose
 from validation.synthetic.design import Design
 from validation.synthetic.effects import LIBRARY
 from validation.synthetic.equivalents import SAME, alternatives
