@@ -143,7 +143,7 @@ def curve_compliance(
     Example:
         An L of two bars, pushed at its end along the first, bends both:
 
-        >>> from stiffness.beam.beam import round_section
+        >>> from stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
         >>> L = [straight_piece([0, 0, 0], [0.2, 0, 0], bar),
         ...      straight_piece([0.2, 0, 0], [0.2, 0.2, 0], bar)]

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.test_pose_error import hinged_frame
 
 from assembly.batch.many_pose_errors import bound_pose_errors
 from assembly.batch.many_postures import minimise_energies
@@ -13,6 +12,7 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
+from tests.assembly.linear.test_pose_error import hinged_frame
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
 
 PARTS = ("rotation_error", "translation_error")

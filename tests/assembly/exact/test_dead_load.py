@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from tests.test_exact import moved_unknowns, only
 
 from assembly.exact.dead_load import curvature_of, dead_loads, slopes_of, work_of
 from assembly.exact.exact import solve_exact
@@ -16,6 +15,7 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
+from tests.assembly.exact.test_exact import moved_unknowns, only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 from validation.multibody.simulation import simulate_assembly, without_clearance
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.test_effect_file import L, arm_with
 
 from assembly.effects.acting import act
 from assembly.kinematics.posture import place_robot
@@ -16,6 +15,7 @@ from assembly.sweeps.request import ask_sweep
 from assembly.sweeps.sweep import sweep_in_memory
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
+from tests.assembly.files.test_effect_file import L, arm_with
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 G = 9.81

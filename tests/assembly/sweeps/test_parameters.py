@@ -7,8 +7,8 @@ import pytest
 
 from assembly.files.robot_file import write_robot
 from assembly.robots import BUILT_IN, load_robot
+from assembly.sweeps.identity import robot_hash
 from assembly.sweeps.parameters import design_of, load_design, unit_of
-from assembly.sweeps.sweep import robot_hash
 from forcefit.inputs.table import BadInput
 
 

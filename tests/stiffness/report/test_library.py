@@ -393,7 +393,7 @@ def test_the_commands_build_list_look_up_and_export(tmp_path):
     assert text.count("RMORE") == 12
     with pytest.raises(BadInput, match="--key: missing"):
         run("export", folder, "--to", "adams")
-    with pytest.raises(BadInput, match="expected name=number"):
+    with pytest.raises(BadInput, match="expected NAME=NUMBER"):
         run("look-up", folder, "--at", "length")
 
 

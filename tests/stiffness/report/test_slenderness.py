@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from forcefit.commands.options import numbers, wrench
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import beam_compliance
