@@ -7,7 +7,7 @@ import zlib
 import pytest
 import xarray
 
-import forcefit
+from forcefit.commands import app as command
 
 ERRORS = """
 [[errors]]
@@ -266,7 +266,7 @@ def test_ctrl_c_in_compiled_code_is_130_too(run, monkeypatch):
             KeyboardInterrupt()
         )
 
-    monkeypatch.setattr(forcefit, "app", interrupted)
+    monkeypatch.setattr(command, "app", interrupted)
     assert run("study")[0] == 130
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from forcefit.commands.options import parse_load, parse_sizes
 from forcefit.commands.stiffness import app
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import beam_compliance
@@ -149,10 +150,10 @@ def test_a_beam_that_ends_elsewhere_is_refused():
 
 
 def test_wrenches_and_numbers_as_people_write_them():
-    np.testing.assert_array_equal(wrench("-w", ["fx=1,mz=-2"]), [0, 0, -2, 1, 0, 0])
+    np.testing.assert_array_equal(parse_load(["fx=1,mz=-2"], "-w"), [0, 0, -2, 1, 0, 0])
     with pytest.raises(BadInput, match='unknown component "fq"; valid: fx'):
-        wrench("--wrench", ["fq=1"])
-    assert numbers("--ratios", "20,5", "1") == [5.0, 20.0]
+        parse_load(["fq=1"], "--wrench")
+    assert parse_sizes("--ratios", "20,5", "1") == [5.0, 20.0]
 
 
 # --- curves from files ---------------------------------------------------------------
