@@ -2,9 +2,9 @@
 
     python benchmarks/mutants.py [COUNT] [--seed N] [--only FOLDER]
 
-Each fault is put into a copy of the tree; the tests of its chapter run first, then those
-of its package, then all default tests; the first failure is enough.  Compiled functions
-that call each other across files are compiled anew for faults in their files.  Printed:
+Each fault is put into a copy of the tree; the tests of its chapter run first, then
+those of its package, then all default tests; the first failure is enough.  Functions
+compiled by numba are compiled anew for faults in their files.  Printed:
 the share caught, and every survivor with its line.
 """
 
