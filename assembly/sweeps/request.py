@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.acting import check_covariates
+from assembly.effects.robot_effects import check_covariates
 from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names

@@ -45,7 +45,11 @@ def situations(
     )
     off = [posture.mismatch for posture in postures]
     here = as_declared(
-        many, question.load, mismatch=off, gravity=question.gravity, **question.under
+        many,
+        question.load,
+        mismatch=off,
+        gravity=question.gravity,
+        covariates=question.under,
     )
     if errors is not None:
         here = replace(here, errors=errors)

@@ -46,17 +46,17 @@ def solve(
     json: JsonOption = None,
 ) -> None:
     """Close at least energy: pose error, energy, wrenches, margin."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import solution_of, solution_text
 
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
     with one_thread():
-        results = solution_of(acting.posture, acting.load, acting.gravity)
-    if results["status"] == "ok" and acting.conditions.reads_otherwise:
-        results["reading"] = acting.reading(results["platform_screw"])
+        results = solution_of(applied.posture, applied.load, applied.gravity)
+    if results["status"] == "ok" and applied.conditions.reads_otherwise:
+        results["reading"] = applied.reading(results["platform_screw"])
     write_json(results, json)
     if json != "-":
         print(solution_text(results))
@@ -93,15 +93,15 @@ def exact(
     json: JsonOption = None,
 ) -> None:
     """Close the robot with finite motions: closures hold exactly."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import exact_of, exact_text
 
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under), finite=True,
     )  # fmt: skip
     with one_thread():
-        results = exact_of(acting.posture, acting.load, acting.gravity)
+        results = exact_of(applied.posture, applied.load, applied.gravity)
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -143,7 +143,7 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.linear.reach import READINGS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.report.results import pose_error_of, pose_error_text
@@ -162,13 +162,14 @@ def error(
             option = "--" + key.replace("_", "-")
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
     with one_thread():
         results = pose_error_of(
-            acting.posture, reading or None, load=acting.load, gravity=acting.gravity,
+            applied.posture, reading or None,
+            load=applied.load, gravity=applied.gravity,
             point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
             direction=parse_direction(direction), **options,
         )  # fmt: skip

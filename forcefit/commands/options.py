@@ -186,15 +186,15 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
     Raises:
         BadInput: an effect loads the robot, which the command asking does not know.
     """
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
 
-    acting = act(declared_posture(robot, pose, joint))
-    if acting.gravity is not None or acting.load.any():
+    applied = apply_robot_effects(declared_posture(robot, pose, joint))
+    if applied.gravity is not None or applied.load.any():
         raise BadInput(
             f"{robot}: its effects load it; expected assembly solve or exact, or "
             "validation crosscheck, which know loads"
         )
-    return acting.posture
+    return applied.posture
 
 
 def declared_posture(

@@ -128,7 +128,7 @@ def crosscheck(
     status 1 when a check fails, or when the robot has neither errors nor a load:
     nothing is then compared.
     """
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from validation.crosscheck.crosscheck import Crosscheck, attempt
     from validation.crosscheck.crosscheck import crosscheck as compare_tight
     from validation.crosscheck.playcheck import PlayCheck, playcheck
@@ -144,9 +144,9 @@ def crosscheck(
 
     def compare(posture: "Posture") -> Crosscheck | PlayCheck:
         given = _with_errors(posture, errors, seed)
-        acting = act(given, wrench, g, covariates)
-        at, pushes = acting.posture, acting.load.tolist()
-        weight = None if acting.gravity is None else acting.gravity.tolist()
+        applied = apply_robot_effects(given, wrench, g, covariates)
+        at, pushes = applied.posture, applied.load.tolist()
+        weight = None if applied.gravity is None else applied.gravity.tolist()
         if clearances:
             return playcheck(at, scales, pushes, links, weight, time_limit)
         return compare_tight(at, scales, pushes, links, weight, time_limit)

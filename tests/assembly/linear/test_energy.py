@@ -18,7 +18,7 @@ from assembly.linear.reduction import FreeMotion
 from assembly.linear.reference import reference_energy
 from assembly.linear.without_clearance import flexibility
 from assembly.linear.zone import zone_margin
-from assembly.measurement.settled_clearance import without_play
+from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
@@ -350,7 +350,7 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
             )
             exact = [solve_exact(p).energy for p in (first, second)]
             assert exact[0] == pytest.approx(exact[1], rel=1e-6, abs=scale)
-        tight = without_play(one), without_play(two)
+        tight = without_joint_clearances(one), without_joint_clearances(two)
         rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
                 for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
         found = [
