@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.without_clearance import flexibility, in_groups
 from assembly.measurement.conditions import Conditions
 from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
@@ -34,7 +34,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = in_groups(tight.postures)
     errors = conditions.errors.reshape(len(conditions), -1)
-    loads = row_forces(tight.postures, tight.load_at_origin(), tight.gravity)
+    loads = loads_with_weight(tight.postures, tight.load_at_origin(), tight.gravity)
     through = flexibility(distinct).solve(posture_of_row, errors, loads).joint_wrenches
     wrenches = through.reshape(len(conditions), -1, 6)
     bounds = np.where(

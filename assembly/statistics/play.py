@@ -142,7 +142,7 @@ def loaded_clearances(one: OnePosture, found: Draws) -> NDArray:
     """(k, nu) bool: clearances that press on their bound, by strict complementarity."""
     pull = found.multipliers @ (_cone_columns(one))
     if one.loads is not None:
-        pull += one.loads.forces.joint @ one.joints.cones
+        pull += one.loads.frame_loads.joint @ one.joints.cones
     push = _sizes(pull, one.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(found.clearances, one.starts))
     # push times slack is about the solver's gap: one of the two is nearly zero

@@ -27,6 +27,7 @@ from assembly.batch.many_draws import OnePosture
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
+from assembly.model.clearance import Compliant
 from assembly.solvers.conic import GAP_WITHOUT_PLAY
 
 _USED_UP = 1e-7  # of the largest pull on any cone: less is none
@@ -61,7 +62,7 @@ def energy_slopes(answer: Assembly) -> NDArray:
     return -answer.wrenches
 
 
-def margin_slopes(posture: Posture, compliant: str = "free") -> MarginSlopes:
+def margin_slopes(posture: Posture, compliant: Compliant = "free") -> MarginSlopes:
     """How the zone's margin grows with every geometric error.
 
     Args:
@@ -102,7 +103,7 @@ def solution_slopes(
     """
     A, nu, k = ready.closures, len(ready.cones), len(found.energy)
     grip = A @ ready.joints.cones
-    H = ready.over.T @ grip
+    H = ready.redundant.T @ grip
     pulls = found.multipliers @ grip
     P, N = _used_up(ready, found, pulls)
     size = nu + len(H)
@@ -117,11 +118,11 @@ def solution_slopes(
     if by_play is not None:
         across += by_play
     right[:, :nu] = np.einsum("kij,kj->ki", P, across)
-    right[:, nu:] = by_multiplier @ ready.over
+    right[:, nu:] = by_multiplier @ ready.redundant
     x = np.einsum("kij,kj->ki", np.linalg.pinv(K, _RANK, hermitian=True), right)
     moved = np.einsum("kij,kj->ki", P, x[:, :nu])
     slopes = (by_spring - moved @ ready.G.T) @ ready.misfit
-    slopes += by_screw @ ready.screws[:, nu:] - x[:, nu:] @ ready.unanswered
+    slopes += by_screw @ ready.screws[:, nu:] - x[:, nu:] @ ready.infeasible
     return slopes.reshape(by_wrench.shape)
 
 

@@ -110,7 +110,7 @@ def bound_margin(
         The bound; inf where some error is taken up by no clearance.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(zone.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
     if not len(zone.B):
         return 0.0
@@ -134,7 +134,7 @@ def bound_energy(one: OnePosture, sources: ErrorSources, tolerances: NDArray) ->
         worst.  inf where some error is taken up by no spring.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(one.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(one.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
     h = one.misfit[:, columns] * tolerances
     V = np.zeros((one.G.shape[1], len(tolerances)))

@@ -94,7 +94,7 @@ def assemble_situations(here: Conditions) -> tuple[Energies, NDArray]:
         assert isinstance(one, Assembly)
         found.energy[i] = one.energy
         found.bound[i] = one.energy - one.duality_gap()
-        found.energy_without_play[i] = one.energy_without_play
+        found.energy_without_clearance[i] = one.energy_without_clearance
         found.platform_screw[i] = one.platform_screw
         found.closure_residual[i] = one.closure_residual()
         found.clearance_excess[i] = one.clearance_excess()
