@@ -29,8 +29,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import DeadLoads, resultants, row_loads
-from assembly.exact.placement import along_own
+from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
+from assembly.exact.finite_robot import along_own
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.se3 import (
     exponential,
@@ -114,7 +114,7 @@ class _Rows:
     def loads(self) -> DeadLoads:
         """Loads and weights."""
         c = self.conditions
-        return row_loads(c.postures, c.errors, c.load, c.gravity, c.point)
+        return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
     @cached_property
     def elastic_frames(self) -> tuple[NDArray, NDArray]:
@@ -122,8 +122,8 @@ class _Rows:
         with_contact = [
             self.conditions.robot.index(law.frame) for law in self.conditions.laws
         ]
-        bodies = np.flatnonzero(self.flexible.bodies.any(axis=(1, 2)))
-        joints = np.flatnonzero(self.flexible.joints.any(axis=(1, 2)))
+        bodies = np.flatnonzero(self.flexible.body_compliances.any(axis=(1, 2)))
+        joints = np.flatnonzero(self.flexible.joint_compliances.any(axis=(1, 2)))
         return bodies, np.union1d(joints, with_contact).astype(int)
 
     @cached_property
@@ -356,7 +356,7 @@ class _State:
             J = left_jacobian(self.screws[k][:, frames])
             w = (w[..., None, :] @ J)[..., 0, :]
             generalised[k][:, frames] = w
-            C = (flexible.bodies, flexible.joints)[k][frames]
+            C = (flexible.body_compliances, flexible.joint_compliances)[k][frames]
             screw_residual[k][:, frames] += np.einsum("kij,rkj->rki", C, w)
         joint_wrenches = np.zeros_like(self.screws[0])
         frames = rows.free_frames
@@ -376,7 +376,7 @@ def _solve(rows: _Rows) -> tuple[NDArray, NDArray]:
     state = _State(
         rows, np.zeros((2, count, n, 6)), np.zeros((count, q)), np.zeros((count, K))
     )
-    size, active = np.full(count, np.inf), ~flexible.doubt[rows.posture_of_row]
+    size, active = np.full(count, np.inf), ~flexible.ambiguous[rows.posture_of_row]
     active &= np.isfinite(rows.contact_compliance).all(axis=1)
     for iteration in range(_MOST_ITERATIONS):
         screws, motions, multipliers = _correction(state, first=iteration == 0)
@@ -437,9 +437,9 @@ def _correction(state: _State, first: bool) -> tuple[NDArray, NDArray, NDArray]:
         )
         screw_residual[1] += contact_part.reshape(shape)
     screw_residual[0] += np.einsum(
-        "nij,rnj->rni", flexible.bodies, closing.reshape(shape)
+        "nij,rnj->rni", flexible.body_compliances, closing.reshape(shape)
     )
     screw_residual[1] += np.einsum(
-        "nij,rnj->rni", flexible.joints, closing.reshape(shape)
+        "nij,rnj->rni", flexible.joint_compliances, closing.reshape(shape)
     )
     return screw_residual, motions, multipliers

@@ -19,7 +19,7 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.without_clearance import flexibility, in_groups
@@ -325,7 +325,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
     """(R, 6) platform screws of a robot without clearances, (R,) whether solved."""
     distinct, which = in_groups(conditions.postures)
     flexible = flexibility(distinct)
-    forces = row_forces(
+    forces = loads_with_weight(
         conditions.postures, conditions.load_at_origin(), conditions.gravity
     )
     errors = conditions.errors.reshape(len(conditions), -1)

@@ -8,12 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reach import READINGS, reachable_screws
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.screw_bound import unproved_screw
+from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
@@ -79,22 +80,25 @@ def solution_of(
     try:
         results["zone"] = zone_of(posture)
         answer = solve_assembly(posture, load, gravity=gravity)
+        bound = bound_screw(answer)
         open_ = filter(None, (
             results["zone"].get("reason"),
-            answer.unproved or "; ".join(unproved_screw(answer)),
+            unproved(answer) or "; ".join(unproved_screw(answer, bound)),
         ))  # fmt: skip
-        return results | _answer(answer, gravity) | _status("; ".join(open_))
+        return results | _answer(answer, bound, gravity) | _status("; ".join(open_))
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
         return results | empty | {"status": status, "reason": str(error)}
 
 
-def _status(unproved: str) -> dict[str, str]:
+def _status(reason: str) -> dict[str, str]:
     """That an answer is proved, or what of it is not."""
-    return {"status": "not proved", "reason": unproved} if unproved else {}
+    return {"status": "not proved", "reason": reason} if reason else {}
 
 
-def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
+def _answer(
+    answer: Assembly, bound: ScrewBound, gravity: ArrayLike | None
+) -> dict[str, Any]:
     """The part that only a solved assembly has."""
     certificate = {
         "closure_residual": answer.closure_residual(),
@@ -102,7 +106,7 @@ def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
         "clearance_excess": answer.clearance_excess(),
         "duality_gap": answer.duality_gap(),
         "relative_gap": answer.relative_gap(),
-    } | {f"screw_{name}": value for name, value in vars(answer.screw_bound).items()}
+    } | {f"screw_{name}": value for name, value in vars(bound).items()}
     return {
         **_screws_and_wrenches(answer),
         "certificate": certificate,

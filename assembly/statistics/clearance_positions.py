@@ -152,7 +152,7 @@ def loaded_clearances(prepared: OnePosture, draws: Draws) -> NDArray:
     """(k, nu) bool: clearances loaded at their bound, by strict complementarity."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
-        forces += prepared.loads.forces.joint @ prepared.joints.cones
+        forces += prepared.loads.frame_loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
     # force times slack is about the solver's gap: one of the two is nearly zero

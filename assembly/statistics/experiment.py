@@ -11,6 +11,7 @@ from assembly.batch.many_draws import OnePosture, prepare_energies
 from assembly.batch.many_margins import PostureMargins, prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.reduction import FreeMotion
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.clearance_positions import (
@@ -24,7 +25,6 @@ from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 
 _PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
-_READINGS = {"margin": "rigid", "margin_free": "free"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Experiment:
         """The posture prepared for (21), by quantity."""
         if not self.margins:
             return {}
-        return {k: prepare_margins(self.posture, r) for k, r in _READINGS.items()}
+        return {k: prepare_margins(self.posture, r) for k, r in MARGIN_READINGS.items()}
 
     @cached_property
     def links(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -125,10 +126,9 @@ class Requirement:
     @cached_property
     def prepared(self) -> dict[str, list]:
         """By limit, the prepared postures."""
-        readings = {"margin": "rigid", "margin_free": "free"}
         return {
-            key: [prepare_margins(p, readings[key]) for p in self.postures]
-            if key in readings else [e.energies for e in self.experiments]
+            key: [prepare_margins(p, MARGIN_READINGS[key]) for p in self.postures]
+            if key in MARGIN_READINGS else [e.energies for e in self.experiments]
             for key in self.plan.limits
         }  # fmt: skip
 
@@ -276,7 +276,7 @@ class Requirement:
         columns = 6 * sources.frame + sources.component
         for key, prepared in self.convex.items():
             for posture in prepared:
-                residual = np.abs(posture.unanswered[:, columns]).max(
+                residual = np.abs(posture.infeasible[:, columns]).max(
                     axis=0, initial=0.0
                 )
                 if residual.max(initial=0.0) > 1e-9:

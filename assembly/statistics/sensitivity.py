@@ -27,6 +27,7 @@ from assembly.batch.many_draws import OnePosture
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
+from assembly.model.clearance import Compliant
 from assembly.solvers.conic import GAP_WITHOUT_PLAY
 
 _ACTIVE = 1e-7  # of the largest force on any cone: less is none
@@ -61,7 +62,7 @@ def energy_slopes(assembly: Assembly) -> NDArray:
     return -assembly.wrenches
 
 
-def margin_slopes(posture: Posture, compliant: str = "free") -> MarginSlopes:
+def margin_slopes(posture: Posture, compliant: Compliant = "free") -> MarginSlopes:
     """Slopes of the zone's margin with every geometric error.
 
     Args:
@@ -102,7 +103,7 @@ def solution_slopes(
     """
     A, nu, k = prepared.closures, len(prepared.cones), len(draws.energy)
     closure_columns = A @ prepared.joints.cones
-    H = prepared.over.T @ closure_columns
+    H = prepared.redundant.T @ closure_columns
     forces = draws.multipliers @ closure_columns
     P, N = _active_clearances(prepared, draws, forces)
     size = nu + len(H)
@@ -117,11 +118,11 @@ def solution_slopes(
     if by_clearance is not None:
         projected += by_clearance
     right[:, :nu] = np.einsum("kij,kj->ki", P, projected)
-    right[:, nu:] = by_multiplier @ prepared.over
+    right[:, nu:] = by_multiplier @ prepared.redundant
     x = np.einsum("kij,kj->ki", np.linalg.pinv(K, _RANK, hermitian=True), right)
     moved = np.einsum("kij,kj->ki", P, x[:, :nu])
     slopes = (by_spring - moved @ prepared.G.T) @ prepared.misfit
-    slopes += by_screw @ prepared.screws[:, nu:] - x[:, nu:] @ prepared.unanswered
+    slopes += by_screw @ prepared.screws[:, nu:] - x[:, nu:] @ prepared.infeasible
     return slopes.reshape(by_wrench.shape)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture, place_many
 from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.allocation import Allocation
@@ -74,7 +75,7 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
 
 def present_errors(
     postures: Sequence[Posture],
-    compliant: str = "free",
+    compliant: Compliant = "free",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Assess the robot's own errors: largest margin over the postures, and its causes.

@@ -112,7 +112,7 @@ def bound_margin(
         The bound; inf where some error is taken up by no clearance.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(zone.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
     if not len(zone.B):
         return 0.0
@@ -138,7 +138,7 @@ def bound_energy(
         inf where some error is taken up by no spring.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(prepared.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
     h = prepared.misfit[:, columns] * tolerances
     V = np.zeros((prepared.G.shape[1], len(tolerances)))

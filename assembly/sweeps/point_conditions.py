@@ -81,14 +81,14 @@ def assemble_rows(conditions: Conditions) -> tuple[Energies, NDArray]:
     energies = Energies(
         energy=unknown(),
         bound=unknown(),
-        energy_without_play=unknown(),
+        energy_without_clearance=unknown(),
         platform_screw=unknown(6),
         closure_residual=unknown(),
         clearance_excess=unknown(),
         clearances=unknown(joints.cones.shape[1]),
         motions=unknown(joints.free.shape[1]),
         multipliers=unknown(6 * len(conditions.robot.closures)),
-        road=np.zeros(k, dtype=int),
+        outcome=np.zeros(k, dtype=int),
         status=np.full(k, "ok", dtype=object),
         reason=np.full(k, "", dtype=object),
         joints=joints,
@@ -103,7 +103,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Energies, NDArray]:
         assert isinstance(assembly, Assembly)
         energies.energy[i] = assembly.energy
         energies.bound[i] = assembly.energy - assembly.duality_gap()
-        energies.energy_without_play[i] = assembly.energy_without_play
+        energies.energy_without_clearance[i] = assembly.energy_without_clearance
         energies.platform_screw[i] = assembly.platform_screw
         energies.closure_residual[i] = assembly.closure_residual()
         energies.clearance_excess[i] = assembly.clearance_excess()

@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.many_pose_errors import PoseErrors, bound_pose_errors
-from assembly.batch.many_postures import Energies, minimise_energies, zone_margins
+from assembly.batch.many_postures import Energies, minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.linear.closure import closure_signs
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.singularity import KINDS, find_singularities
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
@@ -196,7 +198,7 @@ def _solve_reached(
         robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     failed: dict[int, str] = {}
-    for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
+    for key, compliant in MARGIN_READINGS.items():
         zone = zone_margins(robot, T, compliant, mismatch, errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.reason) if r} | failed

@@ -217,7 +217,9 @@ def tolerances(
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
-                postures, compliant, lambda d, n: update("present errors", d, n)
+                postures,
+                "free" if compliant == "free" else "rigid",
+                lambda d, n: update("present errors", d, n),
             )
             said.append(present_text(results["present"]))
         elif asked is None:

@@ -7,7 +7,8 @@ import numpy as np
 from assembly.batch.many_draws import prepare_energies
 from assembly.batch.many_margins import prepare_margins
 from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.batch.many_postures import minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error

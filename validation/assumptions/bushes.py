@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.energy import Assembly, solve_with
-from assembly.linear.load import forces_on
+from assembly.linear.load import loads_on_frames
 from assembly.linear.zone import Zone, margin_with
+from assembly.model.clearance import Compliant
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
@@ -68,10 +69,12 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     joints = bush_joints(virtual_joints(posture.robot))
-    return solve_with(linearise(posture), joints, wrench, forces_on(posture, wrench))
+    return solve_with(
+        linearise(posture), joints, wrench, loads_on_frames(posture, wrench)
+    )
 
 
-def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
+def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
     """Factor on all clearances at which a rigid manipulator on bushes just assembles.
 
     Args:

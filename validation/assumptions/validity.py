@@ -30,7 +30,7 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import Assembly, solve_assembly, solve_with
-from assembly.linear.load import forces_on
+from assembly.linear.load import loads_on_frames
 from assembly.model.robot import MatrixLink
 from validation.assumptions.bushes import solve_bushes
 from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
@@ -80,7 +80,7 @@ def cost_between(
         would take count as that: inside an assembly zone both are rounding.
     """
     energy = better.energy + missing
-    least = 0.0 if model.forces else 1e-6 * model.energy_without_play
+    least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
     stored = max(energy, model.energy, 1e6 * least) > energy_floor(model.posture.robot)
     moved = np.abs([model.platform_screw, better.platform_screw]).max(axis=0)
     turn, shift = (
@@ -186,7 +186,7 @@ def halves_cost(
         linearise(posture),
         virtual_joints(posture.robot),
         wrench,
-        forces_on(posture, wrench, own, carried),
+        loads_on_frames(posture, wrench, own, carried),
     )
     ends = solve_assembly(posture, load, gravity=gravity)
     return cost_between(halves, ends, energy_between_ends(posture, gravity))

@@ -112,7 +112,7 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
 
     Returns:
         ``bodies`` and ``carried`` (n, 6) [N m, N] of
-        :func:`assembly.linear.load.forces_on`.
+        :func:`assembly.linear.load.loads_on_frames`.
     """
     own, carried = weights(posture, gravity)
     for beam in heavy_beams(posture, gravity):

@@ -60,7 +60,7 @@ def compare_printed(
 
 def _energy_check(answer: Assembly, energy: float) -> Check:
     """Energies; inside an assembly zone both are rounding of that without play."""
-    play = answer.energy_without_play
+    play = answer.energy_without_clearance
     scale = max(answer.energy, 1e-6 * play, _NOISE_ENERGY / TOLERANCE)
     return Check(
         abs(energy - answer.energy) / scale, TOLERANCE,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
@@ -34,7 +34,7 @@ def solved(robot, load, errors=None):
     """The robot's only row."""
     errors = robot.errors if errors is None else errors
     postures = at_home(robot)
-    forces = row_forces(postures, np.array(load, dtype=float)[None], STILL)
+    forces = loads_with_weight(postures, np.array(load, dtype=float)[None], STILL)
     return flexibility(postures).solve([0], errors.reshape(1, -1), forces)
 
 

@@ -69,9 +69,9 @@ def test_a_draw_is_what_one_solve_says(experiment):
         posture = replace(experiment.posture, robot=robot.with_errors(errors))
         answer = solve_assembly(posture)
         one = data.isel(draw=i)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_play
+        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
         assert float(one["energy"]) == pytest.approx(answer.energy, abs=allowed)
-        if answer.energy > 1e-6 * answer.energy_without_play:
+        if answer.energy > 1e-6 * answer.energy_without_clearance:
             sizes = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
             assert float(one["force"]) == pytest.approx(sizes.max(), rel=1e-3)
             stress = peak_stresses(robot, answer.wrenches)
