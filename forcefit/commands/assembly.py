@@ -148,7 +148,7 @@ def error(
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.linear.reach import READINGS
     from assembly.model.largest import LARGEST_LENGTH
-    from assembly.report.results import pose_error_of, pose_error_text
+    from assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in reading or ():
         if name not in READINGS:
@@ -214,7 +214,7 @@ def show(
     from assembly.linear.error_body import PARTS
     from assembly.linear.reach import READINGS
     from assembly.linear.reduction import FreeMotion
-    from assembly.report.plot import draw_assembly
+    from assembly.report.plot import plot_assembly
     from assembly.report.results import failure_status, remark_lines
     from assembly.solvers.conic import SolverFailed
 
@@ -242,7 +242,7 @@ def show(
         print(line)
     try:
         answer = solve_assembly(posture, wrench)
-        plotter = draw_assembly(
+        plotter = plot_assembly(
             answer, exaggeration, error_body, reading, output is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

@@ -21,7 +21,8 @@ from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
-from assembly.report.results import pose_error_of, solution_of
+from assembly.report.pose_errors import pose_error_of
+from assembly.report.results import solution_of
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.sweep import sweep_poses
 from assembly.sweeps.targets import parse_grid
