@@ -65,7 +65,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 BASE_COMPLIANCE = Effect(
     name="base_compliance",
-    summary="the foundation yields",
     apply=_apply,
     unit=_unit,
     frames=None,

@@ -45,7 +45,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 CONTACT_STIFFENING = Effect(
     name="contact_stiffening",
-    summary="joints yield less and less as the load grows",
     apply=_apply,
     unit=_unit,
     frames=drives,

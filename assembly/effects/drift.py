@@ -29,7 +29,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 DRIFT = Effect(
     name="drift",
-    summary="what is read drifts with time and settles",
     apply=_apply,
     unit=_unit,
     frames=None,

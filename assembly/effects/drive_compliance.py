@@ -33,7 +33,6 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
 
 DRIVE_COMPLIANCE = Effect(
     name="drive_compliance",
-    summary="actuated joints yield",
     apply=_apply,
     unit=_unit,
     frames=drives,

@@ -45,7 +45,6 @@ class Effect:
 
     Attributes:
         name: as in the public format.
-        summary: one line for people.
         apply: from conditions without the effect and parameters by their public names
             (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
         unit: of a parameter, from the robot and the parameter's public name.
@@ -61,7 +60,6 @@ class Effect:
     """
 
     name: str
-    summary: str
     apply: Callable[[Conditions, Values], Conditions]
     unit: Callable[[Robot, str], str]
     frames: Callable[[Robot], tuple[str, ...]] | None

@@ -38,7 +38,6 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
 
 ENCODER_ECCENTRICITY = Effect(
     name="encoder_eccentricity",
-    summary="drives stand off their command once a turn",
     apply=_apply,
     unit=lambda robot, name: "rad",
     frames=turning_drives,

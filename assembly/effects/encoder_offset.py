@@ -16,7 +16,6 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 ENCODER_OFFSET = Effect(
     name="encoder_offset",
-    summary="drives stand off their command by a constant",
     apply=_apply,
     unit=own_unit,
     frames=drives,

@@ -40,7 +40,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 FRICTION_HYSTERESIS = Effect(
     name="friction_hysteresis",
-    summary="elastic joints stop short of where they were going",
     apply=_apply,
     unit=_unit,
     frames=elastic_joints,

@@ -6,7 +6,6 @@ from assembly.effects.effect import Effect
 
 GEOMETRIC_STIFFENING = Effect(
     name="geometric_stiffening",
-    summary="motions are finite: the exact model instead of the linear one",
     apply=lambda conditions, values: replace(conditions, exact=True),
     unit=lambda robot, name: "1",
     frames=None,

@@ -52,7 +52,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 JOINT_CLEARANCE = Effect(
     name="joint_clearance",
-    summary="joints declared tight have play",
     apply=_apply,
     unit=_unit,
     frames=moving_joints,

@@ -15,7 +15,6 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 LINK_LENGTH = Effect(
     name="link_length",
-    summary="bodies are longer than declared",
     apply=_apply,
     unit=lambda robot, name: "m",
     frames=beams,

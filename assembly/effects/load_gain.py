@@ -27,7 +27,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 LOAD_GAIN = Effect(
     name="load_gain",
-    summary="the load applied is not the load recorded",
     apply=_apply,
     unit=_unit,
     frames=None,

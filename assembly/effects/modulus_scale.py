@@ -37,7 +37,6 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
 
 MODULUS_SCALE = Effect(
     name="modulus_scale",
-    summary="links are softer or stiffer than declared",
     apply=_apply,
     unit=lambda robot, name: "1",
     frames=links,

@@ -28,7 +28,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 REGISTRATION = Effect(
     name="registration",
-    summary="the measuring frame, or the measured point, is not where it was thought",
     apply=_apply,
     unit=_unit,
     frames=None,

@@ -17,7 +17,6 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 SELF_WEIGHT = Effect(
     name="self_weight",
-    summary="links (density) and bodies (mass) sag under their weight",
     apply=_apply,
     unit=lambda robot, name: "m/s^2",
     frames=None,

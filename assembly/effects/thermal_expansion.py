@@ -16,7 +16,6 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 THERMAL_EXPANSION = Effect(
     name="thermal_expansion",
-    summary="bodies lengthen with temperature",
     apply=_apply,
     unit=lambda robot, name: "1/K",
     frames=beams,

@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 from assembly.linear.load import loads_with_weight
 from assembly.linear.without_clearance import flexibility, in_groups
 from assembly.measurement.conditions import Conditions
-from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.clearance import (
+    CONES,
+    clearance_bounds,
+    component_bounds,
+    scales_with_margin,
+)
 from assembly.model.robot import Clearance, Frame, Robot
 
 _UNLOADED = 1e-9  # of the largest wrench of its kind: less is no load
@@ -70,17 +75,17 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
     """
     if conditions.rest is None:
         raise ValueError("conditions have no rest positions of the clearances")
-    clearance_screws = conditions.rest * _bounds_by_row(conditions.robot)
+    clearance_screws = conditions.rest * _component_bounds(conditions.robot)
     robot = without_joint_clearances(conditions.robot)
     return replace(
         conditions, robot=robot, errors=conditions.errors + clearance_screws, rest=None
     )
 
 
-def _bounds_by_row(robot: Robot) -> NDArray:
+def _component_bounds(robot: Robot) -> NDArray:
     """(n, 6) bound of every component of a clearance screw; 0 without clearance."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
-    return bounds[:, [0, 0, 1, 2, 2, 3]]
+    return component_bounds(bounds)
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
@@ -93,7 +98,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
     Returns:
         (n, 6) [-], 0 where there is no clearance.
     """
-    bounds = _bounds_by_row(robot)
+    bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
     return np.divide(
         clearance_screws, bounds, out=np.zeros_like(clearance_screws), where=finite

@@ -1,7 +1,4 @@
-"""The commands ``forcefit assembly statistics`` and ``tolerances``.
-
-Importing this module adds them to the application.
-"""
+"""The commands ``forcefit assembly statistics`` and ``tolerances``."""
 
 import sys
 from collections.abc import Generator, Sequence
@@ -11,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -36,7 +32,6 @@ PlayOption = Annotated[
 ]
 
 
-@app.command()
 def statistics(
     robot: RobotArgument,
     errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
@@ -81,6 +76,7 @@ def statistics(
     """
     from assembly.model.error_distributions import read_sources
     from assembly.statistics.experiment import Experiment, precision_for
+    from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
     from assembly.statistics.plot import histogram_figure
     from assembly.statistics.quantities import parse_limit
@@ -107,11 +103,14 @@ def statistics(
         precision=precision_for(limits),
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    options = None
+    if importance is not None:
+        options = ImportanceOptions(importance, by, confidence)
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
-            None if importance is None else (importance, by), confidence, held,
+            options, held,
         )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
@@ -133,9 +132,9 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
 
 
 def _check_play(play: str) -> None:
-    from assembly.statistics.play import PLAY
+    from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
-    _check_word("--play", play, tuple(PLAY))
+    _check_word("--play", play, tuple(CLEARANCE_MODELS))
 
 
 @contextmanager
@@ -149,7 +148,6 @@ def _interruptible(output: Path | None) -> Generator[None, None, None]:
         raise typer.Exit(130) from None
 
 
-@app.command()
 def tolerances(
     robot: RobotArgument,
     grid: Annotated[
@@ -207,7 +205,11 @@ def tolerances(
     if figure is not None:
         check_writable(figure, PICTURE)
     machine = load_robot(robot)
-    asked = None if plan is None else replace(read_plan(plan, machine), play=play)
+    asked = (
+        None
+        if plan is None
+        else replace(read_plan(plan, machine), clearance_model=play)
+    )
     postures = grid_postures(machine, grid)
     results: dict = {"robot": machine.name, "postures": len(postures)}
     said = []

@@ -14,8 +14,8 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
-from assembly.statistics.play import settle_play
-from assembly.statistics.worst_play import play_pulls
+from assembly.statistics.clearance_positions import position_clearances
+from assembly.statistics.worst_clearance import worst_error_slopes
 
 
 def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> None:
@@ -40,10 +40,12 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
         lambda: zone_margins(robot, T),
         lambda: bound_pose_errors(robot, T),
         lambda: prepare_margins(posture).solve(errors[None]),
-        lambda: settle_play(draws, resting, "uniform", rngs),
-        lambda: settle_play(draws, resting, "contact", rngs),
+        lambda: position_clearances(draws, resting, "uniform", rngs),
+        lambda: position_clearances(draws, resting, "contact", rngs),
         _finish_with_newton,
-        lambda: play_pulls(draws, resting, "translation", resting.platform_screw),
+        lambda: worst_error_slopes(
+            draws, resting, "translation", resting.platform_screw
+        ),
     )
     progress(0, len(questions))
     for done, ask in enumerate(questions, start=1):

@@ -14,9 +14,9 @@ from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import load_robot
+from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.play import settle_play
 from forcefit.commands.statistics import app
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import random_robot
@@ -103,7 +103,7 @@ def test_play_that_is_left_does_no_work_on_the_load(play, load):
     one = prepare_energies(home_posture(robot), load)
     found = one.solve(some_errors(robot) / 50)
     generators = [draw_generator(1, d, 1) for d in range(8)]
-    settled, mixed = settle_play(one, found, play, generators)
+    settled, mixed = position_clearances(one, found, play, generators)
     assert mixed.all()
     moved = settled - found.platform_screw
     assert np.abs(moved).max() > 3e-5

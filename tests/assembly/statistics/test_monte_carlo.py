@@ -17,6 +17,7 @@ from assembly.model.link_stress import peak_stresses
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.plot import (
     allocation_figure,
@@ -108,7 +109,7 @@ def test_a_kill_while_importance_is_found_loses_no_draw(
     experiment, small_blocks, tmp_path
 ):
     """The whole file, importance too, ends in the same bytes."""
-    groups = (16, "kind")
+    groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
     run_draws(experiment, 100, whole, importance=groups)
     total = []
