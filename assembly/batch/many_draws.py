@@ -97,7 +97,6 @@ class OnePosture:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
         from assembly.batch.compiled_draws import least_energies
-        from assembly.solvers.cone_solvers import cone_solvers
 
         errors = np.asarray(errors, dtype=float)
         count, n = len(errors), len(self.posture.robot.frames)
@@ -121,7 +120,7 @@ class OnePosture:
         most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
         slip = np.abs(self.free).T @ (np.abs(motions) @ most)
         least_energies(
-            cone_solvers(), np.ascontiguousarray(self.G.T), self.starts,
+            np.ascontiguousarray(self.G.T), self.starts,
             e @ self.misfit[:, some].T, np.linalg.pinv(self.G), self.cones,
             self.pulls.T @ self.pulls,
             float(np.linalg.norm(slip)), u, y, energy, bound, road,

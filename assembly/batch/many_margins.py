@@ -78,7 +78,6 @@ class PostureMargins:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
         from assembly.batch.compiled_draws import least_margins
-        from assembly.solvers.cone_solvers import cone_solvers
 
         errors = np.asarray(errors, dtype=float)
         count, n = len(errors), len(self.posture.robot.frames)
@@ -90,9 +89,7 @@ class PostureMargins:
         margin, bound = np.zeros(count), np.zeros(count)
         q, reach = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
         if len(self.B):
-            least_margins(
-                cone_solvers(), self.B, self.starts, e @ self.K.T, margin, bound, q
-            )
+            least_margins(self.B, self.starts, e @ self.K.T, margin, bound, q)
         missed = np.abs(e @ self.unanswered.T).max(axis=1, initial=0.0)
         margin[missed > _CLEARLY_RIGID] = bound[missed > _CLEARLY_RIGID] = np.inf
         most = np.concatenate(

@@ -153,7 +153,6 @@ def minimise_energies(
         ValueError: a shape does not fit the robot, or a value is not finite.
     """
     from assembly.batch.compiled_energy import Answers, assemble_all
-    from assembly.solvers.cone_solvers import cone_solvers
 
     # writable and in C order, whatever comes: the kernels are compiled for one kind
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
@@ -182,7 +181,7 @@ def minimise_energies(
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.road[:] = ROADS.index("uncertified")  # what rounds is for the other road
     else:
-        assemble_all(cone_solvers(), structure, T, all_errors, off, out)
+        assemble_all(structure, T, all_errors, off, out)
     answers = Energies(
         out.energy, out.bound, out.without_play, out.platform_screw, out.open,
         _excess(out.clearances, structure.starts), out.clearances, out.motions,
@@ -296,7 +295,6 @@ def zone_margins(
         ValueError: ``compliant`` is something else.
     """
     from assembly.batch.compiled_zone import all_margins
-    from assembly.solvers.cone_solvers import cone_solvers
 
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
@@ -308,15 +306,14 @@ def zone_margins(
     road, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
     own = None if errors is None else np.array(errors, dtype=float)
     if joints.scaled.all() and len(joints.scaled):
-        solvers = cone_solvers()
         if own is None:
             same = robot.errors.copy()
-            all_margins(solvers, structure, T, same, off, margin, bound, road)
+            all_margins(structure, T, same, off, margin, bound, road)
         else:
             for i in range(count):
                 one = slice(i, i + 1)
                 all_margins(
-                    solvers, structure, T[one], own[i], off[one], margin[one],
+                    structure, T[one], own[i], off[one], margin[one],
                     bound[one], road[one],
                 )  # fmt: skip
     for i in np.flatnonzero(road).tolist():

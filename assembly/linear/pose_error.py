@@ -125,17 +125,15 @@ def _farthest(
     reach: Reach, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
     """Bounds of the largest size of half a screw, a screw, and the supports it took."""
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.solvers.farthest import NEEDED, advance, begin, choose, learn
-    from assembly.solvers.polytope import empty_polytope
+    from assembly.solvers.farthest import NEEDED, begin_search, search_on
 
     if reach.unbounded(part):
         return (np.inf, np.inf), reach.centre, 0
     body = reach.body
-    search = begin(body, part, tolerance, empty_polytope())
-    while advance(cone_solvers(), body, search) == NEEDED:
+    search, nothing = begin_search(body, part, tolerance), np.zeros(0)
+    state = search_on(body, search, 0.0, nothing, nothing)
+    while state == NEEDED:
         found = reach.support(search.direction @ np.eye(6)[part : part + 3])
-        learn(body, search, found.height, found.screw, found.pulls)
-        choose(search)
+        state = search_on(body, search, found.height, found.screw, found.pulls)
     low, high = search.bounds.tolist()
     return (low, high), search.best, int(search.counts[1])

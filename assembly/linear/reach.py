@@ -112,7 +112,7 @@ class Reach:
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.solvers.support import screw_at, within
+        from assembly.solvers.support import screw_near
 
         direction = np.asarray(direction, dtype=float)
         pull = self.map.T @ direction
@@ -129,7 +129,7 @@ class Reach:
         )
         height = at_centre - least.bound * size - float(pull @ self.start)
         body = self.body
-        screw = screw_at(body, within(body, least.clearances))
+        screw = screw_near(body, least.clearances)
         pulls = pull + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, pulls)
 

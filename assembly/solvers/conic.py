@@ -137,10 +137,10 @@ def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray | None, str]:
     """The interior-point method of this package; its answer must still satisfy H."""
-    from assembly.solvers.cone_solvers import cone_solvers, interior_point
+    from assembly.solvers.cone_solvers import interior_point
 
     u, n, _ = interior_point(
-        cone_solvers(), np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
+        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
         _starts(group), 1e-12,
     )  # fmt: skip
     finite = np.isfinite(u).all() and np.isfinite(n).all()
@@ -192,7 +192,7 @@ def _certified(
     u: NDArray, rigid: NDArray,
 ) -> Iterator[LeastEnergy]:  # fmt: skip
     """An answer with the bound its own springs prove; the same led on by Newton."""
-    from assembly.solvers.cone_solvers import cone_solvers, newton
+    from assembly.solvers.cone_solvers import newton
 
     problem = (G, h, d, H, k, group)
     yield _certify(*problem, u, G @ u + h, rigid)
@@ -202,7 +202,7 @@ def _certified(
     right, size = np.concatenate([h, -k]), float(h @ h) / 2
     u, y = u.copy(), np.concatenate([h, -rigid])
     newton(
-        cone_solvers(), Gt, right, d, len(h), _starts(group), _STOP * GAP,
+        Gt, right, d, len(h), _starts(group), _STOP * GAP,
         _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _SHARP, u, y,
     )  # fmt: skip
     u = into_cones(u, group)

@@ -98,7 +98,6 @@ def _at_contact(
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Clearances pushed by a random wrench until they are taken up."""
-    from assembly.solvers.cone_solvers import cone_solvers
     from assembly.statistics.push import push_all
 
     rows, free = play_rows(one, loaded), ~loaded
@@ -107,7 +106,7 @@ def _at_contact(
     wrenches = np.array([rng.normal(size=6) * scale for rng in generators])
     pushes = wrenches.reshape(-1, 6) @ one.screws[:, : u.shape[1]]
     here, ends = np.ascontiguousarray(u), np.empty_like(u)
-    push_all(cone_solvers(), rows, one.starts, free, here, pushes, ends)
+    push_all(rows, one.starts, free, here, pushes, ends)
     for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
         ends[k] = _push_slowly(one, rows, free, here[k], pushes[k])
     return ends, np.ones(len(u), dtype=bool)

@@ -4,18 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.interior import interior_point
 
 
 @kernel
 def push_all(
-    solvers: ConeSolvers, rows: NDArray, starts: NDArray, free: NDArray, u: NDArray,
+    rows: NDArray, starts: NDArray, free: NDArray, u: NDArray,
     pushes: NDArray, ends: NDArray,
 ) -> None:  # fmt: skip
     """Go from every row of u (k, nu) as far as a push leads: play is then taken up.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         rows: (p, nu) orthonormal, zero where not ``free``.
         starts: (cones + 1,) first column of each cone, and nu.
         free: (nu,) bool, which may move; whole cones.
@@ -42,7 +41,7 @@ def push_all(
             for c in range(nu):
                 if free[c]:
                     right[l] += rows[l, c] * u[i, c]
-        found, _, steps = solvers.interior_point(
+        found, _, steps = interior_point(
             none, nothing, push, rows, right, starts, 1e-9, 0.0
         )
         for c in range(nu):

@@ -129,8 +129,7 @@ def play_pulls(
         (k, 6) slopes of the largest error with the platform's screw, and (k, nu) pulls
         with which it presses on the bound of every clearance that carries no load.
     """
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.solvers.support import support
+    from assembly.solvers.support import pulls_along
 
     part = 3 * POSE_ERRORS.index(key)
     size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
@@ -142,7 +141,7 @@ def play_pulls(
         if free.any():
             body = _body(one, found, i, free)
             direction = by_screw[i, part : part + 3].copy()
-            pulls[i, free] = support(cone_solvers(), body, part, direction, _SHARP)[2]
+            pulls[i, free] = pulls_along(body, part, direction, _SHARP)
     return by_screw, pulls
 
 
