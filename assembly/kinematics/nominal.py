@@ -101,7 +101,7 @@ def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Trac
     Returns:
         The ends of the tracks, and their progress.
     """
-    from assembly.kinematics.compiled_continuation import follow_all, forward
+    from assembly.kinematics.compiled_continuation import follow_all
 
     count, n = len(target), len(robot.frames)
     carries = robot.on_path - np.eye(n)  # a joint's motion comes after its own frame
@@ -111,18 +111,14 @@ def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Trac
     if target.coordinates is not None:
         held = np.where(kinds > 0, target.coordinates, np.nan)
     poses = np.zeros((0, 6)) if target.pose is None else target.pose
+    T = np.zeros((count, n, 4, 4))
+    T[..., 3, 3] = 1.0
     q, progress = follow_all(
         robot.parents, kinds, robot.fixed_transforms, carries,
         np.array(pairs, dtype=int).reshape(-1, 2), robot.index(robot.platform),
         np.array(start, dtype=float), np.array(poses, dtype=float), held,
-        size_of(robot), steps,
+        size_of(robot), steps, T,
     )  # fmt: skip
-    T = np.zeros((count, n, 4, 4))
-    T[..., 3, 3] = 1.0
-    for i in range(count):
-        T[i, :, :3, :3], T[i, :, :3, 3] = forward(
-            robot.parents, kinds, robot.fixed_transforms, q[i]
-        )
     return Track(q, T, progress, _closure_mismatch(robot, T))
 
 
