@@ -79,7 +79,6 @@ class PostureMargins:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
         from assembly.batch.compiled_draws import least_margins
-        from assembly.solvers.cone_solvers import cone_solvers
 
         errors = np.asarray(errors, dtype=float)
         count, n = len(errors), len(self.posture.robot.frames)
@@ -91,9 +90,7 @@ class PostureMargins:
         margin, bound = np.zeros(count), np.zeros(count)
         q, unit = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
         if len(self.B):
-            least_margins(
-                cone_solvers(), self.B, self.starts, e @ self.K.T, margin, bound, q
-            )
+            least_margins(self.B, self.starts, e @ self.K.T, margin, bound, q)
         infeasible = np.abs(e @ self.infeasible.T).max(axis=1, initial=0.0)
         no_factor = infeasible > _CLEARLY_INFEASIBLE
         margin[no_factor] = bound[no_factor] = np.inf

@@ -114,7 +114,6 @@ def bound_pose_errors(
         ValueError: the reading is unknown, or a shape does not fit the robot.
     """
     from assembly.batch.compiled_reach import HANDED_BACK, SOLVED, Bounds, bound_all
-    from assembly.solvers.cone_solvers import cone_solvers
 
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
@@ -147,7 +146,7 @@ def bound_pose_errors(
             robot, T, reading, errors, off, energies, bounds.road
         )
         bound_all(
-            cone_solvers(), structure, T, off, energies.platform_screw.copy(),
+            structure, T, off, energies.platform_screw.copy(),
             np.ascontiguousarray(energies.clearances[:, column_of]),
             _motions(robot, structure, energies), loads,
             np.asarray(offset, dtype=float).copy(), tolerance, bounds,

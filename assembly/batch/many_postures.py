@@ -152,7 +152,6 @@ def minimise_energies(
         ValueError: a shape does not fit the robot, or a value is not finite.
     """
     from assembly.batch.compiled_energy import Answers, assemble_all
-    from assembly.solvers.cone_solvers import cone_solvers
 
     # writable and in C order, whatever comes: the kernels are compiled for one kind
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
@@ -186,7 +185,7 @@ def minimise_energies(
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.road[:] = OUTCOMES.index("uncertified")  # left to the fallback
     else:
-        assemble_all(cone_solvers(), structure, T, all_errors, off, out)
+        assemble_all(structure, T, all_errors, off, out)
     energies = Energies(
         energy=out.energy,
         bound=out.bound,

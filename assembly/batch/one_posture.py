@@ -121,7 +121,6 @@ class OnePosture:
 def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     """Least energies of k draws without loads."""
     from assembly.batch.compiled_draws import least_energies
-    from assembly.solvers.cone_solvers import cone_solvers
 
     count, n = len(errors), len(one.posture.robot.frames)
     flat = errors.reshape(-1, 6 * n)
@@ -137,7 +136,7 @@ def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
     slip = np.abs(one.free).T @ (np.abs(motions) @ most)
     least_energies(
-        cone_solvers(), np.ascontiguousarray(one.G.T), one.starts,
+        np.ascontiguousarray(one.G.T), one.starts,
         e @ one.misfit[:, erring].T, np.linalg.pinv(one.G), one.cones,
         one.pulls.T @ one.pulls,
         float(np.linalg.norm(slip)), u, y, energy, bound, outcome,

@@ -77,7 +77,6 @@ def zone_margins(
         ValueError: ``compliant`` is something else.
     """
     from assembly.batch.compiled_zone import all_margins
-    from assembly.solvers.cone_solvers import cone_solvers
 
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
@@ -89,17 +88,14 @@ def zone_margins(
     outcome, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
     own = None if errors is None else np.array(errors, dtype=float)
     if joints.scaled.all() and len(joints.scaled):
-        solvers = cone_solvers()
         if own is None:
             errors_of_all = robot.errors.copy()
-            all_margins(
-                solvers, structure, T, errors_of_all, off, margin, bound, outcome
-            )
+            all_margins(structure, T, errors_of_all, off, margin, bound, outcome)
         else:
             for i in range(count):
                 one = slice(i, i + 1)
                 all_margins(
-                    solvers, structure, T[one], own[i], off[one], margin[one],
+                    structure, T[one], own[i], off[one], margin[one],
                     bound[one], outcome[one],
                 )  # fmt: skip
     for i in np.flatnonzero(outcome).tolist():

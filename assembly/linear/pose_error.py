@@ -131,17 +131,15 @@ def _farthest(
     reachable: ReachableSet, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
     """Bounds of the largest size of half a screw, a screw, and the supports it took."""
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.solvers.farthest import NEEDED, advance, begin, choose, learn
-    from assembly.solvers.polytope import empty_polytope
+    from assembly.solvers.farthest import NEEDED, begin_search, search_on
 
     if reachable.unbounded(part):
         return (np.inf, np.inf), reachable.centre, 0
     body = reachable.body
-    search = begin(body, part, tolerance, empty_polytope())
-    while advance(cone_solvers(), body, search) == NEEDED:
+    search, nothing = begin_search(body, part, tolerance), np.zeros(0)
+    state = search_on(body, search, 0.0, nothing, nothing)
+    while state == NEEDED:
         support = reachable.support(search.direction @ np.eye(6)[part : part + 3])
-        learn(body, search, support.height, support.screw, support.gradient)
-        choose(search)
+        state = search_on(body, search, support.height, support.screw, support.gradient)
     low, high = search.bounds.tolist()
     return (low, high), search.best, int(search.counts[1])

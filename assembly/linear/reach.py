@@ -139,7 +139,7 @@ class ReachableSet:
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.solvers.support import screw_at, within
+        from assembly.solvers.support import screw_near
 
         direction = np.asarray(direction, dtype=float)
         gradient = self.map.T @ direction
@@ -156,7 +156,7 @@ class ReachableSet:
         )
         height = at_centre - least.bound * size - float(gradient @ self.start)
         body = self.body
-        screw = screw_at(body, within(body, least.clearances))
+        screw = screw_near(body, least.clearances)
         reduced = gradient + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, reduced)
 

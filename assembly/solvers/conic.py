@@ -144,10 +144,10 @@ def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray | None, str]:
     """The interior-point method of this package; its solution must satisfy H."""
-    from assembly.solvers.cone_solvers import cone_solvers, interior_point
+    from assembly.solvers.cone_solvers import interior_point
 
     u, n, _ = interior_point(
-        cone_solvers(), np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
+        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
         _starts(group), 1e-12,
     )  # fmt: skip
     finite = np.isfinite(u).all() and np.isfinite(n).all()
@@ -199,7 +199,7 @@ def _certified(
     u: NDArray, rigid: NDArray,
 ) -> Iterator[LeastEnergy]:  # fmt: skip
     """A solution with the bound of its own springs; the same refined by Newton."""
-    from assembly.solvers.cone_solvers import cone_solvers, newton
+    from assembly.solvers.cone_solvers import newton
 
     problem = (G, h, d, H, k, group)
     yield _certify(*problem, u, G @ u + h, rigid)
@@ -209,7 +209,7 @@ def _certified(
     right, size = np.concatenate([h, -k]), float(h @ h) / 2
     u, y = u.copy(), np.concatenate([h, -rigid])
     newton(
-        cone_solvers(), Gt, right, d, len(h), _starts(group), _STOP * GAP,
+        Gt, right, d, len(h), _starts(group), _STOP * GAP,
         _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _FIRST_SIGMA, u, y,
     )  # fmt: skip
     u = into_cones(u, group)

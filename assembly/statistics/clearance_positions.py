@@ -102,7 +102,6 @@ def _at_contact(
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Clearances displaced along a random wrench until in contact."""
-    from assembly.solvers.cone_solvers import cone_solvers
     from assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
@@ -111,9 +110,7 @@ def _at_contact(
     wrenches = np.array([rng.normal(size=6) * scale for rng in generators])
     directions = wrenches.reshape(-1, 6) @ prepared.screws[:, : clearances.shape[1]]
     positions, ends = np.ascontiguousarray(clearances), np.empty_like(clearances)
-    move_to_contact(
-        cone_solvers(), rows, prepared.starts, free, positions, directions, ends
-    )
+    move_to_contact(rows, prepared.starts, free, positions, directions, ends)
     for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
         ends[k] = _contact_fallback(prepared, rows, free, positions[k], directions[k])
     return ends, np.ones(len(clearances), dtype=bool)

@@ -4,18 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.interior import interior_point
 
 
 @kernel
 def move_to_contact(
-    solvers: ConeSolvers, rows: NDArray, starts: NDArray, free: NDArray,
+    rows: NDArray, starts: NDArray, free: NDArray,
     positions: NDArray, directions: NDArray, ends: NDArray,
 ) -> None:  # fmt: skip
     """The farthest point of the clearances' set along each direction.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         rows: (p, nu) orthonormal, zero where not ``free``.
         starts: (cones + 1,) first column of each cone, and nu.
         free: (nu,) bool, which may move; whole cones.
@@ -43,7 +42,7 @@ def move_to_contact(
             for c in range(nu):
                 if free[c]:
                     right_side[l] += rows[l, c] * positions[i, c]
-        position, _, steps = solvers.interior_point(
+        position, _, steps = interior_point(
             no_springs, no_offset, direction, rows, right_side, starts, 1e-9, 0.0
         )
         for c in range(nu):

@@ -138,8 +138,7 @@ def worst_error_slopes(
         (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
         multipliers of the bounds of the clearances that carry no load.
     """
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.solvers.support import support
+    from assembly.solvers.support import pulls_along
 
     part = 3 * POSE_ERRORS.index(key)
     size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
@@ -151,9 +150,9 @@ def worst_error_slopes(
         if free.any():
             body = _remaining_screws(prepared, draws, i, free)
             direction = by_screw[i, part : part + 3].copy()
-            by_clearance[i, free] = support(
-                cone_solvers(), body, part, direction, _SUPPORT_PRECISION
-            )[2]
+            by_clearance[i, free] = pulls_along(
+                body, part, direction, _SUPPORT_PRECISION
+            )
     return by_screw, by_clearance
 
 

@@ -55,8 +55,8 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
 
 def _finish_with_newton() -> None:
     """Newton's method by itself, as it finishes what an interior point left."""
-    from assembly.solvers.cone_solvers import cone_solvers, newton
+    from assembly.solvers.cone_solvers import newton
 
     one, none = np.ones((1, 1)), np.zeros(1)
     starts, u, y = np.array([0, 1]), np.zeros(1), np.ones(1)
-    newton(cone_solvers(), one, none, none, 1, starts, 1e-9, 1e-9, 1, 0.0, u, y)
+    newton(one, none, none, 1, starts, 1e-9, 1e-9, 1, 0.0, u, y)

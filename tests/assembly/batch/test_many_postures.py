@@ -274,8 +274,8 @@ def test_a_spoilt_solver_is_caught_and_the_slower_road_taken(grid, monkeypatch):
 
     assemble_all = compiled_assembly.assemble_all
 
-    def spoilt(solvers, s, T, errors, mismatch, out):
-        assemble_all(solvers, s, T, errors, mismatch, out)
+    def spoilt(s, T, errors, mismatch, out):
+        assemble_all(s, T, errors, mismatch, out)
         for i in range(len(T)):
             out.energy[i] *= 1 + 1e-6
             P = compiled_assembly.paths_of(T[i], s)
