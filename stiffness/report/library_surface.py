@@ -54,7 +54,7 @@ class SurfaceLink:
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """All that the entry depends on, with the surface file's fingerprint.
+        """All that the entry depends on, with the surface file's digest.
 
         Returns:
             Plain values, the same for the same question.

@@ -56,7 +56,7 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Fingerprint of the geometry alone, to the last bit."""
+        """Digest of the geometry alone, to the last bit."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
