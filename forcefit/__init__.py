@@ -48,7 +48,8 @@ _OWNERS = {
     "validation.diagnosis.diagnose": ("diagnose",),
     "validation.inspection.inspection": ("inspect_campaign",),
     "validation.study.report": ("write_study",),
-    "validation.study.study": ("read_study", "run_study"),
+    "validation.study.study": ("run_study",),
+    "validation.study.study_file": ("read_study",),
 }  # fmt: skip
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
