@@ -13,8 +13,8 @@ from crosscheck_robots import drawn, hexapod, papers_robot, three_rrr
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from forcefit.inputs.table import BadInput
-from validation.crosscheck.pair import exact_answer
-from validation.crosscheck.playcheck import FLOOR_ENERGY
+from validation.crosscheck.clearance_metric import FLOOR_ENERGY
+from validation.crosscheck.pair import exact_solution
 from validation.multibody.simulation import SimulationFailed, simulate_assembly
 
 
@@ -51,7 +51,7 @@ def main() -> None:
                 seconds.append(time.perf_counter() - started)
             converged += 1
             best = solve_assembly(case)
-            for values, answer in ((linear, best), (exact, exact_answer(best))):
+            for values, answer in ((linear, best), (exact, exact_solution(best))):
                 if answer is not None:
                     size = max(answer.energy, FLOOR_ENERGY)
                     values.append(abs(simulated.rigid_energy - answer.energy) / size)

@@ -40,8 +40,8 @@ def main() -> None:
         started = time.perf_counter()
         answers = [crosscheck(posture, links=links) for posture in postures(name)]
         seconds = (time.perf_counter() - started) / len(answers)
-        slopes = [s for a in answers for s in a.slopes.values()]
-        left = {h: [a.unexplained[h] for a in answers]
+        slopes = [s for a in answers for s in a.metric.slopes.values()]
+        left = {h: [a.metric.unexplained[h] for a in answers]
                 for h in ("rotation", "translation")}  # fmt: skip
         first = [a.pairs[0] for a in answers]
         linear = [abs(p.simulated.energy / p.linear.energy - 1) for p in first]
@@ -49,7 +49,7 @@ def main() -> None:
         print(
             f"{name:10} {links:7} {sum(a.passed for a in answers):2}/{len(answers)}   "
             f"{min(slopes):.4f} {max(slopes):.4f}   "
-            f"{max(c.value for a in answers for c in a.limits.values()):.1e}  "
+            f"{max(c.value for a in answers for c in a.metric.limits.values()):.1e}  "
             f"{np.median(left['rotation']):.1e} {max(left['rotation']):.1e}  "
             f"{np.median(left['translation']):.1e} {max(left['translation']):.1e}   "
             f"{np.median(linear):.1e} {max(linear):.1e}; "

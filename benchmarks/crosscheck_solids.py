@@ -34,9 +34,9 @@ def main() -> None:
             energy = first.simulated.energy / first.exact.energy - 1
             print(
                 f"{seed:4}  {links:7} {answer.passed!s:6}  {answer.slope:.4f}  "
-                f"{max(c.value for c in answer.limits.values()):.1e}  "
-                f"{answer.unexplained['rotation']:.1e}        "
-                f"{answer.unexplained['translation']:.1e}           {energy:.1e}"
+                f"{max(c.value for c in answer.metric.limits.values()):.1e}  "
+                f"{answer.metric.unexplained['rotation']:.1e}        "
+                f"{answer.metric.unexplained['translation']:.1e}           {energy:.1e}"
                 f"              {time.perf_counter() - started:.1f}"
             )
 

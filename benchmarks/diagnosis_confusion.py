@@ -30,7 +30,7 @@ from random_robots import draw_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain, write_json
 from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.design import Design
+from validation.synthetic.design import CampaignDesign
 from validation.synthetic.draws import NotApplicable, draw_effect
 from validation.synthetic.effects import LIBRARY, Parameters
 from validation.synthetic.equivalents import SAME, Alternative, alternatives
@@ -75,7 +75,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     robot, load = drawn.robot, drawn.load
     # robots of many legs take long: half as many rows
     many = len(robot.frames) > 20
-    design = Design(
+    design = CampaignDesign(
         configurations=12 if many else 24,
         rows=60 if many else 116,
         reach=drawn.reach,
@@ -131,7 +131,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     same = {
         tuple(sorted(_plain(one)))
         for one in rivals
-        if one.left < SAME and tuple(sorted(_plain(one))) != tuple(names)
+        if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
     }
     # nothing at all is a rival too, if the effects hardly show
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
@@ -142,17 +142,21 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     verdict = "ambiguous" if kind == "confounded" else None
     truth = truth_of(campaign, verdict, accept)
     if kind == "outside":
-        least = rivals[0].left if rivals else np.inf
+        least = rivals[0].residual if rivals else np.inf
         truth["accept_effects"] = [[]]
         truth["hidden_from_library"] = least
         truth["accept_verdicts"] = ["outside_library"]
         if least < VISIBLE:  # a public effect does nearly the same
             truth["accept_verdicts"] = list(VERDICTS)
-            hidden = [one for one in rivals if one.left < VISIBLE]
+            hidden = [one for one in rivals if one.residual < VISIBLE]
             truth["accept_effects"] += [_plain(one) for one in hidden]
     truth["kind"] = kind
     truth["alternatives"] = [
-        {"names": list(one.names), "parameters": one.parameters, "left_chi2": one.left}
+        {
+            "names": list(one.names),
+            "parameters": one.parameters,
+            "left_chi2": one.residual,
+        }
         for one in rivals[:8]
     ]
     return truth

@@ -18,7 +18,7 @@ from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.diagnose import diagnose
 from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.design import Design
+from validation.synthetic.design import CampaignDesign
 from validation.synthetic.generator import Noise, generate_campaign, write_campaign
 
 CASES = (  # robot, rows, configurations, what is hidden at 5 times the noise
@@ -38,7 +38,7 @@ def make(folder: Path, case: int) -> None:
     for attempt in range(TRIES):
         rng = np.random.default_rng([77, case, attempt])
         drawn = draw_robot(rng, kind)
-        design = Design(configurations, rows, drawn.reach, load=drawn.load)
+        design = CampaignDesign(configurations, rows, drawn.reach, load=drawn.load)
         try:
             campaign = generate_campaign(
                 drawn.robot, {hidden: 5.0}, design, Noise(), drawn.point,

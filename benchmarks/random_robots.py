@@ -19,7 +19,7 @@ from assembly.robots.placing import drive_stiffness
 from assembly.robots.three_rrr import ThreeRRRParameters
 from validation.multibody.motion import turn_of
 from validation.multibody.simulation import SimulationFailed, without_clearance
-from validation.synthetic.design import Design, plan_campaign
+from validation.synthetic.design import CampaignDesign, plan_campaign
 from validation.synthetic.effects import Machine
 from validation.synthetic.machine import simulate_readings
 from validation.synthetic.springs import rest_on_springs
@@ -77,7 +77,7 @@ def _of_first_order(
 ) -> tuple[float, float]:
     """Reach [rad] and load [N] with which no deviation grows far: no singularities."""
     for _ in range(8):
-        design = Design(configurations=30, rows=60, reach=reach, load=load)
+        design = CampaignDesign(configurations=30, rows=60, reach=reach, load=load)
         rows = plan_campaign(robot, design, np.random.default_rng(0)).rows
         try:
             found = simulate_readings(robot, point, rows, program="springs")

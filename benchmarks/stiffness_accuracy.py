@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffness.fem.adaptive_step import estimated_error, finer, solve_level
+from stiffness.fem.adaptive_step import estimated_error, refine_level, solve_level
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.fea import Budget, first_mesh, interface_center
 from stiffness.fem.material import Material
@@ -52,7 +52,7 @@ def levels(name, kind, most):
         level = solve_level(solid, [Material(60e9, 0.3)], centers, kind)
         unknowns, seconds = level.solution.unknowns, time.perf_counter() - start
         found.append((*level.totals(), unknowns, seconds))
-        solid = finer(level, 1.15)
+        solid = refine_level(level, 1.15)
         if len(found) == 6 or unknowns * len(solid.cells) > most * len(
             level.solid.cells
         ):

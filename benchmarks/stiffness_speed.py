@@ -109,7 +109,7 @@ def ngsolve(name, order, layers, finer):
 
 def quadratic(name, accuracy):
     """Quadratic elements whose true error is as asked, their K and unknowns."""
-    from stiffness.fem.adaptive_step import finer, solve_level
+    from stiffness.fem.adaptive_step import refine_level, solve_level
     from stiffness.fem.condensation import condense
     from stiffness.fem.elements import isoparametric
     from stiffness.fem.fea import Budget, first_mesh
@@ -125,7 +125,7 @@ def quadratic(name, accuracy):
         answer = condense(mesh, lam, mu, centers)
         if true_error(name, answer.stiffness) <= accuracy:
             return mesh, answer
-        solid = finer(level, 1.3)
+        solid = refine_level(level, 1.3)
 
 
 def ccx(name, accuracy):

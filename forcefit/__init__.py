@@ -18,7 +18,8 @@ _OWNERS = {
     "stiffness.beam.sections": ("Section", "rectangular_section", "round_section"),
     "stiffness.fem.fea": ("mesh_link",),
     "stiffness.link": ("LinkStiffness", "turn_link"),
-    "stiffness.report.library": ("build_library", "look_up", "read_library"),
+    "stiffness.report.library": ("look_up", "read_library"),
+    "stiffness.report.library_build": ("build_library",),
     "stiffness.surface.interface": ("Interface", "parse_interface"),
     "assembly.exact.exact": ("solve_exact",),
     "assembly.files.robot_file": ("read_robot", "write_robot"),
@@ -47,7 +48,8 @@ _OWNERS = {
     "validation.diagnosis.diagnose": ("diagnose",),
     "validation.inspection.inspection": ("inspect_campaign",),
     "validation.study.report": ("write_study",),
-    "validation.study.study": ("read_study", "run_study"),
+    "validation.study.study": ("run_study",),
+    "validation.study.study_file": ("read_study",),
 }  # fmt: skip
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]

@@ -20,7 +20,7 @@ class LinkStiffness:
     read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
 
     Attributes:
-        method: how it was found, such as ``"Timoshenko beam"``.
+        method: by which it was computed, such as ``"Timoshenko beam"``.
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
         tip: (3,) [m] the point where screws and wrenches are read.
         base: (3,) [m] the centre of the held interface.
@@ -50,7 +50,7 @@ class LinkStiffness:
         """How stiff, and how well that is known."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
-        found = {
+        figures = {
             "method": self.method,
             "tip": f"{numbers(self.tip)} m",
             "base": f"{numbers(self.base)} m",
@@ -58,8 +58,8 @@ class LinkStiffness:
             "largest relative error": f"{error:.2g}" if error else "closed form",
         }
         if self.mesh:
-            found["mesh"] = f"{self.mesh['elements']} elements"
-        return found | ({"mass": f"{self.mass:.5g} kg"} if self.mass > 0 else {})
+            figures["mesh"] = f"{self.mesh['elements']} elements"
+        return figures | ({"mass": f"{self.mass:.5g} kg"} if self.mass > 0 else {})
 
     def __post_init__(self) -> None:
         shapes = {
@@ -100,7 +100,7 @@ class LinkStiffness:
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Entries divided by sqrt(K_ii K_jj), so that radians and metres weigh alike.
+    """Entries divided by sqrt(K_ii K_jj), so that rotations and translations compare.
 
     Args:
         matrix: (6, 6) a stiffness, or a difference of two.

@@ -43,7 +43,6 @@ OWNERS = {
         "assembly/statistics/importance_table.py",
         "assembly/statistics/tolerances.py",
         "assembly/model/tables.py",
-        "stiffness/report/library.py",
     ),
     "pandas": ("assembly/model/tables.py",),
     "h5netcdf": ("assembly/sweeps/netcdf.py",),

@@ -64,7 +64,8 @@ def study(
     the study file names.  Exit status 1 if a check fails.
     """
     from validation.study.report import results_table, verdict, write_study
-    from validation.study.study import read_study, run_study
+    from validation.study.study import run_study
+    from validation.study.study_file import read_study
 
     asked = read_study(file, output)
     with progress_bars() as update:

@@ -119,7 +119,7 @@ def generate(
 
     from assembly.robots import load_robot
     from validation.multibody.simulation import SimulationFailed, without_clearance
-    from validation.synthetic.design import Design
+    from validation.synthetic.design import CampaignDesign
     from validation.synthetic.draws import NotApplicable
     from validation.synthetic.generator import (
         Noise,
@@ -135,7 +135,7 @@ def generate(
             f'--program: found "{program[:60]}", expected ' + " | ".join(PROGRAMS)
         )
     wanted, measured = parse_effects(effect), parse_point(point)
-    design = Design(
+    design = CampaignDesign(
         configurations, rows, reach, stroke, force, loads, temperature, command,
         humidity,
     )  # fmt: skip

@@ -24,7 +24,7 @@ def build(
     from rich.progress import Progress
 
     from forcefit.inputs.errors import checked
-    from stiffness.report.library import build_library, read_spec
+    from stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)
     count = int(checked("--workers", workers, "1", least=1))

@@ -130,8 +130,7 @@ def crosscheck(
     """
     from assembly.effects.robot_effects import apply_robot_effects
     from validation.crosscheck.crosscheck import Crosscheck, attempt
-    from validation.crosscheck.crosscheck import crosscheck as compare_tight
-    from validation.crosscheck.playcheck import PlayCheck, playcheck
+    from validation.crosscheck.crosscheck import crosscheck as compare_models
 
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
@@ -142,14 +141,18 @@ def crosscheck(
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare(posture: "Posture") -> Crosscheck | PlayCheck:
+    def compare(posture: "Posture") -> Crosscheck:
         given = _with_errors(posture, errors, seed)
         applied = apply_robot_effects(given, wrench, g, covariates)
-        at, pushes = applied.posture, applied.load.tolist()
-        weight = None if applied.gravity is None else applied.gravity.tolist()
-        if clearances:
-            return playcheck(at, scales, pushes, links, weight, time_limit)
-        return compare_tight(at, scales, pushes, links, weight, time_limit)
+        return compare_models(
+            applied.posture,
+            scales,
+            applied.load,
+            links,
+            applied.gravity,
+            time_limit,
+            clearances,
+        )
 
     if grid is not None:
         _crosscheck_grid(robot, grid, compare, json)
@@ -159,7 +162,7 @@ def crosscheck(
     write_json(failure if answer is None else answer.table(), json)
     if json != "-":
         print(failure["reason"] if answer is None else answer.text())
-    if figure is not None and isinstance(answer, Crosscheck):
+    if figure is not None and answer is not None:
         from validation.crosscheck.plot import slope_figure
 
         save_figure(slope_figure(answer), figure)

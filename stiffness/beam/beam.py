@@ -44,8 +44,8 @@ def beam_compliance(
         nu: [-] Poisson's ratio, in (-1, 0.5).
         theory: ``"timoshenko"``, or ``"euler"``, which leaves shear out.
         axis: (3,) any length, from base to tip, in the axes of the result.
-        up: (3,) the section's z, in the same axes; what it has along the axis is
-            dropped.  Default: y, unless the beam lies along y, then z.
+        up: (3,) the section's z, in the same axes; its component along the axis
+            is removed.  Default: y, unless the beam lies along y, then z.
 
     Returns:
         (6, 6) [rad/(N m), rad/N, m/(N m), m/N] symmetric positive definite.

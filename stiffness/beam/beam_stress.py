@@ -13,7 +13,7 @@ tau       shear stress along y and along z                            Pa
 In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Shear forces and torsion load
 every section alike and M is linear in x, so the von Mises stress of a fibre,
 sqrt(sigma^2 + 3 tau^2), is convex in x: its largest value is at the base or at the tip,
-and only these two sections are looked at.
+and only these two sections are evaluated.
 """
 
 import math
@@ -36,14 +36,14 @@ def peak_beam_stress(
 ) -> tuple[NDArray, NDArray]:
     """Largest von Mises stress in a straight beam, and where it is.
 
-    Axial force, bending, torsion and shear act together.  Looked at are, in the
+    Axial force, bending, torsion and shear act together.  Evaluated are, in the
     sections at the base and at the tip,
 
     - round bar and tube: 360 points of the outer circle;
     - solid rectangle: a grid of 33 x 33 points, corners and middles included;
     - hollow rectangle: 33 points along each outer side.
 
-    Left out: what the joint that holds the link does to its ends (a held edge is
+    Left out: local stress where a joint holds the link's ends (a held edge is
     singular, see :mod:`stiffness.fem.stress`), and the stress in the inner corners of a
     hollow rectangle, which their fillets decide.
 
@@ -66,7 +66,7 @@ def peak_beam_stress(
         twisted rectangle; Bredt (1896), with the wall's own twist, for a hollow one.
 
     Example:
-        A bar pushed sideways at its tip is bent most at its base:
+        A transverse force at the tip of a bar bends it most at its base:
 
         >>> bar = {"radius": 0.04}
         >>> stress, where = peak_beam_stress(bar, 0.452, [0, 0, 0, 0, 0, 1e3])
@@ -141,8 +141,8 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
     return _rectangle(constants, width, height)
 
 
-def _bent(section: Section, y: NDArray, z: NDArray) -> NDArray:
-    """(p, 3, 6) what axial force and bending cause; shear still zero."""
+def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
+    """(p, 3, 6) normal stress of axial force and bending; shear is zero."""
     influence = np.zeros((len(y), 3, 6))
     influence[:, 0, 1] = z / section.I_y
     influence[:, 0, 2] = -y / section.I_z
@@ -155,12 +155,12 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     along = np.column_stack([-out[:, 1], out[:, 0]])
-    influence = _bent(section, *(radius * out.T))
+    influence = _bending(section, *(radius * out.T))
     influence[:, 1:, 0] = along * radius / section.J
     # V Q / (I b) at the neutral axis: 4/3 of the mean in a bar, 2 in a thin tube
-    most = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
-    # its share along the circle, from nothing where V points to all of it across
-    influence[:, 1:, 4:] = most / section.area * along[:, :, None] * along[:, None, :]
+    peak = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
+    # along the circle it grows as the sine of the angle from V
+    influence[:, 1:, 4:] = peak / section.area * along[:, :, None] * along[:, None, :]
     return radius * out, influence
 
 
@@ -170,11 +170,11 @@ def _rectangle(
     """A grid over the whole section."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
-    influence = _bent(section, y, z)
+    influence = _bending(section, y, z)
     if width <= height:
-        tau_y, tau_z = _twisted(y, z, width / 2, height / 2)
+        tau_y, tau_z = _torsion(y, z, width / 2, height / 2)
     else:  # a quarter turn about x: the short side lies along z
-        tau_z, minus_tau_y = _twisted(z, -y, height / 2, width / 2)
+        tau_z, minus_tau_y = _torsion(z, -y, height / 2, width / 2)
         tau_y = -minus_tau_y
     influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
     influence[:, 1, 4] = 1.5 / section.area * (1 - (2 * y / width) ** 2)
@@ -182,7 +182,7 @@ def _rectangle(
     return np.column_stack([y, z]), influence
 
 
-def _twisted(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
+def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
     """Shear [m] along p and q for unit G theta; half sides a <= b along p and q."""
     along_p, along_q = np.zeros_like(p), 2 * p
     # the terms fall as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
@@ -209,7 +209,7 @@ def _hollow(
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
         along = np.array([-out[1], out[0]])
         where = across / 2 * out + up * share[:, None] * along
-        influence = _bent(section, *where.T)
+        influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
         # Bredt's flow over the wall, and the wall's own twist at its outer face
@@ -219,7 +219,7 @@ def _hollow(
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)
         parallel = Q / (second * 2 * wall)
-        # a force across flows along this side from its middle, wall x arm x way
+        # a transverse force: shear flow along this side, zero at its middle
         other = section.I_z if turns % 2 == 0 else section.I_y
         crossing = -b / 2 * (up * share) / other
         flow = parallel[:, None] * along + crossing[:, None] * out

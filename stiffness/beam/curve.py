@@ -1,7 +1,7 @@
 r"""Beams along a curve: tapered, bent, L-shaped, by integrating compliance.
 
 A cantilever carries its tip's wrench through every section, so its compliance is the
-sum of what each slice adds, each read at the tip,
+integral of the compliance of its slices, each read at the tip,
 
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
@@ -141,7 +141,7 @@ def curve_compliance(
             that changes too abruptly to be integrated.
 
     Example:
-        An L of two bars, pushed at its end along the first, bends both:
+        A force at the end of an L of two bars, along the first, bends both:
 
         >>> from stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
@@ -213,7 +213,7 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """What one piece adds, by ten Gauss points in each of its equal parts."""
+    """Compliance of one piece, by ten Gauss points in each of its equal parts."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

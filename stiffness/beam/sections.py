@@ -238,8 +238,6 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
     """
     if "radius" in given:
         return round_section(given["radius"], nu, given.get("inner_radius", 0.0))
-    from stiffness.beam.sections import box_section, i_section  # which needs Section
-
     if "wall" in given:
         return box_section(given["width"], given["height"], given["wall"], nu)
     if "web" in given:

@@ -1,7 +1,8 @@
-"""One mesh's answer: a link's stiffness, how wrong it is, and where to refine.
+"""One step of adaptive refinement: solve, estimate the error, mark, refine.
 
-What the elements indicate (:mod:`stiffness.fem.error_indicator`) is scaled by what the
-last refinement did to the stiffness, compared with what it did to the indication.
+The error indicator (:mod:`stiffness.fem.error_indicator`) is multiplied by an
+effectivity index: the change of the stiffness in the last refinement over that of the
+indicator.
 """
 
 from collections.abc import Sequence
@@ -12,31 +13,40 @@ from numpy.typing import NDArray
 
 from stiffness.fem.condensation import Condensed, condense
 from stiffness.fem.elements import ORDER, Elements, isoparametric
-from stiffness.fem.error_indicator import error_matrices, shape_errors, traction_errors
+from stiffness.fem.error_indicator import (
+    error_matrices,
+    geometry_errors,
+    traction_errors,
+)
 from stiffness.fem.material import Material, material_of_elements
-from stiffness.mesh.curved_elements import without_folds
-from stiffness.mesh.edge_grading import ENDS, layered, singular_edges, without_chords
+from stiffness.mesh.curved_elements import refine_inverted
+from stiffness.mesh.edge_grading import (
+    ENDS,
+    layered,
+    singular_edges,
+    split_joining_edges,
+)
 from stiffness.mesh.mesh import Solid
 from stiffness.mesh.refine import refine
 
-# true over indicated error of a first mesh was 0.6 to 1.1 on the training parts of
+# effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
 # benchmarks/stiffness_random_parts.py
-_BLIND = 2.0
-_SAFETY = 1.3
+_DEFAULT_EFFECTIVITY = 2.0
+_SAFETY_FACTOR = 1.3
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One mesh's answer.
+    """The solution on one mesh.
 
     Attributes:
         solid: straight tetrahedra.
         mesh: cubic elements, parts of the tetrahedra along singular edges.
         material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
         solution: condensed stiffness and fields.
-        errors: (s, 6, 6) each of the solid's tetrahedra's estimated share of K_h - K,
-            before it is compared with another mesh's.
-        shape_errors: (s, 6, 6) the same for what the elements leave of the shapes.
+        errors: (s, 6, 6) local error indicators: contribution of each of the solid's
+            tetrahedra to K_h - K, without an effectivity index.
+        geometry_errors: (s, 6, 6) the same for the geometry of curved elements.
     """
 
     solid: Solid
@@ -44,36 +54,36 @@ class Level:
     material: NDArray
     solution: Condensed
     errors: NDArray
-    shape_errors: NDArray
+    geometry_errors: NDArray
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """(6, 6) the stiffness, its indicated error and that of the shapes."""
+        """(6, 6) the stiffness, its indicated error and the geometry's."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
-            self.shape_errors.sum(axis=0),
+            self.geometry_errors.sum(axis=0),
         )
 
 
 def solve_level(
     solid: Solid, materials: Sequence[Material], centers: NDArray, interface: str
 ) -> Level:
-    """Stiffness, fields and error shares of one mesh.
+    """Stiffness, fields and local error indicators of one mesh.
 
     Args:
-        solid: straight tetrahedra; those that would fold when bent, or that touch two
-            singular edges, are halved first.
+        solid: straight tetrahedra; those that would be inverted when curved, or that
+            touch two singular edges, are bisected first.
         materials: the first fills the link, later ones where they say.
         centers: (2, 3) [m] of base and tip.
         interface: one of ``KINDS``.
 
     Returns:
-        The answer, on cubic elements with a layer along the singular edges.
+        The solution on cubic elements with a layer along the singular edges.
 
     Raises:
         BadInput: no material fills the link.
     """
-    solid = without_chords(without_folds(solid, ORDER), ENDS)
+    solid = split_joining_edges(refine_inverted(solid, ORDER), ENDS)
     parts = layered(solid, ENDS)
     mesh = isoparametric(solid, ORDER, parts)
     material = material_of_elements(mesh, materials)
@@ -82,72 +92,74 @@ def solve_level(
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
     on_edge[singular_edges(solid, ENDS)] = True
     singular = on_edge[mesh.cells[:, :4]].any(axis=1)
-    each = error_matrices(mesh, solution.fields, lam, mu, singular, solution.stiffness)
-    # at singular edges s_3 is known to do; tractions there say twice as much
+    indicated = error_matrices(
+        mesh, solution.fields, lam, mu, singular, solution.stiffness
+    )
+    # at singular edges s_3 is reliable; tractions there overestimate by a factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
-    left = np.zeros_like(each)
+    residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
-    np.add.at(left, mesh.owner[free], tractions)
+    np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # the same error seen from inside and from the surface: the larger one, not both
-    larger = np.einsum("tii,i->t", left - each, sizes) > 0
-    each[larger] = left[larger]
-    errors, shape = np.zeros((2, len(solid.cells), 6, 6))
-    np.add.at(errors, parts.parent, each)
-    off = shape_errors(mesh, solid.shapes, solution.fields, lam, mu)
-    np.add.at(shape, parts.parent[mesh.owner], off)
-    return Level(solid, mesh, material, solution, errors, shape)
+    # two indicators of the same error, inside and at the surface: the larger one
+    larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
+    indicated[larger] = residual[larger]
+    errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
+    np.add.at(errors, parts.parent, indicated)
+    by_face = geometry_errors(mesh, solid.shapes, solution.fields, lam, mu)
+    np.add.at(geometry, parts.parent[mesh.owner], by_face)
+    return Level(solid, mesh, material, solution, errors, geometry)
 
 
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Error of the last stiffness: what the elements indicate, scaled.
+    """Error of the last stiffness: the indicator times an effectivity index.
 
     Args:
         history: of each mesh, finest last, the totals of its :class:`Level`.
 
     Returns:
-        (6, 6) estimate of the exact stiffness minus the last one, and the factor on
-        the indicated error that it uses: what the last refinement did to the stiffness
-        over what it did to the indicated error, and some more.
+        (6, 6) estimate of the exact stiffness minus the last one, and the effectivity
+        index used, of the worst motion: the change of the stiffness in the last
+        refinement over that of the indicated error, times a safety factor.
     """
-    K, indicated, shape = history[-1]
-    factors = np.full(6, _BLIND)
+    K, indicated, geometry = history[-1]
+    factors = np.full(6, _DEFAULT_EFFECTIVITY)
     if len(history) > 1:
-        coarse, indicated_then, _ = history[-2]
-        fell = np.diag(indicated_then - indicated)
-        sank = np.diag(coarse - K)
-        proved = np.divide(sank, fell, out=np.full(6, _BLIND), where=fell > 0)
-        factors = _SAFETY * np.clip(proved, 1.0, 2 * _BLIND)
-    # each motion has its own: a twist and a bend err in different places
+        coarse, indicated_before, _ = history[-2]
+        drop = np.diag(indicated_before - indicated)
+        effectivity = np.full(6, _DEFAULT_EFFECTIVITY)
+        np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
+        factors = _SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * _DEFAULT_EFFECTIVITY)
+    # one index for each motion: torsion and bending err in different places
     root = np.sqrt(factors)
-    told = np.outer(root, root) * indicated
-    worst = int(np.argmax(np.diag(told) / np.diag(K)))
-    # what leaves the shapes outward and inward may cancel in K, not in the estimate
-    return -told - np.abs(shape), float(factors[worst])
+    estimate = np.outer(root, root) * indicated
+    worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
+    # geometry errors of either sign may cancel in K, not in the estimate
+    return -estimate - np.abs(geometry), float(factors[worst])
 
 
-def finer(level: Level, growth: float) -> Solid:
-    """Halve the elements with the largest shares of the error.
+def refine_level(level: Level, growth: float) -> Solid:
+    """Bisect the elements with the largest local error indicators.
 
     Args:
         level: the mesh to refine.
-        growth: of the count of elements, before neighbours are halved too (with them
-            it is about its square).
+        growth: factor on the number of elements, before closure of the mesh by its
+            neighbours (with them it is about its square).
 
     Returns:
         The finer mesh.
     """
     shares = np.einsum(
         "tii,i->t",
-        level.errors + np.abs(level.shape_errors),
+        level.errors + np.abs(level.geometry_errors),
         1 / np.diag(level.solution.stiffness),
     )
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # an element's share falls with h^4 to h^7: 1.5 halvings for each factor e^..
+        # a share falls as h^4 to h^7: by at least 1.5 powers of two a bisection
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

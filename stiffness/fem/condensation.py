@@ -1,11 +1,11 @@
-"""A solid condensed on its two interfaces: six numbers at the base, six at the tip.
+"""Static condensation of a solid on two interfaces, six degrees of freedom each.
 
 ``rigid`` (RBE2): every node of an interface moves with its joint, as when it is bolted
 to something much stiffer.  ``distributing`` (RBE3): the base is held like that, but the
 tip's wrench is spread over its interface as tractions that vary linearly, the interface
 is free to deform, and the tip's screw is the mean motion, the least-squares rigid one
-over the area.  ``distributing-both`` does the same at the base, so that the answer does
-not depend on which end is called the tip.  Each is softer than the one before.
+over the area.  ``distributing-both`` does the same at the base, so that the stiffness
+does not depend on which end is called the tip.  Each is softer than the one before.
 """
 
 from dataclasses import dataclass
@@ -60,8 +60,8 @@ def condense(
     if kind == "rigid":
         return _rigid(mesh, upper, centers[1])
     if kind == "distributing":
-        return _mean_of_tip(mesh, upper, centers[1])
-    return _distributing(mesh, upper, centers)
+        return _distributing_tip(mesh, upper, centers[1])
+    return _distributing_both(mesh, upper, centers)
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
@@ -84,7 +84,7 @@ def _product(upper: csr_array, fields: NDArray) -> NDArray:
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Base nodes stand still, tip nodes follow six unit screws."""
+    """Base nodes fixed, tip nodes moved by six unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -100,26 +100,28 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
 
-def _mean_of_tip(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Base nodes stand still; wrenches spread at the tip, its mean motion read."""
-    flat = _averaging(mesh, 1, tip_center).reshape(-1, 6)
+def _distributing_tip(
+    mesh: Elements, upper: csr_array, tip_center: NDArray
+) -> Condensed:
+    """Base nodes fixed; wrenches distributed at the tip, its mean motion read."""
+    flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
     free = np.repeat(free, 3)
     return _from_loads(upper, flat, free)
 
 
-def _distributing(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Wrenches spread at the tip, balanced at the base; mean motions read."""
-    base, tip = (_averaging(mesh, k, centers[k]) for k in (0, 1))
-    # unit wrenches at the tip and what balances them at the base
-    carry = screw_map(centers[0] - centers[1])
-    loads = tip - np.einsum("nij,jk->nik", base, carry.T)
+def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
+    """Wrenches distributed at the tip, balanced at the base; mean motions read."""
+    base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
+    # unit wrenches at the tip and their reactions at the base
+    to_base = screw_map(centers[0] - centers[1])
+    loads = tip - np.einsum("nij,jk->nik", base, to_base.T)
     flat = loads.reshape(-1, 6)
-    held = _three_supports(mesh)
+    supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
-    free[held] = False
-    # the tip's mean motion as seen from the base's: the supports carry nothing
+    free[supports] = False
+    # the tip's mean motion relative to the base's: the supports have no reactions
     return _from_loads(upper, flat, free)
 
 
@@ -133,7 +135,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
     return Condensed(K, fields, int(free.sum()))
 
 
-def _averaging(mesh: Elements, patch: int, center: NDArray) -> NDArray:
+def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
     """(n, 3, 6) nodal loads of unit wrenches; transposed, the mean of a field."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
@@ -150,8 +152,8 @@ def _averaging(mesh: Elements, patch: int, center: NDArray) -> NDArray:
     return loads
 
 
-def _three_supports(mesh: Elements) -> NDArray:
-    """Six unknowns that hold a body without straining it: three nodes far apart."""
+def _isostatic_supports(mesh: Elements) -> NDArray:
+    """(6,) fixed unknowns of an isostatic support, at three nodes far apart."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)
@@ -160,7 +162,7 @@ def _three_supports(mesh: Elements) -> NDArray:
     off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
     third = int(np.argmax(off))
     normal = np.abs(np.cross(points[third] - points[first], line))
-    # the second is free where the line to it mostly runs, the third held off the plane
-    second_held = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
-    third_held = 3 * third + int(np.argmax(normal))
-    return np.array([*(3 * first + d for d in range(3)), *second_held, third_held])
+    # the second node is free along the line to it, the third fixed across the plane
+    second_fixed = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
+    third_fixed = 3 * third + int(np.argmax(normal))
+    return np.array([*(3 * first + d for d in range(3)), *second_fixed, third_fixed])

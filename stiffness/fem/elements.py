@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from stiffness.mesh.curved_elements import curved
-from stiffness.mesh.edge_grading import Parts, uncut
+from stiffness.mesh.curved_elements import curved_elements
+from stiffness.mesh.edge_grading import Parts, whole_elements
 from stiffness.mesh.lagrange import (
     FACES,
     face_nodes,
@@ -50,7 +50,7 @@ class Elements:
         faces: (f, k) nodes of each boundary triangle.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
         owner: (f,) the tetrahedron each boundary triangle belongs to.
-        curved: (t,) whether the tetrahedron is bent.
+        curved: (t,) whether the tetrahedron is curved.
     """
 
     order: int
@@ -63,7 +63,7 @@ class Elements:
 
 
 class Chunk(NamedTuple):
-    """Some elements, with what integrals over them need.
+    """Some elements and their quadrature.
 
     Attributes:
         part: (c,) indices of the elements.
@@ -85,25 +85,25 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Elements whose boundary nodes lie on the known shapes.
+    """Elements whose boundary nodes lie on the exact shapes.
 
     Args:
         solid: the straight tetrahedra.
         order: of the polynomials, 2 or 3.
-        parts: of the tetrahedra, to be elements in their stead.
+        parts: of the tetrahedra, which become the elements.
 
     Returns:
         The elements.
     """
-    whole, parts = curved(solid, order), parts or uncut(solid)
+    whole, parts = curved_elements(solid, order), parts or whole_elements(solid)
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # parts are cut in few different ways: all parts of a way at once
-    ways = parts.places.reshape(len(L), 16)
-    _, first, way = np.unique(ways, axis=0, return_index=True, return_inverse=True)
+    # there are few different cuts: all parts of one cut at once
+    cuts = parts.places.reshape(len(L), 16)
+    _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
-        members = np.flatnonzero(way == k)
+        members = np.flatnonzero(cut == k)
         N, _ = shape_functions(order, L[example])
         corners = whole.nodes[whole.cells[parts.parent[members]]]
         nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
@@ -111,25 +111,25 @@ def isoparametric(
     faces, patch, owner = [], [], []
     for side, on in zip(FACES, face_nodes(order), strict=True):
         for other, missing in enumerate((3, 2, 1, 0)):
-            known = whole.patch[parts.parent, other]
+            parent_patch = whole.patch[parts.parent, other]
             inside = (parts.places[:, side, missing] == 0).all(axis=1)
-            member = np.flatnonzero(inside & (known >= 0))
+            member = np.flatnonzero(inside & (parent_patch >= 0))
             faces.append(cells[member][:, on])
-            patch.append(known[member])
+            patch.append(parent_patch[member])
             owner.append(member)
     return Elements(
-        order,
-        nodes,
-        cells,
-        np.concatenate(faces),
-        np.concatenate(patch),
-        np.concatenate(owner),
-        whole.bent[parts.parent],
+        order=order,
+        nodes=nodes,
+        cells=cells,
+        faces=np.concatenate(faces),
+        patch=np.concatenate(patch),
+        owner=np.concatenate(owner),
+        curved=whole.curved[parts.parent],
     )
 
 
 def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
-    """Elements in chunks, with what integrals over them need.
+    """Quadrature of the elements, in chunks.
 
     Args:
         mesh: the tetrahedra.
@@ -140,10 +140,10 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
     """
     straight = 2 * (mesh.order - 1)
     some = np.ones(len(mesh.cells), dtype=bool) if some is None else some
-    for bent, degree in ((False, straight), (True, straight + 2)):
+    for curved, degree in ((False, straight), (True, straight + 2)):
         L, weights = quadrature(degree)
         N, dN = shape_functions(mesh.order, L)
-        members = np.flatnonzero(some & (mesh.curved == bent))
+        members = np.flatnonzero(some & (mesh.curved == curved))
         for part in _chunks(members, N.shape[1]):
             J = _jacobians(dN, mesh.nodes[mesh.cells[part]])
             G = dN @ np.linalg.inv(J)
@@ -152,7 +152,7 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
 
 
 def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
-    """Some elements of so many nodes at a time, as many as memory is meant for."""
+    """Groups of elements whose matrices fit the memory of a chunk."""
     step = max(1, _CHUNK // (9 * nodes**2))
     for first in range(0, len(members), step):
         yield members[first : first + step]
@@ -161,7 +161,7 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """What integrals of stresses over boundary triangles need.
+    """Quadrature of stresses over boundary triangles.
 
     Args:
         mesh: the tetrahedra.
@@ -212,7 +212,7 @@ def node_gradients(mesh: Elements) -> Iterator[tuple[NDArray, NDArray]]:
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """What integrals over curved triangles need.
+    """Quadrature over curved triangles.
 
     Args:
         mesh: whose nodes they have.
@@ -301,7 +301,7 @@ def _node_blocks(
         corners = mesh.nodes[mesh.cells[part, :4]]
         J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
         inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))
-        # [c, i, j, x, y]: what G_ai G_bj has of the derivatives along x and y
+        # [c, i, j, x, y]: coefficient of the derivatives along x and y in G_ai G_bj
         turn = np.einsum("c,cxi,cyj->cijxy", size, inverse, inverse)
         yield part, _hooke(turn.reshape(-1, 3, 3, 9), lam[part], mu[part]) @ own
     for part, _, _, _, G, w in integration(mesh, mesh.curved):
@@ -329,11 +329,11 @@ def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_ar
     lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)
     indptr[1:] = np.cumsum(lengths.ravel())
     data, indices = np.empty(indptr[-1]), np.empty(indptr[-1], dtype=np.int32)
-    further = 3 * (np.arange(len(row)) - start[row])
+    offset = 3 * (np.arange(len(row)) - start[row])
     for i in range(3):
-        first = indptr[3 * row + i] + further - i
+        first = indptr[3 * row + i] + offset - i
         for j in range(3):
-            there = slice(None) if j >= i else np.flatnonzero(further)
-            data[first[there] + j] = values[3 * i + j, there]
-            indices[first[there] + j] = 3 * column[there] + j
+            kept = slice(None) if j >= i else np.flatnonzero(offset)
+            data[first[kept] + j] = values[3 * i + j, kept]
+            indices[first[kept] + j] = 3 * column[kept] + j
     return csr_array((data, indices, indptr), shape=(3 * count, 3 * count))

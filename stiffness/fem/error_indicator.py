@@ -1,23 +1,23 @@
-r"""How wrong is a finite element stiffness, and where?
+r"""A posteriori error indicator of a finite element stiffness, element by element.
 
-The stiffness of cubic elements is too large by the energy of what they cannot follow.
-Their stresses are quadratic; take them apart in every element into the best linear part
-and the rest, and the linear part into its mean and the rest: s_3 and s_2 are the
-energies of the two rests.  If an error e falls with the polynomials' degree p as p^-b,
-s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) tells b, and with it the share e_3 / (e_2 - e_3)
-of s_3 that is still to come: nothing where the field is smooth, all of it and more
-where it is not.  Elements on a singular edge are known to be of the second kind
-whatever their two numbers say; all of s_3 is taken there, and a little more.
+The stiffness of cubic elements is too large by the energy of the discretisation error.
+Their stresses are quadratic.  In every element they are split into the best linear part
+and a remainder, and the linear part into its mean and a remainder: s_3 and s_2 are the
+energies of the two remainders.  If an error e falls with the polynomial degree p as
+p^-b, the decay s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2) determines b, and with it the
+ratio e_3 / (e_2 - e_3) of the remaining error to s_3: zero where the field is smooth,
+one and more where it is not.  Elements on a singular edge are always of the second
+kind; 1.2 s_3 is taken there.
 
-Where a thin wall ends, a twisted plate's stresses turn round within a layer as deep as
-a third of the wall.  An element much wider than the wall does not see that, and s_2,
-full of the plate's own linear stresses, makes it look smooth.  But it leaves tractions
-t on the free surface.  What would undo them is a wave along the surface, half as long
-as the face is narrow, l, that decays like exp(-pi x / l): its energy, the integral of
-t^2 / (2 mu) l / pi, is taken where it is the larger one.
+At the free edge of a twisted plate the stresses change direction within a boundary
+layer of a third of the wall.  An element much wider than the wall does not resolve it,
+and s_2, dominated by the plate's linear stresses, makes the field look smooth.  But
+residual tractions t remain on the free surface.  They are balanced by a surface wave of
+half wavelength l, the smallest height of the face, that decays as exp(-pi x / l): its
+energy, the integral of t^2 / (2 mu) l / pi, is taken where it is the larger one.
 
-The estimate sees the field, not the shape: what a bent element leaves of a shape is
-counted apart, by :func:`shape_errors`.
+The indicator does not contain the error of the geometry, the distance of curved
+elements from their shapes: see :func:`geometry_errors`.
 
 Sources:
     Mavriplis (1990) for the decay of an element's own coefficients as an estimate;
@@ -33,13 +33,13 @@ from numpy.typing import NDArray
 from stiffness.fem.elements import Elements, gradients_on_faces, integration
 from stiffness.surface.primitives import Plane, Shape
 
-PAIRS = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
+VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _CHUNK = 1024  # faces at a time
-_SINGULAR = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
-# the share still to come over s_3 / s_2, for rates from p^-0.1 to p^-40
+_SINGULAR_SHARE = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
+# remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
 _RATES = np.geomspace(40.0, 0.1, 400)
-_FELL = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
-_TO_COME = np.minimum(3**-_RATES / (2**-_RATES - 3**-_RATES), 3.0)
+_DECAY = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
+_REMAINDER = np.minimum(3**-_RATES / (2**-_RATES - 3**-_RATES), 3.0)
 
 
 def error_matrices(
@@ -67,25 +67,27 @@ def error_matrices(
     for part, L, weights, _, G, w in integration(mesh):
         linear = L @ np.linalg.solve(L.T @ (weights[:, None] * L), L.T * weights)
         mean = np.broadcast_to(weights / weights.sum(), linear.shape)
-        stress = _stress_roots(G, fields[mesh.cells[part]], lam[part], mu[part])
+        stress = _energy_roots(G, fields[mesh.cells[part]], lam[part], mu[part])
         s_3, s_2 = (
-            _products(np.einsum("pq,cqkx->cpkx", share, stress, optimize=True), w)
-            for share in (np.eye(len(L)) - linear, linear - mean)
+            _energy_products(
+                np.einsum("pq,cqkx->cpkx", projection, stress, optimize=True), w
+            )
+            for projection in (np.eye(len(L)) - linear, linear - mean)
         )
         each_3, each_2 = (
             np.einsum("tii,i->t", s, 1 / np.diag(stiffness)) for s in (s_3, s_2)
         )
         ratio = each_3 / np.maximum(each_2, 1e-300)
-        to_come = np.interp(ratio, _FELL, _TO_COME)
-        to_come = np.where(singular[part], _SINGULAR, to_come)
-        errors[part] = to_come[:, None, None] * s_3
+        remainder = np.interp(ratio, _DECAY, _REMAINDER)
+        remainder = np.where(singular[part], _SINGULAR_SHARE, remainder)
+        errors[part] = remainder[:, None, None] * s_3
     return errors
 
 
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Energies of what would undo the tractions that elements leave on free faces.
+    """Energies of the fields that balance residual tractions on free faces.
 
     Args:
         mesh: the tetrahedra.
@@ -108,13 +110,13 @@ def traction_errors(
         t *= mu[cells][:, None, None, None]
         trace = np.trace(slope, axis1=3, axis2=4) * lam[cells][:, None, None]
         t += trace[..., None] * normal[:, :, None]
-        depth = _narrowest(mesh, some) / np.pi / (2 * mu[cells])
+        depth = _smallest_height(mesh, some) / np.pi / (2 * mu[cells])
         weighted = t * (area * depth[:, None])[..., None, None]
         errors[first : first + len(some)] = np.einsum("fqki,fqli->fkl", weighted, t)
     return errors
 
 
-def _narrowest(mesh: Elements, faces: NDArray) -> NDArray:
+def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
     """(f,) [m] the smaller of triangles' heights and their elements' depths."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
@@ -126,14 +128,14 @@ def _narrowest(mesh: Elements, faces: NDArray) -> NDArray:
     return np.minimum(twice / longest, depth)
 
 
-def shape_errors(
+def geometry_errors(
     mesh: Elements,
     shapes: Sequence[Shape | None],
     fields: NDArray,
     lam: NDArray,
     mu: NDArray,
 ) -> NDArray:
-    """By how much the stiffness is too large because elements leave the shapes.
+    """Error of the stiffness because curved elements deviate from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
@@ -163,7 +165,7 @@ def shape_errors(
             outward = np.einsum("fqx,fqx->fq", normal, slope.reshape(normal.shape))
             gap = away.reshape(area.shape) * np.sign(outward)
             cells = mesh.owner[some]
-            roots = _stress_roots(G, fields[mesh.cells[cells]], lam[cells], mu[cells])
+            roots = _energy_roots(G, fields[mesh.cells[cells]], lam[cells], mu[cells])
             weighted = (roots * (area * gap)[..., None, None]).swapaxes(1, 2)
             flat = (len(some), cases, -1)
             errors[some] = weighted.reshape(flat) @ roots.swapaxes(1, 2).reshape(
@@ -172,8 +174,8 @@ def shape_errors(
     return errors
 
 
-def _stress_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, q, k, 7) numbers whose products are energies: six of shear, one of bulk."""
+def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
+    """(c, q, k, 7) stresses whose products are energies: six deviatoric, one bulk."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -181,15 +183,15 @@ def _stress_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
     strain = (slope + slope.swapaxes(3, 4)) / 2
     trace = np.trace(strain, axis1=3, axis2=4)
     strain[..., range(3), range(3)] -= trace[..., None] / 3
-    i, j = PAIRS.T
+    i, j = VOIGT.T
     six = strain[..., i, j] * np.sqrt([1, 1, 1, 2, 2, 2])
     six *= np.sqrt(2 * mu)[:, None, None, None]
     bulk = np.sqrt(lam + 2 / 3 * mu)[:, None, None]
     return np.concatenate([six, (bulk * trace)[..., None]], axis=3)
 
 
-def _products(roots: NDArray, w: NDArray) -> NDArray:
-    """(c, k, k) integrals of the products of each case's numbers with each other's."""
+def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
+    """(c, k, k) integrals of products of energy roots, case by case."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
-from stiffness.fem.adaptive_step import Level, estimated_error, finer, solve_level
+from stiffness.fem.adaptive_step import (
+    Level,
+    estimated_error,
+    refine_level,
+    solve_level,
+)
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.mass_properties import PointMass, mass_properties
 from stiffness.fem.material import Material
@@ -50,7 +55,7 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
-    """A link solved on its finest mesh, ready to be asked for more than its stiffness.
+    """A link solved on its finest mesh, for stresses besides the stiffness.
 
     Attributes:
         link: the stiffness, with error, mesh report, mass.
@@ -160,7 +165,8 @@ def solve_link(
     budget = budget or Budget()
     start = time.monotonic()
     centers = np.array([
-        interface_center(surface, f, n) for f, n in ((base, "base"), (tip, "tip"))
+        interface_center(surface, side, name)
+        for side, name in ((base, "base"), (tip, "tip"))
     ])
     level = solve_level(
         first_mesh(surface, base, tip, budget, cache), materials, centers, interface
@@ -265,27 +271,27 @@ def first_mesh(
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
-    """How many times the elements would bring the error down by an excess."""
-    rate = 1.3  # of the error over the count of elements; 2 were it smooth
+    """Factor on the number of elements that should reduce the error by an excess."""
+    rate = 1.3  # of convergence in the number of elements; 2 for a smooth field
     if len(history) > 1:
-        then, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
-        fell = math.log(max(then / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
-        rate = min(max(fell, 1.0), 2.0)  # what was gained on coarse meshes ends
+        before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
+        measured = math.log(max(before / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
+        rate = min(max(measured, 1.0), 2.0)  # coarse meshes converge faster
     return float(np.clip((1.12 * excess) ** (1 / rate), 1.2, 6.0))
 
 
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float
 ) -> Solid | None:
-    """A finer mesh that the budget allows, of as many times the elements as wanted."""
-    part = growth**0.55 - 1  # what neighbours add is about as much again
-    solid = finer(level, 1 + part)
+    """A finer mesh within the budget, its number of elements grown as wanted."""
+    part = growth**0.55 - 1  # neighbours add about as many elements again
+    solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:
         part *= (growth - 1) / added
-        solid = finer(level, 1 + part)
+        solid = refine_level(level, 1 + part)
     for share in (1.0, 0.7, 0.4, 0.1):
-        solid = solid if share == 1 else finer(level, 1 + share * part)
+        solid = solid if share == 1 else refine_level(level, 1 + share * part)
         each = level.solution.unknowns / len(level.solid.cells)
         unknowns = int(each * len(solid.cells))
         memory, seconds = expected_cost(unknowns)

@@ -11,7 +11,7 @@ from stiffness.fem.elements import Elements, integration
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """Something heavy on the link that does not stiffen it.
+    """A point mass on the link, which adds no stiffness.
 
     Attributes:
         mass: [kg].

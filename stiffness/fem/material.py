@@ -20,8 +20,8 @@ class Material:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         density: [kg/m^3], 0 for a link without mass.
-        where: tells of points (n, 3) [m], in the mesh's axes, which are of it; the
-            last material that claims an element's centre has it.
+        where: which of the points (n, 3) [m], in the mesh's axes, are of this material;
+            the last material that contains an element's centre applies.
     """
 
     E: float
@@ -36,7 +36,7 @@ class Material:
 
 
 def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArray:
-    """Material of each element, told at its centre.
+    """Material of each element, taken at its centre.
 
     Args:
         mesh: the tetrahedra.

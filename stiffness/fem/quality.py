@@ -1,4 +1,4 @@
-"""How good a mesh of tetrahedra is, for the report."""
+"""Quality of a mesh of tetrahedra, for the report."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from stiffness.fem.elements import Elements, integration, triangle_areas
 from stiffness.mesh.lagrange import EDGES
 from stiffness.mesh.mesh import Solid
+from stiffness.surface.surface import directed_edges
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
@@ -22,10 +23,10 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         elements; ``closed``, whether every edge of the boundary has two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
         ``largest_angle`` [rad] between two faces of a tetrahedron.  Quality and angles
-        are those of the tetrahedra before layers are cut off them, thin on purpose.
+        are those of the tetrahedra before graded layers are cut off, thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
-    edges = np.sort(solid.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(solid.faces), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     return {
         "nodes": len(mesh.nodes),
@@ -66,12 +67,12 @@ def dihedral_angles(solid: Solid) -> NDArray:
         (t, 6) [rad] at the edges 01 02 03 12 13 23; arccos(1/3) in a regular one.
     """
     corners = solid.points[solid.cells]
-    found = []
+    angles = []
     for i, j in EDGES:
         k, l = (v for v in range(4) if v not in (i, j))
         along = corners[:, j] - corners[:, i]
-        # what is left of the way to the other corners, across the edge
+        # components of the other corners' positions across the edge
         one, other = (np.cross(along, corners[:, v] - corners[:, i]) for v in (k, l))
         across = np.linalg.norm(np.cross(one, other), axis=1)
-        found.append(np.arctan2(across, np.einsum("ij,ij->i", one, other)))
-    return np.stack(found, axis=1)
+        angles.append(np.arctan2(across, np.einsum("ij,ij->i", one, other)))
+    return np.stack(angles, axis=1)

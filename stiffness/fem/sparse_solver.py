@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# PARDISO's iparm: the defaults of symmetric matrices; 8: no second look at the answer,
-# whose error enters the energy squared; 24: work shared better among few cores, an
-# eighth of the time; 37: rows whose patterns agree to 90 % are ordered as one, as the
-# three of a node do: half the analysis
+# PARDISO's iparm: the defaults of symmetric matrices; 8: no iterative refinement, the
+# solution's error enters the energy squared; 24: two-level factorisation, an eighth of
+# the time saved; 37: rows whose patterns agree to 90 %, as the three of a node do, form
+# one block, which halves the analysis
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
@@ -48,11 +48,11 @@ def _mkl() -> str | None:
         listed = files("mkl") or []
     except PackageNotFoundError:
         return None
-    found = [
+    libraries = [
         str(f.locate()) for f in listed if f.name.startswith(("libmkl_rt.", "mkl_rt."))
     ]
     return next(
-        (f for f in found if Path(f).suffix != ".lib" and Path(f).exists()), None
+        (f for f in libraries if Path(f).suffix != ".lib" and Path(f).exists()), None
     )
 
 

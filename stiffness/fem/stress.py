@@ -1,6 +1,6 @@
 """Stress that a tip wrench causes in a link.
 
-Six fields, one for each component of the wrench, hold every answer: stresses superpose.
+Six fields, one for each component of the wrench, are enough: stresses superpose.
 At the edge of a rigid interface the elastic solution is singular: the peak there grows
 without bound as the mesh is refined and means nothing.  Stresses are therefore reported
 only at some distance from the interfaces, one interface radius unless told otherwise,
@@ -20,7 +20,7 @@ from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.adaptive_step import Level
 from stiffness.fem.elements import Elements, node_gradients, triangle_areas
-from stiffness.fem.error_indicator import PAIRS
+from stiffness.fem.error_indicator import VOIGT
 from stiffness.fem.fea import MeshedLink
 from stiffness.mesh.edge_grading import singular_edges
 
@@ -34,14 +34,14 @@ class StressInfluence:
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
             of the tip's wrench.
         away: [m] nothing nearer than this to an interface is here.
-        inner_edges: whether some of the nodes lie on inner edges without a fillet,
-            where the elastic stress is singular too.
+        reentrant_edges: whether some of the nodes lie on re-entrant edges without a
+            fillet, where the elastic stress is singular too.
     """
 
     places: NDArray
     influence: NDArray
     away: float
-    inner_edges: bool = False
+    reentrant_edges: bool = False
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -52,7 +52,7 @@ class StressInfluence:
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
         )
-        if self.inner_edges:
+        if self.reentrant_edges:
             words += (
                 "; some of them on inner edges without a fillet, where stress is "
                 "singular too and grows with the mesh's fineness"
@@ -92,8 +92,8 @@ class PeakStress:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         von_mises: [Pa].
         place: (3,) [m] of it.
-        region: what was looked at, in words.
-        away: [m] nothing nearer than this to an interface was looked at.
+        region: where stresses were evaluated, in words.
+        away: [m] nothing nearer than this to an interface was evaluated.
         beam: [Pa] and (3,) [m] by the beam formula, between the sections that are so
             far from base and tip; None without a section.
         beam_whole: [Pa] by the beam formula over the whole length; NaN without.
@@ -185,10 +185,10 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
 
     level = solved.level
     mesh = level.mesh
-    sizes = [_interface_radius(mesh, k) for k in (0, 1)]
-    distance = max(sizes) if away is None else away
-    held = np.unique(mesh.faces[mesh.patch <= 1])
-    gap = cKDTree(mesh.nodes[held]).query(mesh.nodes)[0]
+    radii = [_interface_radius(mesh, k) for k in (0, 1)]
+    distance = max(radii) if away is None else away
+    clamped = np.unique(mesh.faces[mesh.patch <= 1])
+    gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes)[0]
     far = gap >= distance * (1 - 1e-9)  # a layer of nodes at just that distance
     if not far.any():
         raise BadInput(
@@ -197,14 +197,14 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
         )
     per_screw = _nodal_stresses(level)[far]
     influence = np.einsum("pks,kw->pws", per_screw, solved.link.compliance)
-    inner = np.unique(singular_edges(level.solid, ()))
+    reentrant = np.unique(singular_edges(level.solid, ()))
     return StressInfluence(
-        mesh.nodes[far], influence, float(distance), bool(far[inner].any())
+        mesh.nodes[far], influence, float(distance), bool(far[reentrant].any())
     )
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
-    """[m] largest distance of an interface's nodes from its area's middle."""
+    """[m] largest distance of an interface's nodes from its centroid."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)
     first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
@@ -225,7 +225,7 @@ def _nodal_stresses(level: Level) -> NDArray:
         stress = np.stack(
             [
                 mu * (slope[..., i, j] + slope[..., j, i]) + (i == j) * pressure
-                for i, j in PAIRS
+                for i, j in VOIGT
             ],
             axis=-1,
         )

@@ -1,14 +1,15 @@
 r"""Thin elements along the edges where stress is singular.
 
-Near an edge that is clamped on one side and free on the other, or near an inner edge of
-the part, strains grow like r^(a - 1) with a below 1, and polynomials on elements of one
-size converge slowly whatever their degree.  A layer of elements that is thin across the
-edge and as long as its neighbours along it costs little and takes most of that error.
+Near an edge that is clamped on one side and free on the other, or near a re-entrant
+edge of the part, strains grow like r^(a - 1) with a below 1, and polynomials on
+elements of one size converge slowly whatever their degree.  A layer of elements that is
+thin across the edge and as long as its neighbours along it costs little and removes
+most of that error.
 
-A tetrahedron with an edge on a singular one is cut, at the same share of the way from
-the singular edge on all its other edges, into a wedge along the edge and what is left;
-one with a corner there into a small tetrahedron and what is left.  Neighbours cut their
-common face alike.  The cuts are made in the coordinates of the bent element, so that
+A tetrahedron with an edge on a singular one is cut, at the same share of all its other
+edges from the singular edge, into a wedge along the edge and a remainder; one with a
+corner there into a small tetrahedron and a remainder.  Neighbours cut their common face
+at the same points.  The cuts are made in the coordinates of the curved element, so that
 layers follow a round edge however thin they are.
 """
 
@@ -18,12 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.mesh.mesh import Solid, moved_onto_shapes
-from stiffness.mesh.refine import agreed, edge_code, edges_of, ranked, split_edges
+from stiffness.mesh.refine import (
+    chosen_by_all,
+    edge_code,
+    edges_of,
+    length_ranks,
+    split_edges,
+)
 
-ENDS = (0, 1)  # patches of base and tip; where loads are spread, tractions end there
-SHARE = 0.25  # of an element's width that its layer takes; 0.15 to 0.3 do as well
-_PASSES = 100  # of halving chords; 3 to 12 do for the links of meshes/
-_INNER = np.cos(np.radians(35.0))  # a flatter inner edge is hardly singular
+ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
+LAYER_SHARE = 0.25  # thickness of the layer over the element's; 0.15 to 0.3 do as well
+_PASSES = 100  # of splitting joining edges; 3 to 12 do for the links of meshes/
+_REENTRANT = np.cos(np.radians(35.0))  # a flatter re-entrant edge is hardly singular
 # a prism's six corners so turned that the k-th comes first (Dompierre et al. 1999)
 _TURNS = np.array([
     [0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4],
@@ -52,7 +59,7 @@ class Parts:
     parent: NDArray
 
 
-def uncut(solid: Solid) -> Parts:
+def whole_elements(solid: Solid) -> Parts:
     """Each tetrahedron as its own only part."""
     count = len(solid.cells)
     places = np.broadcast_to(np.eye(4), (count, 4, 4))
@@ -67,38 +74,38 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
         held: patches that are clamped or loaded.
 
     Returns:
-        (e, 2) corners: the clamped patches' outlines, and the inner edges between
-        patches that meet at more than 215 degrees.
+        (e, 2) corners: the clamped patches' outlines, and the re-entrant edges
+        between patches that meet at more than 215 degrees.
     """
     count = len(solid.points)
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # at an edge of four faces two bodies touch: whichever pairs, the edge stays one
+    # at an edge of four faces two bodies touch: any pairing of its faces will do
     code, left, right = code[::2], owner[::2], owner[1::2]
-    seam = solid.patch[left] != solid.patch[right]
+    border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
     corners = solid.points[solid.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     across = corners.mean(axis=1)[right] - corners.mean(axis=1)[left]
-    inner = np.einsum("ij,ij->i", across, normal[left]) > 0
-    inner &= np.einsum("ij,ij->i", normal[left], normal[right]) < _INNER
-    chosen = code[seam & (clamped | inner)]
+    reentrant = np.einsum("ij,ij->i", across, normal[left]) > 0
+    reentrant &= np.einsum("ij,ij->i", normal[left], normal[right]) < _REENTRANT
+    chosen = code[border & (clamped | reentrant)]
     return np.column_stack([chosen // count, chosen % count])
 
 
-def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
-    """Halve edges that run from one singular edge to another.
+def split_joining_edges(solid: Solid, held: tuple[int, ...]) -> Solid:
+    """Split edges that join singular edges.
 
     Args:
         solid: any.
         held: patches that are clamped or loaded.
 
     Returns:
-        A solid whose tetrahedra touch the singular edges in nothing, a corner or an
-        edge; if a part needs more than a hundred passes, most of them do.
+        A solid whose tetrahedra have at most a corner or an edge on the singular
+        edges; most of them, if a part needs more than a hundred passes.
     """
     settled = False
     for _ in range(_PASSES):
@@ -107,96 +114,96 @@ def without_chords(solid: Solid, held: tuple[int, ...]) -> Solid:
         touched = np.zeros(count, dtype=bool)
         touched[singular // count] = touched[singular % count] = True
         ends, of_cell = edges_of(solid.cells, count)
-        chord = touched[ends].all(axis=1)
-        rank = ranked(solid.points, ends)
-        # a triangle of singular edges only: its longest has to be halved as well
-        closed = chord[of_cell].sum(axis=1) > 2
-        widest = np.where(chord, rank, -1)[of_cell].argmax(axis=1)
-        widest = of_cell[np.arange(len(of_cell)), widest]
-        chord &= ~np.isin(edge_code(ends, count), singular)
-        closed &= ~chord[of_cell].any(axis=1)
-        chord[widest[closed]] = True
-        if not chord.any():
+        joining = touched[ends].all(axis=1)
+        rank = length_ranks(solid.points, ends)
+        # a triangle of singular edges only: its longest is split as well
+        triangle = joining[of_cell].sum(axis=1) > 2
+        longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
+        longest = of_cell[np.arange(len(of_cell)), longest]
+        joining &= ~np.isin(edge_code(ends, count), singular)
+        triangle &= ~joining[of_cell].any(axis=1)
+        joining[longest[triangle]] = True
+        if not joining.any():
             if settled:
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # the longest first: one that is the longest chord of all its tetrahedra
-        rank[~chord] = -1
-        longest = rank[of_cell].max(axis=1)
-        own = rank[of_cell] == np.maximum(longest, 0)[:, None]
-        split = chord & agreed(of_cell, of_cell[own], len(ends))
+        # the longest first: one that is the longest joining edge of all its tetrahedra
+        rank[~joining] = -1
+        highest = rank[of_cell].max(axis=1)
+        own = rank[of_cell] == np.maximum(highest, 0)[:, None]
+        split = joining & chosen_by_all(of_cell, of_cell[own], len(ends))
         solid, _ = split_edges(solid, ends, of_cell, split)
         settled = False
     return moved_onto_shapes(solid)
 
 
-def layered(solid: Solid, held: tuple[int, ...], share: float = SHARE) -> Parts:
+def layered(solid: Solid, held: tuple[int, ...], share: float = LAYER_SHARE) -> Parts:
     """Cut a layer of thin parts along the singular edges.
 
     Args:
-        solid: of :func:`without_chords`.
+        solid: of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
         share: of each edge, from the singular end, that is the layer's.
 
     Returns:
         The parts; tetrahedra that touch no singular edge stay whole.
     """
-    parts = uncut(solid)
+    parts = whole_elements(solid)
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[singular_edges(solid, held)] = True
     # should a tetrahedron touch more than an edge after all, its corners get no layer
-    while (crowded := touched[parts.corners].sum(axis=1) > 2).any():
-        touched[parts.corners[crowded]] = False
+    while (several := touched[parts.corners].sum(axis=1) > 2).any():
+        touched[parts.corners[several]] = False
     on = touched[parts.corners]
     # the singular corners first; a right-hand order is not needed
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)
     kinds = on.sum(axis=1)
-    spokes = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
+    split_edges_of = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
     cut = np.unique(
         np.concatenate([
             edge_code(corners[kinds == k][:, pairs].reshape(-1, 2), count)
-            for k, pairs in spokes.items()
+            for k, pairs in split_edges_of.items()
         ])
     )
-    found = [(corners[kinds == 0], places[kinds == 0], parts.parent[kinds == 0])]
-    for kind, pairs in spokes.items():
+    pieces = [(corners[kinds == 0], places[kinds == 0], parts.parent[kinds == 0])]
+    for kind, pairs in split_edges_of.items():
         own, near = corners[kinds == kind], places[kinds == kind]
         new = count + np.searchsorted(cut, edge_code(own[:, pairs], count))
         start, end = np.array(pairs).T
         between = (1 - share) * near[:, start] + share * near[:, end]
         own, near = np.hstack([own, new]), np.concatenate([near, between], axis=1)
-        members = _of_corner(own) if kind == 1 else _of_edge(own)
+        members = _corner_parts(own) if kind == 1 else _edge_parts(own)
         row = np.arange(len(own))[:, None, None]
-        found.append((
+        pieces.append((
             own[row, members].reshape(-1, 4),
             near[row, members].reshape(-1, 4, 4),
             np.repeat(parts.parent[kinds == kind], members.shape[1]),
         ))
-    corners, places, parent = (np.concatenate(v) for v in zip(*found, strict=True))
+    corners, places, parent = (np.concatenate(v) for v in zip(*pieces, strict=True))
     order = np.argsort(corners, axis=1)
     corners = np.take_along_axis(corners, order, axis=1)
     return Parts(corners, np.take_along_axis(places, order[:, :, None], axis=1), parent)
 
 
-def _of_corner(numbers: NDArray) -> NDArray:
+def _corner_parts(numbers: NDArray) -> NDArray:
     """(t, 4, 4) parts of tetrahedra whose corner 0 is singular."""
     # 4, 5, 6 are the cuts on the way to 1, 2, 3
     tip = np.broadcast_to([[[0, 4, 5, 6]]], (len(numbers), 1, 4))
-    return np.concatenate([tip, _of_prism([4, 5, 6, 1, 2, 3], numbers)], axis=1)
+    return np.concatenate([tip, _prism_parts([4, 5, 6, 1, 2, 3], numbers)], axis=1)
 
 
-def _of_edge(numbers: NDArray) -> NDArray:
+def _edge_parts(numbers: NDArray) -> NDArray:
     """(t, 6, 4) parts of tetrahedra whose edge 01 is singular."""
     # 4, 5 are the cuts on the way from 0 to 2, 3 and 6, 7 from 1
-    wedge = _of_prism([0, 4, 5, 1, 6, 7], numbers)
-    return np.concatenate([wedge, _of_prism([2, 4, 6, 3, 5, 7], numbers)], axis=1)
+    wedge = _prism_parts([0, 4, 5, 1, 6, 7], numbers)
+    return np.concatenate([wedge, _prism_parts([2, 4, 6, 3, 5, 7], numbers)], axis=1)
 
 
-def _of_prism(prism: list[int], numbers: NDArray) -> NDArray:
+def _prism_parts(prism: list[int], numbers: NDArray) -> NDArray:
     """(t, 3, 4) tetrahedra of prisms, by the diagonals from the smallest numbers."""
     local = np.array(prism)
     local = local[_TURNS[numbers[:, local].argmin(axis=1)]]

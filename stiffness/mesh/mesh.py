@@ -1,11 +1,11 @@
 """Surfaces to tetrahedra, with exact interfaces and curved faces kept curved.
 
-Pytetwild makes the tetrahedra, in a process of its own that a time limit can end, from
-a surface with fewer triangles (:mod:`stiffness.surface.decimate`).  The mesh's boundary
-follows the surface to within an envelope only, so every boundary triangle is then told
-which patch of the surface it stands for, and the nodes are moved onto the patches'
-exact shapes.  Meshes are kept in a cache by the content they were made from: pytetwild
-is slow, and never makes the same mesh twice.
+Pytetwild makes the tetrahedra, in a separate process with a time limit, from a surface
+with fewer triangles (:mod:`stiffness.surface.decimate`).  The mesh's boundary follows
+the surface to within an envelope only, so every boundary triangle is then assigned to a
+patch of the surface, and the nodes are projected onto the patches' exact shapes.
+Meshes are kept in a cache by the content they were made from: pytetwild is slow, and
+never makes the same mesh twice.
 """
 
 import hashlib
@@ -177,7 +177,7 @@ def _tetrahedralize(
 def fit_to_patches(
     points: NDArray, cells: NDArray, surface: Surface, patches: Patches
 ) -> Solid:
-    """Tell boundary triangles their patch and move corners onto the exact shapes.
+    """Assign boundary triangles to patches; project corners onto the exact shapes.
 
     Args:
         points: (n, 3) [m].
@@ -186,14 +186,13 @@ def fit_to_patches(
         patches: its patches and shapes.
 
     Returns:
-        The solid; corners whose move would turn a tetrahedron over stay where they
-        were, except on interfaces.
+        The solid; moves of corners that would invert a tetrahedron are shortened.
 
     Raises:
         MeshFailed: the mesh is not the part: its volume is off by more than 2 %, it has
             other holes, or an interface has no face.
     """
-    points, cells = _one_body(points, cells)
+    points, cells = _positive_cells(points, cells)
     faces = boundary_faces(cells)
     patch = _nearest_patch(points, faces, surface, patches)
     solid = Solid(points, cells, faces, patch, patches.shapes)
@@ -204,12 +203,12 @@ def fit_to_patches(
             f"{surface.name}: the mesh has {volume:.6g} m^3, the surface encloses "
             f"{surface.volume:.6g}"
         )
-    # a breach of a thin wall is little volume and much stiffness
-    found, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
-    if found != expected:
+    # a hole in a thin wall changes the volume little and the stiffness much
+    holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
+    if holes != expected:
         raise MeshFailed(
             f"{surface.name}: the mesh has other holes than the surface: Euler "
-            f"characteristic {found}, expected {expected}"
+            f"characteristic {holes}, expected {expected}"
         )
     for number, name in enumerate(("base", "tip")):
         if not (patch == number).any():
@@ -217,8 +216,8 @@ def fit_to_patches(
     return solid
 
 
-def _one_body(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Only used points, only positive volumes."""
+def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
+    """Points that are used, and cells turned to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -248,7 +247,7 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Patch of each boundary face: the nearest one that looks the same way."""
+    """Patch of each boundary face: the nearest one of about the same normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
@@ -316,14 +315,14 @@ def on_shapes(
     for key, group in groups:
         known = tuple(shape for p in key if (shape := shapes[p]) is not None)
         if known:
-            goal = project(points[group], known)
-            near = np.linalg.norm(goal - points[group], axis=1) <= reach
-            moved[group[near]] = goal[near]
+            target = project(points[group], known)
+            near = np.linalg.norm(target - points[group], axis=1) <= reach
+            moved[group[near]] = target[near]
     return moved
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Corners onto their shapes; moves that turn tetrahedra over are shortened.
+    """Corners projected onto their shapes; moves that invert tetrahedra are shortened.
 
     Args:
         solid: whose corners may be off the shapes of their patches.
@@ -333,11 +332,11 @@ def moved_onto_shapes(solid: Solid) -> Solid:
     """
     groups = node_patches(len(solid.points), solid.faces, solid.patch)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    goal = on_shapes(solid.points, groups, solid.shapes, 0.01 * size)
-    share = np.ones(len(goal))
+    target = on_shapes(solid.points, groups, solid.shapes, 0.01 * size)
+    share = np.ones(len(target))
     before = solid.volumes()
     for _ in range(12):
-        points = solid.points + share[:, None] * (goal - solid.points)
+        points = solid.points + share[:, None] * (target - solid.points)
         moved = Solid(points, solid.cells, solid.faces, solid.patch, solid.shapes)
         bad = moved.volumes() < 0.1 * before
         if not bad.any():

@@ -1,4 +1,4 @@
-"""Finer tetrahedra where they are asked for, by bisecting longest edges (Rivara).
+"""Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
 An edge is split only when it is the longest of every tetrahedron around it, so the mesh
 stays conforming at every step; neighbours are split first where it is not.  Boundary
@@ -18,7 +18,7 @@ _TRIANGLE = np.array([[0, 1], [1, 2], [0, 2]])
 
 
 @dataclass(frozen=True, eq=False)
-class Finer:
+class Refined:
     """A refined solid.
 
     Attributes:
@@ -30,8 +30,8 @@ class Finer:
     parent: NDArray
 
 
-def refine(solid: Solid, halvings: NDArray) -> Finer:
-    """Bisect tetrahedra as often as asked; neighbours where conformity needs it.
+def refine(solid: Solid, halvings: NDArray) -> Refined:
+    """Bisect tetrahedra as often as asked, and neighbours for a conforming mesh.
 
     Args:
         solid: to refine.
@@ -47,13 +47,13 @@ def refine(solid: Solid, halvings: NDArray) -> Finer:
         solid, row = split_edges(solid, ends, of_cell, split)
         need[row] = np.maximum(need[row] - 1, 0)
         need, parent = np.r_[need, need[row]], np.r_[parent, parent[row]]
-    return Finer(moved_onto_shapes(solid), parent)
+    return Refined(moved_onto_shapes(solid), parent)
 
 
 def split_edges(
     solid: Solid, ends: NDArray, of_cell: NDArray, split: NDArray
 ) -> tuple[Solid, NDArray]:
-    """Halve some edges with all that is around them; at most one of each tetrahedron.
+    """Bisect some edges and the tetrahedra at them, at most one edge of each.
 
     Args:
         solid: to refine; new corners are not yet moved onto its shapes.
@@ -63,7 +63,7 @@ def split_edges(
 
     Returns:
         The solid, and the tetrahedra (r,) that were halved: their first halves keep
-        their places, the second ones are appended in this order.
+        their indices, the second ones are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -106,15 +106,15 @@ def edge_code(ends: NDArray, points: int) -> NDArray:
     return np.asarray(ends[..., 0] * np.int64(points) + ends[..., 1])
 
 
-def ranked(points: NDArray, ends: NDArray) -> NDArray:
-    """Edges in the order of their lengths.
+def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
+    """Ranks of edges by length.
 
     Args:
         points: (n, 3) [m].
         ends: (e, 2) corners.
 
     Returns:
-        (e,) each edge's place, 0 the shortest; of equal ones the first is lower.
+        (e,) each edge's rank, 0 the shortest; of equal ones the first is lower.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     rank = np.empty(len(ends), dtype=int)
@@ -122,7 +122,7 @@ def ranked(points: NDArray, ends: NDArray) -> NDArray:
     return rank
 
 
-def agreed(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
+def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
     """Edges that all tetrahedra around them have chosen.
 
     Args:
@@ -140,8 +140,8 @@ def agreed(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """(e,) edges to split now: longest in all their cells, in a wanted one's way."""
-    rank = ranked(points, ends)
+    """(e,) edges to split now: longest of all their cells, on a wanted cell's path."""
+    rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
     ).ravel()
@@ -152,7 +152,7 @@ def _terminal_edges(
         if marked[reached].all():
             break
         marked[reached] = True
-    return marked & agreed(of_cell, longest, len(ends))
+    return marked & chosen_by_all(of_cell, longest, len(ends))
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:

@@ -1,10 +1,10 @@
-"""A beam beside finite elements: where they differ, and which part is physics.
+"""A beam against finite elements: the difference, and its physical part.
 
-A beam's section warps and shrinks freely; a rigid face holds it.  The ends of a solid
-link are therefore stiffer than the beam, by about what a beam shorter by a fixed share
-of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section and on
-Poisson's ratio only.  It fades as the link grows slender; a difference that does not
-fade is an error of one of the two models.
+A beam's section warps and contracts freely; a rigid face prevents it.  The ends of a
+solid link are therefore stiffer than the beam, by about what a beam shorter by a fixed
+share of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the section
+and on Poisson's ratio only.  It vanishes as the link grows slender; a difference that
+does not vanish is an error of one of the two models.
 
 The commonest one is a section whose width and height are swapped, or an ``up`` left
 out: the beam is then turned about its own axis.  So the beam is turned by quarters, and
@@ -30,8 +30,8 @@ class Comparison:
     """One link by a beam formula and by finite elements.
 
     Attributes:
-        beam: the formula's answer.
-        fea: the finite elements' answer, same tip and axes.
+        beam: by the formula.
+        fea: by finite elements, same tip and axes.
         difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
         length: [m] base to tip, along the beam.
         size: [m] of the section: radius of gyration times 2, the radius of a round bar.
@@ -65,27 +65,27 @@ class Comparison:
         axis = self.fea.tip - self.fea.base
         if not np.linalg.norm(axis) > 0:
             return 0, worst
-        left = {
+        remaining = {
             angle: _turned_difference(self, np.radians(angle) * axis)
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
         # of turns that are the same but for the mesh and rounding, the smallest
-        least = min(left.values()) + noise + 1e-9 * worst
-        best = min(angle for angle in left if left[angle] <= least)
-        found = left[best] < _MUCH_BETTER * worst and worst > noise
-        return (best, left[best]) if found else (0, worst)
+        least = min(remaining.values()) + noise + 1e-9 * worst
+        best = min(angle for angle in remaining if remaining[angle] <= least)
+        better = remaining[best] < _MUCH_BETTER * worst and worst > noise
+        return (best, remaining[best]) if better else (0, worst)
 
     @property
     def explanation(self) -> str:
         """The difference in words."""
-        angle, left = self.better_turn
+        angle, remaining = self.better_turn
         if angle:
             worst = 100 * np.abs(self.difference).max()
             swap = "" if angle == 180 else ", or width and height swapped"
             return (
                 f"The beam's axes look swapped: turned by {_TURNS[angle]} about base "
-                f"to tip it would differ by {100 * left:.3g} % at most, not "
+                f"to tip it would differ by {100 * remaining:.3g} % at most, not "
                 f"{worst:.3g} %.  Expected another up{swap}."
             )
         c = self.end_effect
@@ -118,7 +118,7 @@ def compare_link(
     size: float,
     length: float | None = None,
 ) -> Comparison:
-    """Put two answers for one link side by side.
+    """Compare two stiffnesses of one link.
 
     Args:
         beam: by formula.

@@ -1,20 +1,15 @@
 """Link stiffnesses kept on disk, with where they came from.
 
-A library is a folder of one JSON file an entry, each written whole or not at all, so a
-build can be interrupted, resumed and shared.  An entry holds the stiffness, its error,
-the mesh, the parameters and material it was made for, the geometry's fingerprint, the
-program's version and the date.
+A library is a folder of one JSON file an entry.  An entry holds the stiffness, its
+error, the mesh, the parameters and material it was made for, the geometry's digest, the
+program's version and the date.  :mod:`stiffness.report.library_build` makes them.
 """
 
 import itertools
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
-from forcefit.inputs.errors import checked
-from forcefit.inputs.table import BadInput, nearest, read_text, read_toml
-from forcefit.inputs.writing import write_json
-from stiffness.beam.curve import curve_compliance
-from stiffness.link import LinkStiffness, check_definite, inverted, scaled
-from stiffness.report.library_surface import SurfaceLink, is_current, read_surface_links
-from stiffness.report.results import link_results
+from forcefit.inputs.table import BadInput, nearest, read_text
+from stiffness.link import check_definite, inverted, scaled
 from stiffness.screws import SCREW, WRENCH
-from stiffness.surface.beam_surfaces import check_shape, shape_beam, shape_surface
 
 FORMAT = "forcefit link 1"
-_MATERIAL = ("young", "poisson", "density")
-_METHODS = ("beam", "fea")
-_LARGEST = 1e15  # in SI: beyond any length, modulus or density
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,235 +45,6 @@ class Entry:
     about: dict[str, Any]
 
     __repr__, _repr_html_ = short_repr, html_table
-
-
-@dataclass(frozen=True)
-class Spec:
-    """What a library is to hold.
-
-    Attributes:
-        folder: of the library.
-        shape: of all entries.
-        method: ``"beam"`` or ``"fea"``.
-        grid: values of each parameter: lengths [m], ``young`` [Pa], ...
-        accuracy: asked of finite elements.
-        links: parts given by their surface, beside the grid or in its stead.
-    """
-
-    folder: Path
-    shape: str
-    method: str
-    grid: dict[str, tuple[float, ...]]
-    accuracy: float = 0.005
-    links: tuple[SurfaceLink, ...] = ()
-
-    def points(self) -> list[dict[str, float]]:
-        """Every combination of the grid's values; none without a shape."""
-        if not self.shape:
-            return []
-        names = list(self.grid)
-        return [
-            dict(zip(names, values, strict=True))
-            for values in itertools.product(*self.grid.values())
-        ]
-
-
-def read_spec(path: Path | str) -> Spec:
-    """What a build file asks for.
-
-    Args:
-        path: TOML with ``library`` and ``accuracy``; ``shape``, ``method`` and a table
-            ``grid`` of lists of numbers; tables ``[[link]]`` of parts given by their
-            surface; the grid, the links, or both.
-
-    Returns:
-        The spec; the folder is relative to the file.
-
-    Raises:
-        BadInput: the file, a name or a value is not proper.
-    """
-    path = Path(path)
-    table = read_toml(path)
-    folder = path.parent / table.text("library")
-    accuracy = table.number("accuracy", "1", 0.005, least=1e-5, below=0.5)
-    links = read_surface_links(table, accuracy)
-    if links and not (table.has("shape") or table.has("grid")):
-        table.finish()
-        return Spec(folder, "", "fea", {}, accuracy, links)
-    grid_table = table.table("grid")
-    grid = {}
-    for name in list(grid_table.content):
-        values = grid_table.get(name)
-        given = values if isinstance(values, list) else [values]
-        if not given or not all(_is_number(v) for v in given):
-            raise grid_table.bad(name, "expected a finite number, or a list of them")
-        if len(set(given)) != len(given):
-            raise grid_table.bad(name, "a value stands there twice")
-        grid[name] = tuple(sorted(float(v) for v in given))
-    shape = table.text("shape")
-    spec = Spec(
-        folder=folder,
-        shape=shape,
-        method=table.choice("method", _METHODS, "fea"),
-        grid=grid,
-        accuracy=accuracy,
-        links=links,
-    )
-    table.finish()
-    for name in ("young", "poisson"):
-        if name not in grid:
-            raise grid_table.bad(name, "missing; expected a number or a list")
-    for point in spec.points():
-        check_shape(shape, _lengths(point))
-        checked(f"{path}: grid.young", point["young"], "Pa", above=0)
-        checked(f"{path}: grid.poisson", point["poisson"], "1", above=-1, below=0.5)
-    return spec
-
-
-def _is_number(value: object) -> bool:
-    """A number of a sane size, not true or false."""
-    proper = isinstance(value, int | float) and not isinstance(value, bool)
-    return proper and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
-
-
-def _lengths(point: Mapping[str, float]) -> dict[str, float]:
-    """The parameters that are lengths."""
-    return {name: v for name, v in point.items() if name not in _MATERIAL}
-
-
-def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
-    """Name of an entry, the same for the same parameters.
-
-    Args:
-        spec: of its library.
-        point: its parameters.
-
-    Returns:
-        Such as ``round-fea-length0.4-radius0.02-young6e+10-poisson0.3``.
-    """
-    values = "-".join(f"{name}{value:.9g}" for name, value in point.items())
-    return f"{spec.shape}-{spec.method}-{values}"
-
-
-def build_library(
-    spec: Spec,
-    workers: int = 1,
-    update: Callable[[int, int], None] | None = None,
-) -> list[Path]:
-    """Compute the entries that are not there yet.
-
-    Args:
-        spec: what is wanted.
-        workers: processes.
-        update: called with entries done and wanted.
-
-    Returns:
-        Files of all entries of the spec.
-
-    Raises:
-        BadInput: the folder cannot be made, or an entry cannot be computed.
-    """
-    _make_folder(spec.folder, write=False)
-    wanted: list[dict[str, float] | SurfaceLink] = [*spec.points(), *spec.links]
-    files = [spec.folder / f"{_key(spec, one)}.json" for one in wanted]
-    tell = update or (lambda done, total: None)
-    waiting = [
-        one
-        for one, file in zip(wanted, files, strict=True)
-        if not (
-            is_current(file, one) if isinstance(one, SurfaceLink) else file.exists()
-        )
-    ]
-    done = len(wanted) - len(waiting)
-    tell(done, len(wanted))
-    make = partial(_make_entry, spec)
-    if workers == 1:
-        for one in waiting:
-            make(one)
-            done += 1
-            tell(done, len(wanted))
-        return files
-    with ProcessPoolExecutor(workers) as pool:
-        for job in as_completed([pool.submit(make, one) for one in waiting]):
-            job.result()
-            done += 1
-            tell(done, len(wanted))
-    return files
-
-
-def _make_folder(folder: Path, write: bool = True) -> None:
-    """The folder of a library; without ``write`` only whether there can be one."""
-    try:
-        made = [one for one in (folder, *folder.parents) if not one.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{folder}: cannot be made: {error.strerror}") from None
-    if not write:
-        for one in made:
-            one.rmdir()
-
-
-def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
-    """Name of an entry of either kind."""
-    if isinstance(wanted, SurfaceLink):
-        return wanted.name
-    return entry_key(spec, wanted)
-
-
-def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
-    """Compute one entry and write it."""
-    if isinstance(wanted, SurfaceLink):
-        request = wanted.request()
-        link, parameters = wanted.solve(), wanted.parameters
-        about = {"surface": wanted.surface.name, "request": request}
-    else:
-        link, geometry = _solve_point(spec, wanted)
-        parameters, about = wanted, {"shape": spec.shape, "geometry": geometry}
-    key = _key(spec, wanted)
-    _make_folder(spec.folder)
-    content = (
-        link_results(link)
-        | about
-        | {
-            "format": FORMAT,
-            "key": key,
-            "parameters": parameters,
-            "stiffness_error": link.stiffness_error,
-            "program": _program(),
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-    )
-    write_json(content, str(spec.folder / f"{key}.json"))
-
-
-def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """The link of one point, and its geometry's fingerprint."""
-    lengths, E, nu = _lengths(point), point["young"], point["poisson"]
-    tip = np.array([0.0, 0.0, lengths["length"]])
-    if spec.method == "beam":
-        C = curve_compliance(shape_beam(spec.shape, lengths, nu), E, nu)
-        return LinkStiffness("Timoshenko beam", C, tip=tip, base=np.zeros(3)), ""
-    from stiffness.fem.fea import solve_link
-    from stiffness.fem.material import Material
-    from stiffness.surface.interface import parse_interface
-
-    surface = shape_surface(spec.shape, lengths)
-    solved = solve_link(
-        surface,
-        parse_interface("z=0"),
-        parse_interface(f"z={lengths['length']!r}"),
-        [Material(E, nu, point.get("density", 0.0))],
-        accuracy=spec.accuracy,
-    )
-    return solved.link, surface.digest()
-
-
-def _program() -> str:
-    """Name and version of this program."""
-    try:
-        return f"forcefit {version('forcefit')}"
-    except PackageNotFoundError:
-        return "forcefit, not installed"
 
 
 def read_entry(path: Path | str, key: str) -> Entry:

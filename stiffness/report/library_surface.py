@@ -54,7 +54,7 @@ class SurfaceLink:
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """All that the entry depends on, with the surface file's fingerprint.
+        """All that the entry depends on, with the surface file's digest.
 
         Returns:
             Plain values, the same for the same question.
@@ -109,31 +109,31 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
     """
     from stiffness.fem.condensation import KINDS
 
-    found: dict[str, SurfaceLink] = {}
+    links: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
         name = table.text("name")
         if not _NAME.fullmatch(name):
             expected = "letters, digits, dots, - and _, a letter or digit first"
             raise table.bad("name", f"found {describe(name)}, expected {expected}")
-        if name in found:
+        if name in links:
             raise table.bad("name", f"found {quoted(name)} twice, expected other names")
         surface = Path(root.file).parent / table.text("surface")
         if not surface.is_file():
             raise table.bad("surface", f"found no file {surface}, expected a surface")
-        found[name] = SurfaceLink(
-            name,
-            surface,
-            _interface(table, "base"),
-            _interface(table, "tip"),
-            table.number("young", "Pa", above=0.0),
-            table.number("poisson", "-", above=-1.0, below=0.5),
-            table.number("density", "kg/m^3", 0.0, least=0.0),
-            table.choice("unit", UNITS, "m"),
-            table.choice("interface", KINDS, "rigid"),
-            table.number("accuracy", "1", accuracy, least=1e-5, below=0.5),
+        links[name] = SurfaceLink(
+            name=name,
+            surface=surface,
+            base=_interface(table, "base"),
+            tip=_interface(table, "tip"),
+            young=table.number("young", "Pa", above=0.0),
+            poisson=table.number("poisson", "-", above=-1.0, below=0.5),
+            density=table.number("density", "kg/m^3", 0.0, least=0.0),
+            unit=table.choice("unit", UNITS, "m"),
+            interface=table.choice("interface", KINDS, "rigid"),
+            accuracy=table.number("accuracy", "1", accuracy, least=1e-5, below=0.5),
         )
         table.finish()
-    return tuple(found.values())
+    return tuple(links.values())
 
 
 def _interface(table: Table, key: str) -> Any:

@@ -1,4 +1,4 @@
-"""Pictures of stiffnesses; a function takes a result and returns a figure."""
+"""Plots of stiffnesses; a function takes a result and returns a figure."""
 
 from typing import TYPE_CHECKING
 
@@ -33,7 +33,7 @@ def plot_comparison(comparison: Comparison) -> "Figure":
 
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1.3, 1])
-    _draw_entries(left, [comparison.beam, comparison.fea])
+    _plot_entries(left, [comparison.beam, comparison.fea])
     percent = 100 * comparison.difference
     limit = max(np.abs(percent).max(), 1e-3)
     image = right.imshow(percent, cmap="RdBu_r", vmin=-limit, vmax=limit)
@@ -52,7 +52,7 @@ def plot_comparison(comparison: Comparison) -> "Figure":
     return figure
 
 
-def _draw_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
+def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
     """Entries larger than a thousandth of their scale, as bars of each link."""
     entries = entries_that_matter(links[0].stiffness)
     width = 0.8 / len(links)
@@ -87,12 +87,12 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     fine = np.geomspace(ratio.min(), ratio.max(), 200)
     errors = [100 * c.fea.relative_error_estimate for c in sweep.comparisons]
     # entries of a round section come in pairs: the second would hide the first
-    drawn: list[tuple[int, int]] = []
+    plotted: list[tuple[int, int]] = []
     for entry in entries_that_matter(sweep.comparisons[0].beam.stiffness):
         c, d = sweep.end_effect[entry], sweep.second[entry]
-        if any(abs(abs(sweep.end_effect[e]) - abs(c)) < 0.01 for e in drawn):
+        if any(abs(abs(sweep.end_effect[e]) - abs(c)) < 0.01 for e in plotted):
             continue
-        drawn.append(entry)
+        plotted.append(entry)
         name = " ".join(SCREW[i] for i in dict.fromkeys(entry))
         values = [100 * k.difference[entry] for k in sweep.comparisons]
         (line,) = axes.plot(fine, 100 * (c / fine + d / fine**2), lw=1)
@@ -121,14 +121,14 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Von Mises stress of one wrench from base to tip, the region looked at in white.
+    """Von Mises stress of one wrench from base to tip, the evaluated region in white.
 
     Args:
         everywhere: the influence at all nodes, also at the interfaces.
         peak: of the wrench.
         base: (3,) [m].
         tip: (3,) [m].
-        section: of a beam to draw beside it.
+        section: of a beam to plot beside it.
         up: (3,) the section's z.
 
     Returns:

@@ -1,13 +1,13 @@
-r"""Beam and finite elements over slenderness: what the ends add, and how it fades.
+r"""Beam and finite elements over slenderness: the end effect and its decay.
 
 The same section at several lengths.  A rigid face keeps the section from warping and
-shrinking over a distance that the section sets, not the length, so that the link is as
-stiff as a beam shorter by that much:
+contracting over a distance that the section sets, not the length, so that the link is
+as stiff as a beam shorter by that much:
 
     K / K_beam = 1 + c r / L + d (r / L)^2.
 
-c is a number of the section, the interfaces and Poisson's ratio; what the two terms do
-not explain is left as the residual and should be no more than the meshes' error.
+c depends on the section, the interfaces and Poisson's ratio; the residual of the two
+terms should be no more than the meshes' error.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -113,7 +113,7 @@ def sweep_slenderness(
     if len(ratios) < 2:
         raise BadInput("slenderness: found one length, expected two or more")
     constants = declared_section(section, nu)
-    found = []
+    comparisons = []
     for done, ratio in enumerate(ratios, start=1):
         length = ratio * constants.size
         surface = shape_surface(
@@ -129,10 +129,10 @@ def sweep_slenderness(
         ).link
         C = beam_compliance(length, constants, E, nu, axis=[0, 0, 1], up=[0, 1, 0])
         beam = LinkStiffness("Timoshenko beam", C, tip=fea.tip, base=fea.base)
-        found.append(compare_link(beam, fea, constants.size))
+        comparisons.append(compare_link(beam, fea, constants.size))
         if update is not None:
             update(done, len(ratios))
-    return fit_end_effect(found)
+    return fit_end_effect(comparisons)
 
 
 def fit_end_effect(comparisons: Sequence[Comparison]) -> SlendernessSweep:

@@ -40,8 +40,8 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
             )
     for name in SHAPES[shape]:
         if not (name in lengths and 0 < lengths[name] < float("inf")):
-            found = f"found {lengths[name]:g}" if name in lengths else "missing"
-            raise BadInput(f"{shape}: {name}: {found}, expected a length > 0 [m]")
+            given = f"found {lengths[name]:g}" if name in lengths else "missing"
+            raise BadInput(f"{shape}: {name}: {given}, expected a length > 0 [m]")
     if shape == "tube" and lengths["inner_radius"] >= lengths["radius"]:
         raise BadInput("tube: inner_radius must be smaller than radius")
     if shape == "box" and 2 * lengths["wall"] >= min(

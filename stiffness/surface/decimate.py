@@ -1,45 +1,47 @@
-"""A surface with fewer triangles for the mesher, which takes its time over each.
+"""A surface with fewer triangles for the mesher, whose time grows with their number.
 
-Long thin triangles, as every drawing program makes them of bars and bores, cost
-pytetwild most: it cuts its first tetrahedra along all of them.  Corners of the mesh are
-moved onto the part's exact shapes afterwards, so what it is given may be coarser.
+Long thin triangles, as CAD programs make them of bars and bores, cost pytetwild most:
+it cuts its first tetrahedra along all of them.  Corners of the mesh are projected onto
+the part's exact shapes afterwards, so the mesher's surface may be coarser.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.surface.surface import Surface, signed_volume
+from stiffness.surface.surface import Surface, directed_edges, signed_volume
 
-_VOLUME = 0.01  # a coarse surface encloses as much as the part, to this
+_VOLUME = 0.01  # relative difference of the enclosed volumes
 _PARTS = 0.01 * 1.4 ** np.arange(13)  # of the triangles, tried one after the other
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """The fewest triangles that stay near a surface, among a dozen tries.
+    """The fewest triangles within a tolerance of a surface, among a dozen tries.
 
     Args:
         surface: closed.
-        tolerance: [m] largest distance of either from the other, looked for at the
+        tolerance: [m] largest distance of either from the other, evaluated at the
             surface's corners and at the coarser one's corners, edges and centres.
 
     Returns:
-        Points (n, 3) [m] and triangles (m, 3) of a closed surface with as many ways
-        through and a volume within 1 %; the surface's own if no try gives one.
+        Points (n, 3) [m] and triangles (m, 3) of a closed surface of the same
+        genus and a volume within 1 %; the surface's own if no try gives one.
 
     Sources:
         Garland & Heckbert (1997) for the quadric decimation, as VTK has it.
     """
     import pyvista
 
-    whole = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
-    ways = euler_characteristic(surface.triangles)
+    original = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
+    characteristic = euler_characteristic(surface.triangles)
     for part in _PARTS:
-        fewer = whole.decimate(1 - part)
+        fewer = original.decimate(1 - part)
         if fewer.n_cells < 4:
             continue
         points = np.array(fewer.points, dtype=float)
         triangles = np.array(fewer.regular_faces, dtype=int)
-        if not _closed(triangles) or euler_characteristic(triangles) != ways:
+        if not _closed(triangles) or (
+            euler_characteristic(triangles) != characteristic
+        ):
             continue
         volume = signed_volume(points, triangles)
         if abs(volume / surface.volume - 1) > _VOLUME:
@@ -48,7 +50,7 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
         samples = [points, (a + b) / 2, (b + c) / 2, (c + a) / 2, (a + b + c) / 3]
         if (
             _distance(fewer, surface.points) <= tolerance
-            and _distance(whole, np.concatenate(samples)) <= tolerance
+            and _distance(original, np.concatenate(samples)) <= tolerance
         ):
             return points, triangles
     return surface.points, surface.triangles
@@ -62,12 +64,12 @@ def _distance(mesh: object, points: NDArray) -> float:
 
 def _closed(triangles: NDArray) -> bool:
     """Whether every edge has two triangles."""
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Corners less edges plus triangles: 2 a closed shell, less 2 each way through it.
+    """Corners less edges plus triangles: 2 - 2 genus for each closed shell.
 
     Args:
         triangles: (m, 3) corners.
@@ -75,6 +77,6 @@ def euler_characteristic(triangles: NDArray) -> int:
     Returns:
         The characteristic, the sum over all shells.
     """
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(triangles), axis=1)
     corners = len(np.unique(triangles))
     return corners - len(np.unique(edges, axis=0)) + len(triangles)

@@ -1,9 +1,8 @@
-"""A curved patch of no known shape, as smooth as its facets let one guess.
+"""A curved patch of no known shape, smoothed by Phong tessellation.
 
-Between the corners a facet is lifted toward what the corners' normals say: half of the
-mean of the projections onto the corners' tangent planes (Boubekeur & Alexa 2008, Phong
-tessellation).  On an arc of half-angle a this leaves a^4 of the radius where a flat
-facet leaves a^2.
+Between the corners a facet is lifted by half of the mean of the projections onto the
+corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation).  On an arc of
+half-angle a this leaves a^4 of the radius where a flat facet leaves a^2.
 """
 
 from dataclasses import dataclass, field

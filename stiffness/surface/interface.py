@@ -145,8 +145,8 @@ def _vector(table: Mapping, key: str) -> NDArray:
     value = table.get(key)
     array = number_array(value.tolist() if isinstance(value, np.ndarray) else value)
     if array is None or array.shape != (3,) or not np.isfinite(array).all():
-        found = describe(value) if key in table else "nothing"
-        raise BadInput(f"{key}: found {found}, expected 3 finite numbers")
+        given = describe(value) if key in table else "nothing"
+        raise BadInput(f"{key}: found {given}, expected 3 finite numbers")
     return array
 
 
@@ -155,6 +155,6 @@ def _length(table: Mapping, key: str, name: str) -> float:
     value = table.get(key)
     array = number_array([value])
     if array is None or not (np.isfinite(array[0]) and array[0] > 0):
-        found = describe(value) if key in table else "nothing"
-        raise BadInput(f"{name}: found {found}, expected a finite number > 0 [m]")
+        given = describe(value) if key in table else "nothing"
+        raise BadInput(f"{name}: found {given}, expected a finite number > 0 [m]")
     return float(array[0])

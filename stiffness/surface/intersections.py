@@ -1,11 +1,11 @@
-"""Does a surface cut itself?"""
+"""Self-intersections of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Pairs of triangles without a common vertex that cut each other.
+    """Pairs of triangles without a common vertex that intersect.
 
     Args:
         points: (n, 3) [m].
@@ -26,14 +26,14 @@ def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
-    """Pairs (i, j) of triangles whose boxes overlap, by a sweep along each cell row."""
+    """Pairs (i, j) of triangles whose bounding boxes overlap, by sweep and prune."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis = int(np.argmax(np.ptp(points, axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     start = low[order, axis]
     last = np.searchsorted(start, high[order, axis], side="right")
-    found = []
+    pairs = []
     for first in range(0, len(order), 512):
         rows = np.arange(first, min(first + 512, len(order)))
         width = int((last[rows] - rows).max(initial=1))
@@ -45,8 +45,8 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
             if k != axis:
                 proper &= (low[a, k] <= high[b, k]) & (low[b, k] <= high[a, k])
         i, j = np.nonzero(proper)
-        found.append(np.column_stack([order[rows[i]], order[columns[i, j]]]))
-    return np.concatenate(found)
+        pairs.append(np.column_stack([order[rows[i]], order[columns[i, j]]]))
+    return np.concatenate(pairs)
 
 
 def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArray:

@@ -1,4 +1,4 @@
-"""A surface cut into smooth patches, each with the shape its facets stand for."""
+"""Segmentation of a surface into smooth patches, each with its exact shape."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from stiffness.surface.primitives import (
     fit_sphere,
     fit_torus,
 )
-from stiffness.surface.surface import Surface
+from stiffness.surface.surface import Surface, directed_edges
 
-_SHARP = np.cos(np.radians(35.0))  # a sharper edge than this is meant to be one
+_SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
 _ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
-_SEEDS = 12  # tries to find a shape in what is left of a part
-_TRIES = 120  # on one surface; what is left then keeps its facets
+_SEEDS = 12  # tries to recognise a shape in the rest of a part
+_TRIES = 120  # on one surface; the rest then keeps its facets
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """What each triangle of a surface belongs to.
+    """The patch of each triangle of a surface, and their shapes.
 
     Attributes:
         patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
@@ -61,11 +61,11 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
             raise BadInput(f"{surface.name}: base and tip are the same faces")
         patch[members] = number
         shapes.append(interface_shape(interface))
-    facets = _Facets(surface)
-    for members in facets.smooth_parts(patch < 0):
-        for part, shape in _recognise(facets, members):
+    graph = _TriangleGraph(surface)
+    for members in graph.smooth_parts(patch < 0):
+        for part, shape in _recognise(graph, members):
             patch[part] = len(shapes)
-            shapes.append(shape or facets.lifted(part))
+            shapes.append(shape or graph.lifted(part))
     return Patches(patch, tuple(shapes))
 
 
@@ -131,8 +131,8 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     return np.flatnonzero(on)
 
 
-class _Facets:
-    """Triangles with their neighbours, ready to be flooded."""
+class _TriangleGraph:
+    """Triangles, their neighbours and the angles between them."""
 
     def __init__(self, surface: Surface) -> None:
         self.points, self.triangles = surface.points, surface.triangles
@@ -141,7 +141,7 @@ class _Facets:
         self.normals = normals / np.maximum(self.areas, 1e-300)[:, None]
         self.tolerance = _ON_SHAPE * surface.diagonal
         self.tries = _TRIES
-        edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        edges = np.sort(directed_edges(self.triangles), axis=1)
         owner = np.repeat(np.arange(len(self.triangles)), 3)
         order = np.lexsort(edges.T)
         self.left, self.right = owner[order[::2]], owner[order[1::2]]
@@ -149,8 +149,8 @@ class _Facets:
             "ij,ij->i", self.normals[self.left], self.normals[self.right]
         )
 
-    def flooded(self, members: NDArray, bend: float) -> NDArray:
-        """Part number of each member, cut where neighbours bend more than allowed."""
+    def connected_parts(self, members: NDArray, bend: float) -> NDArray:
+        """Component of each member; cut where the cosine is below ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -163,7 +163,7 @@ class _Facets:
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
         """Indices of the triangles of each part between sharp edges."""
-        label = self.flooded(members, _SHARP)
+        label = self.connected_parts(members, _SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
         ]
@@ -182,38 +182,40 @@ class _Facets:
         return (distances < self.tolerance) & (np.abs(along) > _SHARP)
 
 
-def _recognise(facets: _Facets, part: NDArray) -> list[tuple[NDArray, Shape | None]]:
+def _recognise(
+    graph: _TriangleGraph, part: NDArray
+) -> list[tuple[NDArray, Shape | None]]:
     """Shapes of a smooth part: one for all of it, else the largest first."""
-    shape = _fit(facets, part)
-    if shape is not None and facets.fits(shape, part).all():
+    shape = _fit(graph, part)
+    if shape is not None and graph.fits(shape, part).all():
         return [(part, shape)]
-    found: list[tuple[NDArray, Shape | None]] = []
+    recognised: list[tuple[NDArray, Shape | None]] = []
     while len(part):
-        members, shape = _largest_shape(facets, part)
+        members, shape = _largest_shape(graph, part)
         if shape is None:
-            return found + _leftovers(facets, part, separate=bool(found))
-        found.append((members, shape))
+            return recognised + _leftovers(graph, part, separate=bool(recognised))
+        recognised.append((members, shape))
         part = np.setdiff1d(part, members)
-    return found
+    return recognised
 
 
 def _leftovers(
-    facets: _Facets, part: NDArray, separate: bool
+    graph: _TriangleGraph, part: NDArray, separate: bool
 ) -> list[tuple[NDArray, Shape | None]]:
-    """What no shape was found for; pieces between shapes get one more chance."""
+    """Triangles of no recognised shape; pieces between shapes are fitted once more."""
     if not separate:
         return [(part, None)]
-    inside = np.zeros(len(facets.triangles), dtype=bool)
+    inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
-    pieces = facets.smooth_parts(inside)
-    return [(piece, _fit(facets, piece)) for piece in pieces]
+    pieces = graph.smooth_parts(inside)
+    return [(piece, _fit(graph, piece)) for piece in pieces]
 
 
-def _fit(facets: _Facets, part: NDArray) -> Shape | None:
+def _fit(graph: _TriangleGraph, part: NDArray) -> Shape | None:
     """The simplest shape all corners of a part lie on."""
-    points = facets.points[np.unique(facets.triangles[part])]
-    normals = facets.normals[part]
-    # a few corners decide whether a shape is worth fitting to all of them
+    points = graph.points[np.unique(graph.triangles[part])]
+    normals = graph.normals[part]
+    # a few corners decide whether a shape is fitted to all of them
     few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
@@ -224,56 +226,58 @@ def _fit(facets: _Facets, part: NDArray) -> Shape | None:
     for fit, least in tries:
         if len(points) < least:
             break
-        if len(few) < len(points) and not _lies_on(fit(few, normals), few, facets):
+        if len(few) < len(points) and not _lies_on(fit(few, normals), few, graph):
             continue
         shape = fit(points, normals)
-        if _lies_on(shape, points, facets):
+        if _lies_on(shape, points, graph):
             return shape
     return None
 
 
-def _lies_on(shape: Shape, points: NDArray, facets: _Facets) -> bool:
+def _lies_on(shape: Shape, points: NDArray, graph: _TriangleGraph) -> bool:
     """Whether points are on a shape, to the tolerance of the surface."""
-    return bool(np.abs(shape.signed(points)[0]).max() < facets.tolerance)
+    return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
-def _largest_shape(facets: _Facets, part: NDArray) -> tuple[NDArray, Shape | None]:
+def _largest_shape(
+    graph: _TriangleGraph, part: NDArray
+) -> tuple[NDArray, Shape | None]:
     """The largest connected piece of a part that is one shape; none if none is."""
-    inside = np.zeros(len(facets.triangles), dtype=bool)
+    inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
-    flat = facets.flooded(inside, 1 - 1e-10)
+    flat = graph.connected_parts(inside, 1 - 1e-10)
     best, largest, area = None, part[:0], 0.0
-    whole = facets.areas[part].sum()
+    whole = graph.areas[part].sum()
     tried = ~inside
     for _ in range(_SEEDS):
         waiting = part[~tried[part]]
-        if len(waiting) == 0 or area > whole / 2 or facets.tries == 0:
+        if len(waiting) == 0 or area > whole / 2 or graph.tries == 0:
             break
-        facets.tries -= 1
-        seed = waiting[np.argmax(facets.areas[waiting])]
+        graph.tries -= 1
+        seed = waiting[np.argmax(graph.areas[waiting])]
         tried[flat == flat[seed]] = True
         for rings in (0, 2, 4):
-            shape = _fit(facets, _ring(facets, inside, flat, seed, rings))
+            shape = _fit(graph, _ring(graph, inside, flat, seed, rings))
             if shape is None:
                 continue
             on = np.zeros_like(inside)
-            on[part] = facets.fits(shape, part)
-            label = facets.flooded(on, _SHARP)
+            on[part] = graph.fits(shape, part)
+            label = graph.connected_parts(on, _SHARP)
             piece = np.flatnonzero(on & (label == label[seed]))
             tried[piece] = True
-            # a plane of two facets is a facet of something round
-            if len(piece) > 2 and facets.areas[piece].sum() > area:
-                best, largest, area = shape, piece, float(facets.areas[piece].sum())
+            # two coplanar triangles are a facet of a curved shape
+            if len(piece) > 2 and graph.areas[piece].sum() > area:
+                best, largest, area = shape, piece, float(graph.areas[piece].sum())
     return largest, best
 
 
 def _ring(
-    facets: _Facets, inside: NDArray, flat: NDArray, seed: int, rings: int
+    graph: _TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """A seed with its coplanar neighbours, grown by some rings of facets."""
+    """A seed with its coplanar neighbours, grown by some rings of graph."""
     members = inside & (flat == flat[seed])
-    touch = inside[facets.left] & inside[facets.right] & (facets.cosine > _SHARP)
-    left, right = facets.left[touch], facets.right[touch]
+    touch = inside[graph.left] & inside[graph.right] & (graph.cosine > _SHARP)
+    left, right = graph.left[touch], graph.right[touch]
     for _ in range(rings):
         grown = np.r_[right[members[left]], left[members[right]]]
         members = members | (inside & np.isin(flat, flat[grown]))

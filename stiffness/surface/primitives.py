@@ -19,7 +19,7 @@ _TINY = 1e-300  # keeps a division at a shape's own axis finite
 
 
 class Shape(Protocol):
-    """Something that points can be moved onto."""
+    """A surface that points can be projected onto."""
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
         """Signed distances (n,) [m] and unit gradients (n, 3)."""
@@ -95,7 +95,7 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Points moved onto one shape, or onto the curve or corner several share.
+    """Points projected onto one shape, or onto the intersection of several.
 
     Args:
         points: (n, 3) [m] near the shapes.
@@ -110,7 +110,7 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # tangent shapes: the cutoff drops what they cannot both ask for
+        # tangent shapes: the cutoff drops directions in which they contradict
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -178,7 +178,7 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
         point = center + size * (p[0] * frame[1] + p[1] * frame[2])
         return Cone(point, direction / np.linalg.norm(direction), size * p[4], p[5])
 
-    return _polish(shape, np.r_[circle[:2], 0.0, 0.0, radius, 0.0], points, size)
+    return _refined_fit(shape, np.r_[circle[:2], 0.0, 0.0, radius, 0.0], points, size)
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
@@ -212,11 +212,11 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
             return Torus(point, unit, size * p[5], size * p[6])
 
         start = np.r_[circle[:2], 0.0, 0.0, 0.0, radius, tube]
-        candidates.append(_polish(shape, start, points, size))
+        candidates.append(_refined_fit(shape, start, points, size))
     return min(candidates, key=lambda t: float(np.abs(t.signed(points)[0]).max()))
 
 
-def _polish(
+def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
     """Nonlinear least squares over a shape's parameters."""

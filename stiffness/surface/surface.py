@@ -26,7 +26,7 @@ class Surface:
         points: (n, 3) [m].
         triangles: (m, 3) indices of points.
         name: of the file, for messages.
-        repairs: what had to be put right, in words.
+        repairs: what was repaired, in words.
     """
 
     points: NDArray
@@ -56,7 +56,7 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Fingerprint of the geometry alone, to the last bit."""
+        """Digest of the geometry alone, to the last bit."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
@@ -91,8 +91,20 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
+def directed_edges(triangles: NDArray) -> NDArray:
+    """Edges of triangles, each in the direction in which its triangle runs.
+
+    Args:
+        triangles: (m, 3) indices.
+
+    Returns:
+        (3 m, 2) indices; three rows a triangle.
+    """
+    return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
 def read_surface(path: Path | str, unit: str = "m") -> Surface:
-    """Read a surface and refuse what bounds no solid.
+    """Read a surface and refuse one that bounds no solid.
 
     Args:
         path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed.
@@ -116,10 +128,10 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 
 
 def _read_triangles(path: Path) -> tuple[NDArray, NDArray]:
-    """Points and triangles of a file, as they stand there."""
+    """Points and triangles of a file, in its unit."""
     if path.suffix.lower() not in FORMATS:
-        found = nearest(path.suffix, FORMATS)
-        raise BadInput(f"{path}: unknown kind of surface file{found}")
+        hint = nearest(path.suffix, FORMATS)
+        raise BadInput(f"{path}: unknown kind of surface file{hint}")
     try:
         with path.open("rb") as file:
             if not file.read(1):
@@ -134,7 +146,7 @@ def _read_triangles(path: Path) -> tuple[NDArray, NDArray]:
 def check_surface(
     points: NDArray, triangles: NDArray, name: str, unit: str = "m"
 ) -> Surface:
-    """Check and put right a surface.
+    """Check and repair a surface.
 
     Args:
         points: (n, 3) [m].
@@ -194,7 +206,7 @@ def _check_coordinates(
 
 
 def _merge(points: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, list[str]]:
-    """Vertices at one place become one; triangles without area go."""
+    """Merge coincident vertices; drop triangles without area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
@@ -223,7 +235,7 @@ def _merge(points: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, list[
 
 def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
     """Every edge must be shared by exactly two triangles."""
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(triangles), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     if (count == 1).any():
         where = points[edges[count == 1][0]].mean(axis=0)
@@ -242,7 +254,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Turn all triangles outward; refuse several bodies."""
+    """Orient all triangles outward; refuse several bodies."""
     triangles, shell, flipped = _orient_shells(triangles)
     repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
     shells = [triangles[shell == k] for k in range(shell.max() + 1)]
@@ -265,12 +277,12 @@ def _orient(
 
 
 def _orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
-    """Make neighbours agree; shell number of each triangle, and how many turned."""
+    """Consistent orientation; shell of each triangle, and how many were flipped."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
     count = len(triangles)
-    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
     first, second = order[::2], order[1::2]  # closed: edges come in pairs
@@ -296,7 +308,7 @@ def _orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Whether a surface goes around a point (its solid angle is 4 pi)."""
+    """Whether a surface encloses a point (its solid angle is 4 pi)."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -1,4 +1,4 @@
-"""The kinds of file a surface comes in."""
+"""Readers of surface files."""
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
@@ -33,7 +33,7 @@ def read_triangles(path: Path | str) -> tuple[NDArray, NDArray]:
         points, faces = read(path)
     except BadInput:
         raise
-    except (Exception, SystemExit) as error:  # whatever a foreign reader does
+    except (Exception, SystemExit) as error:  # any error of a third-party reader
         raise BadInput(f"{path}: not a readable {suffix[1:].upper()} file") from error
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         raise BadInput(f"{path}: holds no triangles, or is not {suffix[1:].upper()}")

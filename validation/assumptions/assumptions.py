@@ -48,53 +48,53 @@ def assumption_costs(
         By assumption its cost, or why it is not known.
     """
     tight = replace(posture, robot=without_clearance(posture.robot))
-    asked: dict[str, Callable[[], Cost]] = {
+    computed: dict[str, Callable[[], Cost]] = {
         "linear closures": lambda: closure_cost(tight, load),
         "beams, not solids": lambda: _solid_cost(posture, load, solids),
         "weight at the links' ends": lambda: _weight_cost(posture, gravity, load),
         "disc and cone, not two bushes": lambda: bush_cost(posture, load),
     }
-    found: dict[str, Cost | str] = {}
-    for name, cost in asked.items():
+    costs: dict[str, Cost | str] = {}
+    for name, compute in computed.items():
         try:
-            known = cost()
-            found[name] = known if known.known else NOTHING
-        except (CannotAssemble, FreeMotion, SolverFailed, _NotAsked) as error:
-            found[name] = str(error)
-    return found
+            cost = compute()
+            costs[name] = cost if cost.known else NOTHING
+        except (CannotAssemble, FreeMotion, SolverFailed, _NotApplicable) as error:
+            costs[name] = str(error)
+    return costs
 
 
-class _NotAsked(Exception):
-    """An assumption that says nothing here."""
+class _NotApplicable(Exception):
+    """An assumption that the robot does not make, or that is not computed."""
 
 
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Of weights at the links' ends, if there are any."""
+    """Of weights at the links' ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
-        raise _NotAsked("no gravity, or no beam with a density")
+        raise _NotApplicable("no gravity, or no beam with a density")
     return spread_cost(posture, gravity, load)
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Of round beams, if they are to be meshed."""
-    known: dict[tuple[float, float], NDArray] = {}
-    found = {}
+    """Of round beams against solids."""
+    compliances: dict[tuple[float, float], NDArray] = {}
+    stiffness = {}
     for frame in posture.robot.frames:
         link = frame.link
         if not isinstance(link, BeamLink) or set(link.section) != {"radius"}:
             continue
         if not solids:
-            raise _NotAsked("not meshed; --solids does, in minutes")
+            raise _NotApplicable("not meshed; --solids does, in minutes")
         key = (beam_axis(frame)[0] / link.section["radius"], link.poisson)
         key = (round(key[0], 6), key[1])
-        if key not in known:
-            known[key] = bar_compliance(*key)
-        found[frame.name] = bar_stiffness(frame, known[key])
-    if not found:
-        raise _NotAsked("no beam of full round section")
-    return link_cost(posture, found, load)
+        if key not in compliances:
+            compliances[key] = bar_compliance(*key)
+        stiffness[frame.name] = bar_stiffness(frame, compliances[key])
+    if not stiffness:
+        raise _NotApplicable("no beam of full round section")
+    return link_cost(posture, stiffness, load)
 
 
 def costs_table(posture: Posture, costs: Mapping[str, Cost | str]) -> dict[str, Any]:

@@ -1,15 +1,15 @@
 """Pins held in two bushes each, instead of a disc for shifts and a cone for tilts.
 
-The paper bounds a pin's radial play |(TX, TY)| <= c and its tilt |(RX, RY)| <= t apart
-from each other.  A pin in two bushes of play c, at z = +-h with h = c / t, touches
-where its axis is at their places:
+The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
+independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
+bounded by the position of its axis there:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
 
 two discs again, in other coordinates: shifted by c it cannot tilt at all.  With all
-play halved, disc and cone lie inside the two bushes; the two bushes lie inside disc and
-cone.  So bushes cost at least as much energy as disc and cone, at most as much as these
-with half the play, and the zone's margin is at most doubled.
+clearances halved, disc and cone lie inside the two bushes; the two bushes lie inside
+disc and cone.  So bushes cost at least as much energy as disc and cone, at most as much
+as these with half the clearance, and the zone's margin is at most doubled.
 """
 
 from dataclasses import replace
@@ -26,16 +26,16 @@ from assembly.model.clearance import Compliant
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Two bushes for every pin that has both radial play and tilt.
+    """Two bushes for every pin that has both radial clearance and tilt.
 
     Args:
-        joints: what may move, with discs and cones.
+        joints: with discs and cones.
 
     Returns:
         The same with other columns in place of each such disc and cone.
     """
     cones = joints.cones.copy()
-    # each column of bounded play has one entry, its bound
+    # each column of a bounded clearance has one entry, its bound
     rows = np.abs(joints.cones).argmax(axis=0)
     column = {int(row): k for k, row in enumerate(rows)}
     for i in range(len(joints.robot.frames)):

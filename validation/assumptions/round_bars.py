@@ -1,7 +1,7 @@
 """Links as solid round bars: their stiffness by finite elements instead of a beam's.
 
-The ends are held as in a virtual joint, every point of them moving with the joint: they
-can neither warp nor shrink, which a beam's can.  A bar's compliance depends on its
+The ends are rigid, as at a virtual joint: they can neither warp nor contract, which a
+beam's can.  A bar's compliance depends on its
 slenderness L / r and Poisson's ratio alone once it is read in units of L and E, so one
 computation serves every link of one shape.
 """

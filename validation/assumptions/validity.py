@@ -1,4 +1,4 @@
-"""What each assumption of the virtual-joint model costs a robot at a posture.
+"""The error of each assumption of the virtual-joint model at a posture.
 
 Four assumptions, each against a model without it, all else being equal:
 
@@ -15,8 +15,8 @@ A cost is a difference of the platform's pose and a relative difference of the e
 It counts where it exceeds one per cent or 20 um, the paper's robot's own target.
 Where neither model stores energy or moves the platform there is nothing to compare.
 
-Poses are compared at the solution of least energy.  Where play that no load takes up
-leaves a flat valley, that pose is one of many; ``docs/validity.md`` says where.
+Poses are compared at the solution of least energy.  Where no load acts on a clearance
+the minimum is not unique in the pose; ``docs/validity.md`` says where.
 """
 
 import math
@@ -42,7 +42,7 @@ ENERGY_LIMIT = 0.01  # [-]
 
 @dataclass(frozen=True)
 class Cost:
-    """What an assumption costs; NaN where both models give nothing but rounding.
+    """The error of an assumption; NaN where both models give nothing but rounding.
 
     Attributes:
         rotation: [rad] by which the platform's orientation is off.
@@ -68,16 +68,16 @@ class Cost:
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """What one answer gets wrong, by another.
+    """Difference of a solution from a better one.
 
     Args:
-        model: the answer with the assumption.
+        model: the solution with the assumption.
         better: the one without.
         missing: [J] energy that neither counts but the better one has.
 
     Returns:
-        The cost.  Without loads, energies below 1e-6 of what closing without play
-        would take count as that: inside an assembly zone both are rounding.
+        The cost.  Without loads, energies below 1e-6 of that of closing without
+        clearances count as that: inside an assembly zone both are rounding.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -109,7 +109,7 @@ def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 
     Raises:
         CannotAssemble: it cannot be assembled.
-        SolverFailed: no answer was found.
+        SolverFailed: no solution was found.
     """
     exact = solve_exact(posture, load)
     return cost_between(exact.linear, exact)
@@ -132,7 +132,7 @@ def link_cost(
 
     Raises:
         CannotAssemble: it cannot be assembled.
-        SolverFailed: no answer was found.
+        SolverFailed: no solution was found.
     """
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     other = replace(posture, robot=posture.robot.with_links({**links}))
@@ -157,7 +157,7 @@ def spread_cost(
 
     Raises:
         CannotAssemble: it cannot be assembled.
-        SolverFailed: no answer was found.
+        SolverFailed: no solution was found.
     """
     ends = solve_assembly(posture, load, gravity=gravity)
     return cost_between(ends, ends, missing=energy_between_ends(posture, gravity))
@@ -178,7 +178,7 @@ def halves_cost(
 
     Raises:
         CannotAssemble: it cannot be assembled.
-        SolverFailed: no answer was found.
+        SolverFailed: no solution was found.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     own, carried = half_weights(posture, gravity)
@@ -204,6 +204,6 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 
     Raises:
         CannotAssemble: it cannot be assembled.
-        SolverFailed: no answer was found.
+        SolverFailed: no solution was found.
     """
     return cost_between(solve_assembly(posture, load), solve_bushes(posture, load))

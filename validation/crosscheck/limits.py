@@ -1,4 +1,4 @@
-"""What two models agree on as imperfections vanish: limits, slopes, and how sure.
+"""Limits and slopes of two models as imperfections vanish, with uncertainties.
 
 ======  ===================  ==========================================================
 symbol  code                 meaning
@@ -8,8 +8,8 @@ slope   ``fit_slope``        of log difference over log scale, as s goes to 0
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
-A limit is known to what leaving out the largest scale changes, twice.  Nothing is asked
-below :data:`FLOOR`, which simulations do not resolve.
+The uncertainty of a limit is twice its change when the largest scale is left out.
+Differences below :data:`FLOOR`, which simulations do not resolve, are noise.
 """
 
 import math
@@ -24,7 +24,10 @@ from validation.crosscheck.pair import Pair, sprung
 from validation.crosscheck.verdict import Check
 
 LIMIT_TOLERANCE = 1e-3  # relative, of every quantity extrapolated to no error
-FLOOR = {"rotation": 1e-10, "translation": 1e-11}  # [rad], [m] what simulations resolve
+FLOOR = {
+    "rotation": 1e-10,
+    "translation": 1e-11,
+}  # [rad], [m] resolution of simulations
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 
@@ -34,10 +37,10 @@ def spring_limits(
     """Differences of springs and energy, extrapolated to no error.
 
     Args:
-        robot: whose links and joint springs are looked at.
-        pairs: both answers at several scales.
-        spread: loads act between the links' ends: what links carry there is not in
-            the linear model, and links' wrenches are left out.
+        robot: whose links and joint springs are compared.
+        pairs: both solutions at several scales.
+        spread: whether loads act between the links' ends: the linear model does not
+            contain them, and links' wrenches are left out.
 
     Returns:
         By name, relative to the largest among all links or all joints; see
@@ -57,10 +60,10 @@ def spring_limits(
             compared.append(("wrenches", wrench, stiff * screw, ("moment", "force")))
         for what, linear, floor, labels in compared:
             name = f"{kind}_{what}"
-            known = sprung(robot)[rows] if name == "joint_wrenches" else 1.0
-            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs]) * known
+            mask = sprung(robot)[rows] if name == "joint_wrenches" else 1.0
+            ours = np.array([getattr(p.linear, linear)[rows] for p in pairs]) * mask
             theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
-            theirs = theirs * known
+            theirs = theirs * mask
             for label, half, least in zip(labels, HALVES.values(), floor, strict=True):
                 limits[f"{kind} {label}"] = limit_difference(
                     scales, ours[..., half], theirs[..., half], 1, least
@@ -99,19 +102,19 @@ def limit_difference(
     limit, change = limit_of(scales, (theirs - ours) * weight)
     largest = np.abs(ours * weight).max()
     size = max(largest, floor / bound, least_size, 1e-300)
-    unsure = max(0.0, change - 2 * floor) / size
-    return Check(limit / size, bound, unsure, signal=not largest < size)
+    uncertainty = max(0.0, change - 2 * floor) / size
+    return Check(limit / size, bound, uncertainty, signal=not largest < size)
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
-    """Largest component at scale 0, and what it is not known to.
+    """Largest component at scale 0, and its uncertainty.
 
     Args:
         scales: (k,) all different, largest first.
         values: (k, ...) at these scales.
 
     Returns:
-        Its size, and twice the most that leaving out the largest scale changes.
+        Its size, and twice its largest change when the largest scale is left out.
     """
     limit = extrapolate(scales, values)
     change = limit - extrapolate(scales[1:], values[1:])
@@ -156,7 +159,7 @@ def fit_slope(scales: ArrayLike, values: ArrayLike, floor: float) -> float:
 def slope_check(
     scales: NDArray, values: NDArray, floor: float, expected: float, bound: float
 ) -> Check:
-    """How far a slope is from what it should be.
+    """Difference of a slope from the expected one.
 
     Args:
         scales: (k,) largest first.
@@ -166,9 +169,9 @@ def slope_check(
         bound: on the difference.
 
     Returns:
-        The difference, not known to what leaving out the largest scale changes; from
-        two scales alone nothing can be held against it.  Without two values above the
-        floor there is no slope, and no signal.
+        The difference; its uncertainty is the change when the largest scale is left
+        out, infinite on two scales.  Without two values above the floor there is no
+        slope, and no signal.
     """
     slope = fit_slope(scales, values, floor)
     if math.isnan(slope):

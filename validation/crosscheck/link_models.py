@@ -31,7 +31,7 @@ class LinkModels:
 
 
 def link_models(robot: Robot, kind: str) -> LinkModels:
-    """What a simulation needs to model a robot's links in one of three ways.
+    """Stiffnesses and solids with which a simulation models a robot's links.
 
     Args:
         robot: any.

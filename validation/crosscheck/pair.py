@@ -1,4 +1,4 @@
-"""Two answers side by side at one scale of a robot's imperfections."""
+"""Both models' solutions at one scale of a robot's imperfections."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,15 +17,15 @@ from validation.multibody.simulation import MultibodyAssembly
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Both answers at one scale.
+    """Both solutions at one scale.
 
     Attributes:
         scale: factor on errors and load.
-        linear: the virtual-joint model's answer.
-        simulated: the simulation's.
-        exact: the virtual-joint model with finite rotations, None if it gave up.
-        between: [J] what weights store in the simulation's beams between their ends,
-            where the linear model knows nothing.
+        linear: of the virtual-joint model.
+        simulated: of the simulation.
+        exact: of the virtual-joint model with finite rotations, None if there is none.
+        between: [J] stored by weights in the simulation's beams between their ends,
+            which the linear model does not contain.
     """
 
     scale: float
@@ -36,7 +36,7 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """[J] of the linear model, and what it cannot have between links' ends."""
+        """[J] of the linear model, and of weights between links' ends."""
         return self.linear.energy + self.between
 
     @property
@@ -45,7 +45,7 @@ class Pair:
         return self.simulated.platform_screw - self.linear.platform_screw
 
     def table(self, robot: Robot) -> dict[str, Any]:
-        """Both answers and their differences, by name; see the public format."""
+        """Both solutions and their differences, by name; see the public format."""
         linear, simulated = self.linear, self.simulated
         vjm = {
             "platform_screw": linear.platform_screw,
@@ -112,17 +112,17 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
     }
 
 
-def exact_answer(
+def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """The answer with finite rotations near a linear one; None if none was found.
+    """The solution with finite rotations near a linear one; None if none was found.
 
     Args:
-        linear: the answer to start from.
-        gravity: (3,) [m/s^2] base axes, the one of the linear answer.
+        linear: to start from.
+        gravity: (3,) [m/s^2] base axes, the one of the linear solution.
 
     Returns:
-        The exact answer or None.  The load's moment is a couple of dead forces on the
+        The exact solution or None.  The load's moment is a couple of dead forces on the
         platform, as in the simulation.
     """
     joints, robot = linear.joints, linear.posture.robot

@@ -1,4 +1,4 @@
-"""Figures of validations.  Functions take a result and return a figure."""
+"""Plots of cross-checks.  Functions take a result and return a figure."""
 
 import math
 from typing import TYPE_CHECKING
@@ -10,16 +10,18 @@ from assembly.kinematics.posture import Posture
 from stiffness.link import scaled
 from stiffness.screws import SCREW
 from validation.crosscheck.crosscheck import Crosscheck
+from validation.crosscheck.pose_metric import PoseMetric
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def slope_figure(answer: Crosscheck) -> "Figure":
+def slope_figure(check: Crosscheck) -> "Figure":
     """Difference of simulation and linear model against the scale of the errors.
 
     Args:
-        answer: of :func:`validation.crosscheck.crosscheck.crosscheck`.
+        check: of :func:`validation.crosscheck.crosscheck.crosscheck`, without
+            clearances.
 
     Returns:
         A log-log figure, rotation [mrad] and translation [mm] beside each other, each
@@ -27,15 +29,17 @@ def slope_figure(answer: Crosscheck) -> "Figure":
     """
     from matplotlib.figure import Figure
 
+    metric = check.metric
+    assert isinstance(metric, PoseMetric)
     figure = Figure(figsize=(8, 3.6), layout="constrained")
     panels = figure.subplots(1, 2)
     units = {"rotation": "mrad", "translation": "mm"}
-    scales = answer.scales
-    for panel, (name, values) in zip(panels, answer.differences.items(), strict=True):
-        slope = answer.slopes[name]
-        found = "no difference" if math.isnan(slope) else f"slope {slope:.3f}"
+    scales = check.scales
+    for panel, (name, values) in zip(panels, metric.differences.items(), strict=True):
+        slope = metric.slopes[name]
+        label = "no difference" if math.isnan(slope) else f"slope {slope:.3f}"
         shown = np.where(values > 0, values, np.nan) * 1e3
-        panel.loglog(scales, shown, "o", color="C0", label=found)
+        panel.loglog(scales, shown, "o", color="C0", label=label)
         guide = shown[-1] * (scales / scales[-1]) ** 2
         panel.loglog(scales, guide, "--", color="0.5", label="slope 2")
         panel.set(
@@ -59,7 +63,7 @@ def stiffness_figure(beam: NDArray, fea: NDArray) -> "Figure":
 
     Returns:
         A figure of their difference in per cent of sqrt(K_ii K_jj) of the beam, so
-        that rotations and translations weigh alike.
+        that rotations and translations are comparable.
     """
     from matplotlib.figure import Figure
 
@@ -86,7 +90,7 @@ def closing_figure(
         sequence: (k, n, 4, 4) frames of
             :func:`validation.multibody.simulation.closing_sequence`.
         exaggeration: factor on displacements from the nominal posture; default: the
-            widest open closure is drawn as a tenth of the robot.
+            widest open closure is plotted as a tenth of the robot.
 
     Returns:
         A figure of three panels; red lines join the frames that are to coincide.

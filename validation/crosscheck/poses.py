@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import POSE, Posture, place_many
 from assembly.model.robot import Robot
 from validation.crosscheck.crosscheck import Crosscheck, attempt
-from validation.crosscheck.playcheck import PlayCheck
 
-Answer = Crosscheck | PlayCheck
 _VERDICTS = {
     "passed": "passed",
     "not decided": "NOT DECIDED",
@@ -22,7 +20,7 @@ _VERDICTS = {
 def check_poses(
     robot: Robot,
     axes: Mapping[str, NDArray],
-    check: Callable[[Posture], Answer],
+    check: Callable[[Posture], Crosscheck],
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[dict[str, Any]]:
     """Run a check at every reachable pose of a grid.
@@ -57,13 +55,13 @@ def _row(
     robot: Robot,
     posture: Posture | None,
     reason: str,
-    check: Callable[[Posture], Answer],
+    check: Callable[[Posture], Crosscheck],
 ) -> dict[str, Any]:
-    """What was found at one pose."""
+    """The result at one pose."""
     if posture is None:
         return {"status": "out of reach", "reason": reason, "passed": None}
-    answer, failure = attempt(robot.name, lambda: check(posture))
-    return failure if answer is None else {"status": "ok"} | answer.table()
+    result, failure = attempt(robot.name, lambda: check(posture))
+    return failure if result is None else {"status": "ok"} | result.table()
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -80,15 +78,15 @@ def poses_text(rows: list[dict[str, Any]]) -> str:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())
         slope = row.get("slope")
         known = slope is not None and np.isfinite(slope)
-        said = f"slope {slope:.4f}, " if known else ""
+        measured = f"slope {slope:.4f}, " if known else ""
         verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
         if row["passed"] is None:
             verdict = "not checked"
         status = "" if row["status"] == "ok" else f" ({row['status']})"
-        lines.append(f"{where}: {said}{verdict}{status}")
-    found = poses_table(rows)
+        lines.append(f"{where}: {measured}{verdict}{status}")
+    reached = poses_table(rows)["reached"]
     lines.append(
-        f"{sum(row['passed'] is True for row in rows)} of {found['reached']} reachable "
+        f"{sum(row['passed'] is True for row in rows)} of {reached} reachable "
         f"poses passed"
     )
     return "\n".join(lines)

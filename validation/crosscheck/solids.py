@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix, diags
 from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import MeshLink, Robot
 from forcefit.inputs.table import BadInput
-from validation.multibody.exudyn_parts import MeshBody, Solid
+from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
@@ -23,7 +23,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
         BadInput: a surface or an interface is not usable, or an interface is not
             rigid, the only kind a floating frame has here.
     """
-    known: dict[tuple[object, ...], Solid] = {}
+    known: dict[tuple[object, ...], MeshedSolid] = {}
     bodies = {}
     for frame in robot.frames:
         link = frame.link
@@ -39,12 +39,12 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
         if key not in known:
             known[key] = _solid(link)
         solid = known[key]
-        reach = solid.centers[1] - solid.centers[0]
-        bodies[frame.name] = MeshBody(solid, mesh_turn(frame, reach))
+        span = solid.centers[1] - solid.centers[0]
+        bodies[frame.name] = MeshBody(solid, mesh_turn(frame, span))
     return bodies
 
 
-def _solid(link: MeshLink) -> Solid:
+def _solid(link: MeshLink) -> MeshedSolid:
     """The finest mesh of a link, with its stiffness matrix."""
     from stiffness.fem.elements import assemble
     from stiffness.fem.fea import solve_link
@@ -54,13 +54,13 @@ def _solid(link: MeshLink) -> Solid:
 
     base, tip = parse_interface(link.base), parse_interface(link.tip)
     material = (Material(link.young, link.poisson, link.density or 0.0),)
-    found = solve_link(read_surface(link.surface, link.unit), base, tip, material)
-    mesh, constants = found.level.mesh, found.level.material
+    solved = solve_link(read_surface(link.surface, link.unit), base, tip, material)
+    mesh, constants = solved.level.mesh, solved.level.material
     upper = assemble(mesh, constants[:, 0], constants[:, 1])
-    return Solid(
+    return MeshedSolid(
         nodes=mesh.nodes,
         stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
         base=np.unique(mesh.faces[mesh.patch == 0]),
         tip=np.unique(mesh.faces[mesh.patch == 1]),
-        centers=found.centers,
+        centers=solved.centers,
     )

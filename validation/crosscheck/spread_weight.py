@@ -1,10 +1,10 @@
-"""Weight spread over a beam, and what is lost when it acts at the beam's ends.
+"""Distributed weight of a beam, and the energy lost when it acts at the ends.
 
-The virtual-joint model knows a link by its two ends.  Half of the weight at either end,
-with the moments of a beam clamped at both (:func:`assembly.linear.load.weights`),
-leaves the ends as they are; what the beam stores between them is missing.  Half of the
-weight alone, without the moments, also moves the ends: a cantilever's by a third too
-far.
+The virtual-joint model describes a link by its two ends.  Half of the weight at either
+end, with the moments of a beam clamped at both (:func:`assembly.linear.load.weights`),
+gives the exact displacements of the ends; the energy between them is missing.  Half of
+the weight alone, without the moments, also moves the ends: a cantilever's by a third
+too far.
 """
 
 from collections.abc import Iterator
@@ -71,7 +71,7 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
 def energy_between_ends(
     posture: Posture, gravity: ArrayLike, pieces: float = np.inf
 ) -> float:
-    """What beams store under their own weight although both of their ends are held.
+    """Energy of beams clamped at both ends under their own weight.
 
     For the weight across, q^2 L^5 / 1440 EI in bending and q^2 L^3 / 24 GA in shear;
     q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.
@@ -80,8 +80,8 @@ def energy_between_ends(
         posture: where the robot stands.
         gravity: (3,) [m/s^2] base axes.
         pieces: number of equal ones at whose ends the weight acts, with the moments of
-            a clamped piece: what these store within themselves is then left out, the
-            share 1 / pieces^4 of bending and 1 / pieces^2 of shear and stretching.
+            a clamped piece: their own energy is left out, the share 1 / pieces^4 of
+            bending and 1 / pieces^2 of shear and stretching.
 
     Returns:
         [J] the sum over all beams with a density.

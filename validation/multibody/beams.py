@@ -1,4 +1,4 @@
-"""Beams of the simulation: where they run, and what their sections resist.
+"""Beams of the simulation: their axes and the stiffness of their sections.
 
 Written apart from :mod:`assembly.model.links`: only a section's own constants are
 shared.

@@ -1,13 +1,13 @@
 """Joint clearances as smooth, conservative contact.
 
-A joint plays inside its cones: discs for (TX, TY) and (RX, RY), intervals for TZ and
-RZ.  At distance r from the middle of a cone of size c,
+A joint moves freely inside its cones: discs for (TX, TY) and (RX, RY), intervals for TZ
+and RZ.  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-so the push is k P P' r / c: none inside, a stiff spring outside, smooth everywhere, at
+so the force is k P P' r / c: none inside, a stiff spring outside, smooth everywhere, at
 the middle too (smoothing r - c instead is singular there).  The width w is first three
-times c, which pulls the joint gently to its middle, and then shrinks to 3e-4.
+times c, which centres the joint weakly, and is then reduced to 3e-4.
 
 A pin in two bushes touches at two places, at +-h along z: each is a disc of its own for
 the pin's axis there, (TX + h RY, TY - h RX), and the cone for (RX, RY) is gone.
@@ -22,12 +22,12 @@ from assembly.model.robot import Clearance, Frame
 TURN_STIFFNESS = 1e9  # [N m/rad] of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m]
 WIDE, NARROW = 3.0, 3e-4  # [-] widths of the smoothing in sizes of the cone
-_LOOSE = 0.5  # [rad, m] bounds of own motions from here on are looked at afterwards
+_UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
 _CONES = (("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)))
 
 
 @dataclass(frozen=True)
-class Cone:
+class ClearanceCone:
     """A disc or an interval.
 
     Attributes:
@@ -53,59 +53,62 @@ class Cone:
 
 
 @dataclass(frozen=True)
-class Play:
-    """How a joint may move beside its springs.
+class JointClearance:
+    """How a joint may move besides its springs.
 
     Attributes:
         cones: what bounds it.
         free: rows without a bound.
     """
 
-    cones: tuple[Cone, ...]
+    cones: tuple[ClearanceCone, ...]
     free: tuple[int, ...]
 
     @property
-    def loose(self) -> tuple[int, ...]:
+    def unlocked(self) -> tuple[int, ...]:
         """Rows that are not locked."""
         bounded = {row for cone in self.cones for row in cone.rows}
         tilting = {row for cone in self.cones if cone.arm for row in (0, 1)}
         return tuple(sorted(bounded | tilting | {*self.free}))
 
 
-def joint_play(frame: Frame, scale: float = 1.0, bushes: bool = False) -> Play:
-    """Clearances of a frame's joint, and its own motion where no spring holds it.
+def joint_clearance(
+    frame: Frame, scale: float = 1.0, bushes: bool = False
+) -> JointClearance:
+    """Clearances of a frame's joint, and its own motion if no spring resists it.
 
     Args:
         frame: of a robot.
         scale: factor on the clearances.
-        bushes: whether a joint with both radial play and tilt is a pin in two bushes,
-            each with that radial play, so far apart that it can tilt as much.
+        bushes: whether a joint with both radial clearance and tilt is a pin in two
+            bushes, each with that radial clearance, so far apart that it can tilt as
+            much.
 
     Returns:
-        The play; without clearance and own motion, nothing is loose.
+        The clearance; without one and without own motion, every row is locked.
     """
     given = frame.clearance or Clearance()
     moves = frame.passive and not frame.compliant
-    cones: list[Cone] = []
+    cones: list[ClearanceCone] = []
     free: list[int] = []
     for name, rows in _CONES:
         bound = getattr(given, name)
-        if moves and frame.own_axis in rows and (bound is None or bound >= _LOOSE):
+        if moves and frame.own_axis in rows and (bound is None or bound >= _UNBOUNDED):
             free += rows
         elif bound:
             stiffness = TURN_STIFFNESS if rows[0] < 3 else SHIFT_STIFFNESS
-            cones.append(Cone(rows, scale * bound, stiffness))
+            cones.append(ClearanceCone(rows, scale * bound, stiffness))
     if bushes and given.radial and given.tilt:
         size, h = scale * given.radial, given.radial / given.tilt
         cones = [cone for cone in cones if cone.rows not in {(0, 1), (3, 4)}]
-        cones += [Cone((3, 4), size, SHIFT_STIFFNESS, arm) for arm in (h, -h)]
-    return Play(tuple(cones), tuple(free))
+        cones += [ClearanceCone((3, 4), size, SHIFT_STIFFNESS, arm) for arm in (h, -h)]
+    return JointClearance(tuple(cones), tuple(free))
 
 
-def cone_pushes(
-    cone: Cone, screw: Sequence[float], width: float
+def cone_forces(
+    cone: ClearanceCone, screw: Sequence[float], width: float
 ) -> Iterator[tuple[int, float]]:
-    """What holds a joint back that has moved out of the middle of a cone.
+    """Contact forces of a cone on a joint that has moved from its middle.
 
     Args:
         cone: the bound.
@@ -113,7 +116,7 @@ def cone_pushes(
         width: [-] of the smoothing, in sizes of the cone.
 
     Yields:
-        Rows of the screw and the components [N m or N] of the push along them: the
+        Rows of the screw and the components [N m or N] of the force along them: the
         gradient of the energy.
     """
     offsets = cone.offsets(screw)
@@ -126,12 +129,14 @@ def cone_pushes(
         yield 1, cone.arm * factor * offsets[0]
 
 
-def cone_energy(cone: Cone, screw: Sequence[float], width: float) -> float:
-    """[J] where a joint presses against a cone; arguments of ``cone_pushes``."""
+def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> float:
+    """[J] of the contact of a joint with a cone; arguments of ``cone_forces``."""
     return cone.stiffness * _overlap(cone, cone.offsets(screw), width)[0] ** 2 / 2
 
 
-def _overlap(cone: Cone, offsets: list[float], width: float) -> tuple[float, float]:
+def _overlap(
+    cone: ClearanceCone, offsets: list[float], width: float
+) -> tuple[float, float]:
     """P and sqrt(x^2 + w^2) of the head of this module."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)

@@ -3,8 +3,8 @@
 Bodies are massless to the static solver; places are points and axes fixed to bodies;
 elastic parts and locked joints stand between two places.  Exudyn orders screws and
 wrenches [T R]; everything in and out of here is [R T] like in the whole library.
-How a model is solved is in :mod:`validation.multibody.exudyn_solver`, what can be asked
-of it in :mod:`validation.multibody.exudyn_reading`.
+The solution is in :mod:`validation.multibody.exudyn_solver`, its evaluation in
+:mod:`validation.multibody.exudyn_reading`.
 """
 
 import math
@@ -16,23 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from validation.multibody.contact import NARROW, WIDE, Play, cone_pushes
+from validation.multibody.contact import NARROW, WIDE, JointClearance, cone_forces
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
-HELD = 1e-2  # [N m/rad, N/m] on free motions while closures are pulled shut
-_CENTRING = 1e3  # [N/m] of bounded play; 1e-3 of it in N m/rad, 1e-6 about own axes
+HOLDING_STIFFNESS = 1e-2  # [N m/rad, N/m] on free motions while closures are closed
+_CENTRING = 1e3  # [N/m] of clearances; 1e-3 of it in N m/rad, 1e-6 about own axes
 
 
 @dataclass(frozen=True)
-class Stiffness:
-    """Springs that are in no robot.
+class Regularisation:
+    """Springs and tolerances of the simulation that belong to no robot.
 
     Attributes:
-        closing: [N m/rad, N/m] of the connectors that shut closures.
-        idle: [N m/rad, N/m] that is left on motions that nothing resists.
-        narrow: [-] last width of the smoothing of contacts, which centres play.
+        closing: [N m/rad, N/m] of the connectors that close the closures.
+        idle: [N m/rad, N/m] that remains on motions that nothing resists.
+        narrow: [-] last width of the smoothing of contacts, which centres clearances.
         tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
     """
 
@@ -47,31 +47,36 @@ class Model:
 
     Attributes:
         robot: its name, for messages.
-        stiffness: of what is in no robot.
+        regularisation: springs and tolerances that belong to no robot.
         ground: the base.
         width: [-] of the contacts' smoothing, in sizes of their cones.
         deadline: [s] of ``time.monotonic``, after which the solver stops.
-        broken: what was raised inside a function that Exudyn calls; it would tell
-            only that there was an error.
+        callback_error: what was raised in a user function of Exudyn, which reports only
+            that there was an error.
         idle: Exudyn's numbers of the springs of free motions, and their axes.
-        watched: places whose way from open to shut is kept.
-        seen: where they were: (places, 4, 4) at each step.
+        recorded: places whose motion from open to closed is recorded.
+        history: of them, (places, 4, 4) at each step.
     """
 
     def __init__(
-        self, exudyn: Any, items: Any, fem: Any, robot: str, stiffness: Stiffness
+        self,
+        exudyn: Any,
+        items: Any,
+        fem: Any,
+        robot: str,
+        regularisation: Regularisation,
     ) -> None:
         self.exu, self.item, self.fem = exudyn, items, fem
-        self.robot, self.stiffness = robot, stiffness
+        self.robot, self.regularisation = robot, regularisation
         self.container = self.exu.SystemContainer()
         self.mbs = self.container.AddSystem()
         ground = self.mbs.AddObject(self.item.ObjectGround())
         self.ground = Place(int(ground), np.eye(4), np.eye(4))
         self.width, self.deadline = WIDE, math.inf
-        self.broken: BaseException | None = None
+        self.callback_error: BaseException | None = None
         self.idle: list[tuple[int, int]] = []
-        self.watched: list[Place] = []
-        self.seen: list[NDArray] = []
+        self.recorded: list[Place] = []
+        self.history: list[NDArray] = []
 
     def discard(self) -> None:
         """Give the memory back; Exudyn keeps models and user functions otherwise."""
@@ -108,43 +113,45 @@ class Model:
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """A new body at the place that moves freely along one axis, but for a trace."""
-        K = np.diag(np.where(np.arange(6) == axis, HELD, np.inf))
+        """A new body at the place, free along one axis but for a weak spring."""
+        K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
         return spring
 
     def hold_idle(self, stiffness: float) -> None:
-        """Change how passive joints are held."""
+        """Set the weak springs of free motions."""
         for part, axis in self.idle:
             K = np.diag(np.where(np.arange(6) == axis, stiffness, 0.0))
             self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
-    def add_contact(self, place: Place, play: Play) -> Contact:
-        """A new body at the place that may play; a weak spring centres it."""
-        rows = np.array(play.loose, dtype=int)
+    def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
+        """A new body at the place within a clearance; a weak spring centres it."""
+        rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
         centring[rows] = _CENTRING * np.where(rows < 3, 1e-3, 1.0)
         centring[2] *= 1e-3
         spring = self.add_spring(place, np.diag(centring))
         weak = np.where(np.isfinite(centring), centring, 0.0).tolist()
 
-        def push(mbs: Any, t: float, item: int, shift: Any, turn: Any, *_: Any) -> Any:
+        def contact_wrench(
+            mbs: Any, t: float, item: int, shift: Any, turn: Any, *_: Any
+        ) -> Any:
             try:
                 self.check_time()
                 screw = [*turn, *shift]
                 wrench = [k * s for k, s in zip(weak, screw, strict=True)]
-                for cone in play.cones:
-                    for row, value in cone_pushes(cone, screw, self.width):
+                for cone in clearance.cones:
+                    for row, value in cone_forces(cone, screw, self.width):
                         wrench[row] += value
             except BaseException as error:
-                self.broken = error
+                self.callback_error = error
                 raise
             return wrench[3:] + wrench[:3]
 
         name = "springForceTorqueUserFunction"
-        self.mbs.SetObjectParameter(spring.parts[0], name, push)
-        return Contact(place, spring.far, play)
+        self.mbs.SetObjectParameter(spring.parts[0], name, contact_wrench)
+        return Contact(place, spring.far, clearance)
 
     def add_beam(
         self, base: Place, length: float, K: NDArray, elements: int
@@ -165,13 +172,13 @@ class Model:
             parts.append(int(self.mbs.AddObject(beam)))
         return tuple(parts), tuple(bodies)
 
-    def add_closure(self, first: Place, second: Place, shut: NDArray) -> Closure:
+    def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
         """A connector that is stress-free while the closure is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
-        connector = self._connect(markers, np.eye(6) * self.stiffness.closing)
-        return Closure(first, second, marker, connector, shut)
+        connector = self._connect(markers, np.eye(6) * self.regularisation.closing)
+        return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
         """A wrench at a place, base axes, whose direction stays."""

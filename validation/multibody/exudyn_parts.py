@@ -1,4 +1,4 @@
-"""What a model of the simulation is built of: places on bodies, and parts between them.
+"""Parts of a simulation model: places on bodies, and elements between them.
 
 Numbers are Exudyn's; screws and wrenches are ordered [R T] like in the whole library.
 """
@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from validation.multibody.contact import Play
+from validation.multibody.contact import JointClearance
 
 
 class SimulationFailed(RuntimeError):
@@ -75,7 +75,7 @@ class Elastic:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class MeshedSolid:
     """A link as finite elements, with two rigid interfaces, in its mesh's axes.
 
     Attributes:
@@ -102,7 +102,7 @@ class MeshBody:
         turn: (3, 3) the mesh's axes seen from the frame's.
     """
 
-    solid: Solid
+    solid: MeshedSolid
     turn: NDArray
 
 
@@ -123,33 +123,33 @@ class Modes:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Two places that a connector pulls together.
+    """Two places that a connector brings together.
 
     Attributes:
         first: place on the first chain.
         second: place on the second chain.
         marker: Exudyn's number of the connector's end on the first chain; it is moved.
         connector: Exudyn's number of the connector.
-        shut: (4, 4) the second place seen from the first when closed, nominally.
+        closed: (4, 4) the second place seen from the first when closed, nominally.
     """
 
     first: Place
     second: Place
     marker: int
     connector: int
-    shut: NDArray
+    closed: NDArray
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A joint with play between two places.
+    """A joint with clearance between two places.
 
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        play: how it may move.
+        clearance: how it may move.
     """
 
     near: Place
     far: Place
-    play: Play
+    clearance: JointClearance

@@ -1,4 +1,4 @@
-"""What can be asked of a solved Exudyn model: places, energies, wrenches."""
+"""Evaluation of a solved Exudyn model: places, energies, wrenches."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,9 @@ def pose(model: Model, place: Place) -> NDArray:
     return matrix(R, read(place.body, kind.Position)) @ place.local
 
 
-def left_open(model: Model, closure: Closure) -> NDArray:
+def closure_error(model: Model, closure: Closure) -> NDArray:
     """(6,) [rad, m] screw from the closed position to the present one."""
-    first = pose(model, closure.first) @ closure.shut
+    first = pose(model, closure.first) @ closure.closed
     return logarithm(inverse(first) @ pose(model, closure.second))
 
 
@@ -38,9 +38,11 @@ def energy(model: Model, part: Elastic) -> float:
 
 
 def contact_energy(model: Model, contact: Contact) -> float:
-    """[J] by which the contact's bounds yield."""
+    """[J] stored in the contact's compliance."""
     screw = screw_between(model, contact).tolist()
-    return sum(cone_energy(cone, screw, model.width) for cone in contact.play.cones)
+    return sum(
+        cone_energy(cone, screw, model.width) for cone in contact.clearance.cones
+    )
 
 
 def wrench(model: Model, part: Elastic) -> NDArray:

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 from scipy.sparse import identity
 
 from validation.multibody.exudyn_model import Model
-from validation.multibody.exudyn_parts import Elastic, MeshBody, Modes, Place, Solid
+from validation.multibody.exudyn_parts import (
+    Elastic,
+    MeshBody,
+    MeshedSolid,
+    Modes,
+    Place,
+)
 from validation.multibody.motion import matrix, shifted
 
 
@@ -50,7 +56,7 @@ def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
     return Elastic(place, tip, (number,), modes=modes)
 
 
-def _interface(model: Model, number: int, solid: Solid, side: int) -> int:
+def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
     """A marker that moves with an interface, 0 the base and 1 the tip."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
@@ -77,10 +83,10 @@ def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
     return turn @ np.linalg.solve(screws.T, K)
 
 
-_CONDENSED: WeakKeyDictionary[Solid, Any] = WeakKeyDictionary()
+_CONDENSED: WeakKeyDictionary[MeshedSolid, Any] = WeakKeyDictionary()
 
 
-def _floating(fem: Any, solid: Solid) -> Any:
+def _floating(fem: Any, solid: MeshedSolid) -> Any:
     """Exudyn's floating body of a solid, condensed at its first use."""
     if solid not in _CONDENSED:
         link = fem.FEMinterface()

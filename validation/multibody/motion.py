@@ -69,7 +69,7 @@ def logarithm(T: NDArray) -> NDArray:
 
 
 def _mean_turn(angles: NDArray) -> NDArray:
-    """(3, 3) mean of the rotations met on the way to a rotation vector."""
+    """(3, 3) mean of the rotations by t times a rotation vector, t from 0 to 1."""
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -16,7 +16,7 @@ from assembly.model.robot import BASE, BeamLink, Frame, MatrixLink, Robot
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import declared_section
 from validation.multibody.beams import beam_axes, beam_span, element_stiffness
-from validation.multibody.contact import joint_play
+from validation.multibody.contact import joint_clearance
 from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, MeshBody, Place
 from validation.multibody.exudyn_solids import add_mesh
@@ -24,7 +24,7 @@ from validation.multibody.motion import inverse, matrix, placement, shifted
 
 
 class Placed(Protocol):
-    """What is asked of a posture."""
+    """The part of a posture that the simulation uses."""
 
     @property
     def robot(self) -> Robot:
@@ -37,7 +37,7 @@ class Placed(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is to be built.
+    """The model to be built.
 
     Attributes:
         posture: the robot and its joint coordinates.
@@ -45,8 +45,8 @@ class Case:
         springs: by frame, K_E of links that are springs; see :func:`link_springs`.
         meshes: by frame, links that are solids.
         elements: of each other link, a beam.
-        clearances: whether joints play.
-        bushes: whether pins play in two bushes each.
+        clearances: whether joints have their clearances.
+        bushes: whether pins have two bushes each.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         couple: (3,) [N m] on the platform besides, base axes, by dead forces.
@@ -73,7 +73,7 @@ def link_springs(
     """Stiffness of every link that is to be neither a beam nor a mesh.
 
     Args:
-        robot: whose links are asked about.
+        robot: any.
         links: ``"beam"`` or ``"spring"``.
         given: K_E (6, 6) [N m/rad .. N/m] by frame.
         meshes: solids by frame.
@@ -104,15 +104,15 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """What was built.
+    """The built model.
 
     Attributes:
-        bodies: places of the frames on their bodies, before any play or joint spring.
+        bodies: places of the frames on their bodies, before clearances and springs.
         before: places of the frames before their own motion.
         links: elastic bodies by frame.
         joints: joint springs by frame.
         idle: the springs of free motions by frame.
-        contacts: joints with play by frame.
+        contacts: joints with clearance by frame.
         closures: in the robot's order.
         platform: (4, 4) nominal platform, seen from the base.
     """
@@ -159,9 +159,9 @@ def build(model: Model, case: Case) -> Tree:
             links[frame.name] = _add_beam(model, place, frame, case.elements)
             place = links[frame.name].far
         bodies[frame.name] = place
-        play = joint_play(frame, case.scale, case.bushes)
-        if case.clearances and play.cones:
-            contacts[frame.name] = model.add_contact(place, play)
+        clearance = joint_clearance(frame, case.scale, case.bushes)
+        if case.clearances and clearance.cones:
+            contacts[frame.name] = model.add_contact(place, clearance)
             place = contacts[frame.name].far
         K = frame.springs
         if K is not None and np.isfinite(np.diag(K)).any():
@@ -175,16 +175,26 @@ def build(model: Model, case: Case) -> Tree:
     nominal = _nominal(posture)
     closures = []
     for a, b in robot.closures:
-        shut = inverse(nominal[a]) @ nominal[b]  # what rounded files leave is no error
-        closures.append(model.add_closure(before[a], before[b], shut))
+        # the rounding of files is not an error
+        closed = inverse(nominal[a]) @ nominal[b]
+        closures.append(model.add_closure(before[a], before[b], closed))
     platform = nominal[robot.platform]
-    tree = Tree(bodies, before, links, joints, idle, contacts, closures, platform)
+    tree = Tree(
+        bodies=bodies,
+        before=before,
+        links=links,
+        joints=joints,
+        idle=idle,
+        contacts=contacts,
+        closures=closures,
+        platform=platform,
+    )
     if case.load.any():
         model.add_load(before[robot.platform], case.load)
     if case.couple.any():
-        _twist(model, before[robot.platform], platform, case.couple)
+        _add_couple(model, before[robot.platform], platform, case.couple)
     if case.gravity.any():
-        _weigh(model, robot, tree, case.gravity)
+        _add_weights(model, robot, tree, case.gravity)
     return tree
 
 
@@ -218,7 +228,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
     return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
 
 
-def _twist(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
+def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
     """A couple: along each axis an arm of 1 m, at its end a force m x axis / 2."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
@@ -226,7 +236,7 @@ def _twist(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> Non
         model.add_force(place, -force)
 
 
-def _weigh(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
+def _add_weights(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
     """Loads of everything that has a mass.
 
     A beam's weight acts at its nodes, with the moments at its ends of a clamped beam

@@ -1,15 +1,15 @@
-"""The forced assembly as a multibody simulation: an independent second opinion.
+"""The forced assembly as a multibody simulation, independent of the linear model.
 
 Every body is placed open and stress-free, with its full geometric error; the closures
-are then pulled shut by force, and Exudyn finds the static equilibrium with finite
+are then closed by force, and Exudyn finds the static equilibrium with finite
 rotations.  Nothing but the robot's data and its joint coordinates is shared with the
 virtual-joint model: placement, beams and equilibrium are found anew.
 
 At a frame the body's error comes first, then the link's deformation, then the joint's,
 as in the paper; rotation vector and translation of an error are both in the frame's
-axes.  Joints are tight here: passive ones turn or slide freely along their own z.
-A closure is shut by a connector whose target is shifted until nothing is left open, so
-overconstrained rigid loops (parallelograms) are no special case.
+axes.  Without clearances passive joints turn or slide freely along their own z.  A
+closure is closed by a connector whose target is corrected until the closure error
+vanishes, so overconstrained rigid loops (parallelograms) are no special case.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
-from validation.multibody.exudyn_model import HELD, Model, Stiffness
+from validation.multibody.exudyn_model import HOLDING_STIFFNESS, Model, Regularisation
 from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
 from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed
 from validation.multibody.exudyn_reading import (
@@ -47,16 +47,16 @@ from validation.multibody.open_robot import Case, Placed, Tree, build, link_spri
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
-# tried in turn; beside contacts closures must hardly be softer than these, and a rod
-# between two balls may roll by radians under its own weight unless it is held
-_TIGHT = (Stiffness(1e10, 1e-6), Stiffness(1e10, HELD))
-# nothing says where in its play a joint is that no contact presses: rounding of forces
-# in the first moves it by 1e-3 m, in the second, a little smoother, by 1e-7 m
-_PLAYING = (
-    Stiffness(1e12, 1e-6),
-    Stiffness(1e9, 1e-6, narrow=5e-4, tolerance=1e-6),
-    Stiffness(1e11, 1e-6),
-    Stiffness(1e11, HELD),
+# tried in turn; with contacts closures must not be much softer than these, and a rod
+# between two spherical joints may roll by radians under its weight unless it is held
+_TIGHT = (Regularisation(1e10, 1e-6), Regularisation(1e10, HOLDING_STIFFNESS))
+# a joint without contact is undetermined within its clearance: rounding of forces moves
+# it by 1e-3 m in the first, by 1e-7 m in the second, which is a little smoother
+_WITH_CLEARANCES = (
+    Regularisation(1e12, 1e-6),
+    Regularisation(1e9, 1e-6, narrow=5e-4, tolerance=1e-6),
+    Regularisation(1e11, 1e-6),
+    Regularisation(1e11, HOLDING_STIFFNESS),
 )
 
 
@@ -75,13 +75,13 @@ class MultibodyAssembly:
         link_wrenches: (n, 6) [N m, N] what acts on the link's tip from outside.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
         joint_wrenches: (n, 6) [N m, N] what acts on their outer side.
-        clearance_screws: (n, 6) [rad, m] play, and own motions of passive joints.
+        clearance_screws: (n, 6) [rad, m] of joints, and own motions of passive ones.
         closure_wrenches: (closures, 6) [N m, N] what each closure's second chain
             exerts on its first, at the platform's nominal origin, base axes.
         transforms: (n, 4, 4) frames seen from the base, before their own motion.
-        gap: [rad, m] largest component left open in a closure.
+        gap: [rad, m] largest component of a closure error.
         idle_energy: [J] in the springs that hold free motions; a check, nearly zero.
-        contact_energy: [J] by which contacts yield.
+        contact_energy: [J] in the compliance of contacts.
         held: whether motions that nothing resists are held by 0.01 N m/rad or N/m,
             since no equilibrium was found without.
         seconds: [s] taken.
@@ -106,7 +106,7 @@ class MultibodyAssembly:
 
     @property
     def rigid_energy(self) -> float:
-        """[J] energy that rigid contacts would leave, to first order of their yield."""
+        """[J] energy with rigid contacts, to first order in their compliance."""
         return self.energy + 2 * self.contact_energy
 
 
@@ -139,10 +139,10 @@ def simulate_assembly(
         gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
             weigh; other links, whose mass is not known, do not.
         elements: beam elements per link.
-        clearances: whether joints play, scaled like the errors; tight otherwise.
+        clearances: whether joints have their clearances, scaled like the errors.
         meshes: by frame, links that are solids of finite elements in a floating frame.
-        bushes: whether joints with radial play and tilt are pins in two bushes each,
-            see :func:`validation.multibody.contact.joint_play`, instead of a disc and a
+        bushes: whether joints with radial clearance and tilt are pins in two bushes,
+            see :func:`validation.multibody.contact.joint_clearance`, not a disc and a
             cone.
         time_limit: [s] after which the simulation fails.
         couple: (3,) [N m] on the platform besides, base axes, by forces whose direction
@@ -165,14 +165,22 @@ def simulate_assembly(
     solids = dict(meshes or {})
     springs = link_springs(posture.robot, links, given, solids)
     case = Case(
-        posture, scale, springs, solids, elements, clearances, bushes,
-        _vector(load, 6), _vector(gravity, 3), _vector(couple, 3),
-    )  # fmt: skip
-    *first, last = _PLAYING if clearances else _TIGHT
+        posture=posture,
+        scale=scale,
+        springs=springs,
+        meshes=solids,
+        elements=elements,
+        clearances=clearances,
+        bushes=bushes,
+        load=_vector(load, 6),
+        gravity=_vector(gravity, 3),
+        couple=_vector(couple, 3),
+    )
+    *first, last = _WITH_CLEARANCES if clearances else _TIGHT
     first = [] if hold else first
-    for added in first:
+    for regularisation in first:
         try:
-            return _simulate(case, added, started, time_limit)
+            return _simulate(case, regularisation, started, time_limit)
         except OutOfTime:
             raise
         except SimulationFailed:
@@ -186,11 +194,11 @@ def _vector(given: ArrayLike | None, size: int) -> NDArray:
 
 
 def _simulate(
-    case: Case, stiffness: Stiffness, started: float, limit: float
+    case: Case, regularisation: Regularisation, started: float, limit: float
 ) -> MultibodyAssembly:
     """Build, solve, read, and give the memory back."""
     robot = case.posture.robot
-    model = Model(*_import_exudyn(), robot.name, stiffness)
+    model = Model(*_import_exudyn(), robot.name, regularisation)
     model.deadline = started + limit
     try:
         tree = build(model, case)
@@ -203,18 +211,18 @@ def _simulate(
 def closing_sequence(
     posture: Placed, steps: int = 8, scale: float = 1.0, load: ArrayLike | None = None
 ) -> NDArray:
-    """Where the frames are while the closures of a tight robot are pulled shut.
+    """Frames of a robot without clearances while its closures are closed.
 
     Args:
         posture: as in :func:`simulate_assembly`; links with a section are beams, the
             others must be given by a matrix.
-        steps: in which the closures are shut, at least 4.
+        steps: in which the closures are closed, at least 4.
         scale: factor on the geometric errors.
         load: (6,) [N m, N] on the platform, which grows meanwhile.
 
     Returns:
-        (k, n, 4, 4) frames seen from the base: open and stress-free first, shut last;
-        k is at least ``steps + 1``.
+        (k, n, 4, 4) frames seen from the base: open and stress-free first, closed
+        last; k is at least ``steps + 1``.
 
     Raises:
         BadInput: a link's stiffness is not known.
@@ -223,43 +231,51 @@ def closing_sequence(
     robot = posture.robot
     springs = link_springs(robot, "beam", {}, {})
     case = Case(
-        posture, scale, springs, {}, 4, False, False, _vector(load, 6), np.zeros(3),
-        np.zeros(3),
-    )  # fmt: skip
+        posture=posture,
+        scale=scale,
+        springs=springs,
+        meshes={},
+        elements=4,
+        clearances=False,
+        bushes=False,
+        load=_vector(load, 6),
+        gravity=np.zeros(3),
+        couple=np.zeros(3),
+    )
     model = Model(*_import_exudyn(), robot.name, _TIGHT[-1])
     model.deadline = time.monotonic() + TIME_LIMIT
     try:
         tree = build(model, case)
-        model.watched = [tree.before[frame.name] for frame in robot.frames]
+        model.recorded = [tree.before[frame.name] for frame in robot.frames]
         solve(model, tree.closures, steps=steps)
-        return np.array(model.seen)
+        return np.array(model.history)
     finally:
         model.discard()
 
 
 def without_clearance(robot: Robot) -> Robot:
-    """The same robot with every joint tight, to compare with a simulation.
+    """The same robot without clearances, to compare with a simulation.
 
     Args:
         robot: any.
 
     Returns:
-        A robot without play; its passive joints move along their z without bound.
+        The robot; its passive joints move along their z without bound.
     """
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     return replace(robot, frames=frames)
 
 
 def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAssembly:
-    """Everything asked of the equilibrium."""
+    """The equilibrium's screws, wrenches and energies."""
     count = len(robot.frames)
-    screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "play")}
+    screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "clearance")}
     wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}
     kinds: tuple[tuple[str, Mapping[str, Elastic | Contact]], ...] = (
         ("link", tree.links),
         ("joint", tree.joints),
-        ("play", tree.idle),
-        ("play", tree.contacts),
+        ("clearance", tree.idle),
+        ("clearance", tree.contacts),
     )
     for kind, parts in kinds:
         for name, part in parts.items():
@@ -280,13 +296,13 @@ def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAs
         link_wrenches=wrenches["link"],
         joint_screws=screws["joint"],
         joint_wrenches=wrenches["joint"],
-        clearance_screws=screws["play"],
+        clearance_screws=screws["clearance"],
         closure_wrenches=np.reshape(closings, (-1, 6)),
         transforms=transforms,
         gap=largest_gap(model, tree.closures),
         idle_energy=sum(energy(model, part) for part in tree.idle.values()),
         contact_energy=sum(contact_energy(model, c) for c in tree.contacts.values()),
-        held=bool(model.idle) and model.stiffness.idle == HELD,
+        held=bool(model.idle) and model.regularisation.idle == HOLDING_STIFFNESS,
         seconds=time.monotonic() - started,
     )
 

@@ -1,4 +1,4 @@
-"""Problems (21) and (22) as the paper prints them, in cvxpy, beside our answers."""
+"""Problems (21) and (22) as the paper prints them, in cvxpy, against our solutions."""
 
 import math
 from typing import Any
@@ -13,20 +13,20 @@ _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
 def compare_printed(
-    posture: Posture, answer: Assembly, zone: dict[str, Any]
+    posture: Posture, assembly: Assembly, zone: dict[str, Any]
 ) -> dict[str, Any]:
     """Solve the printed problems, and compare energy and margins with ours.
 
     Args:
         posture: where the robot stands.
-        answer: our assembly, without loads.
+        assembly: ours, without loads.
         zone: our ``margin`` and ``margin_free``.
 
     Returns:
         Their ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; by name
         the ``relative_difference``, NaN where there is nothing to compare; ``checks``,
-        the verdict on each; ``verdict`` and ``passed``.  Where cvxpy found no answer,
-        the ``reason`` instead of all that.
+        the verdict on each; ``verdict`` and ``passed``.  Where cvxpy has no solution,
+        only the ``reason``.
     """
     from assembly.linear.reference import reference_energy, reference_margin
 
@@ -36,12 +36,12 @@ def compare_printed(
     except RuntimeError as error:
         return {"verdict": "no answer", "passed": False, "reason": str(error)}
     checks = {
-        "energy": _energy_check(answer, energy),
+        "energy": _energy_check(assembly, energy),
         "margin": _margin_check(zone["margin"], margin),
         "margin_free": _margin_check(zone["margin_free"], free),
     }
-    found = {check.verdict for check in checks.values()}
-    bad, some = bool(found & {"fails", "undecided"}), "ok" in found
+    outcomes = {check.verdict for check in checks.values()}
+    bad, some = bool(outcomes & {"fails", "undecided"}), "ok" in outcomes
     return {
         "energy": energy,
         "platform_screw": screw,
@@ -58,18 +58,18 @@ def compare_printed(
     }
 
 
-def _energy_check(answer: Assembly, energy: float) -> Check:
-    """Energies; inside an assembly zone both are rounding of that without play."""
-    play = answer.energy_without_clearance
-    scale = max(answer.energy, 1e-6 * play, _NOISE_ENERGY / TOLERANCE)
+def _energy_check(assembly: Assembly, energy: float) -> Check:
+    """Energies; inside an assembly zone they are zero but for rounding."""
+    tight = assembly.energy_without_clearance
+    scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
-        abs(energy - answer.energy) / scale, TOLERANCE,
-        signal=max(answer.energy, play) >= _NOISE_ENERGY / TOLERANCE,
+        abs(energy - assembly.energy) / scale, TOLERANCE,
+        signal=max(assembly.energy, tight) >= _NOISE_ENERGY / TOLERANCE,
     )  # fmt: skip
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Margins; nothing to compare where neither exists, or no play is taken up."""
+    """Margins; nothing to compare where neither exists, or no clearance is needed."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

@@ -1,4 +1,4 @@
-"""One self-contained page of a study, and its results for machines."""
+"""Report of a study: one self-contained HTML page, and the results as JSON."""
 
 import html
 from importlib.metadata import version
@@ -20,10 +20,10 @@ from validation.html import (
     html_table,
     png_bytes,
 )
-from validation.study.headline import verdict, worst_play
+from validation.study.headline import verdict, worst_clearance
 from validation.study.study import StudyResults, points_solved
 
-_PLAY_OF = {
+_CLEARANCE_OF = {
     "frozen": "anywhere while no deformation changes",
     "free": "anywhere, and compliant joints turn about their own axis",
     "budget": "anywhere, and springs too, with 5 % more than the least energy",
@@ -65,7 +65,7 @@ def write_study(results: StudyResults) -> Path:
 
 
 def results_table(results: StudyResults) -> dict[str, Any]:
-    """Everything a study found, as plain values."""
+    """The results of a study, as plain values."""
     table: dict[str, Any] = {
         "program": f"forcefit {version('forcefit')}",
         "title": results.study.title,
@@ -74,7 +74,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "passed": results.passed,
         "verdicts": results.verdicts,
         "unchecked": results.unchecked,
-        "worst_play": worst_play(results),
+        "worst_play": worst_clearance(results),
         "solution": results.solution,
         "error": results.error,
         "reference": results.reference,
@@ -93,10 +93,10 @@ def map_summary(maps: Any) -> dict[str, Any]:
     """Least, median and largest value of each map, and the counts of the statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
-    found = {key: maps[key].values for key in ("margin", "margin_free", "energy")}
+    arrays = {key: maps[key].values for key in ("margin", "margin_free", "energy")}
     for key in ("rotation_error", "translation_error"):
-        found[key] = maps[key].sel(bound="upper").values
-    for key, values in found.items():
+        arrays[key] = maps[key].sel(bound="upper").values
+    for key, values in arrays.items():
         values = values[~np.isnan(values)] if "error" in key else (
             values[np.isfinite(values)]
         )  # fmt: skip
@@ -126,7 +126,7 @@ def report_page(results: StudyResults) -> str:
         parts.append(_stiffness(results.stiffness))
     if results.maps is not None:
         parts.append(_maps(results))
-    if results.answer is not None and "picture" in study.checks:
+    if results.assembly is not None and "picture" in study.checks:
         parts.append(_picture(results))
     if results.crosscheck is not None or results.crosscheck_failure:
         parts.append(_crosscheck(results))
@@ -135,7 +135,7 @@ def report_page(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults) -> str:
-    """The honest sentence at the top."""
+    """The conclusion at the top."""
     kind = "good" if results.passed else "bad"
     return f"<p class='verdict {kind}'>{html.escape(verdict(results))}</p>"
 
@@ -175,14 +175,14 @@ def _solution(results: StudyResults) -> str:
     return "".join(parts)
 
 
-def _linearisation_rows(found: dict[str, Any]) -> list[list[str]]:
+def _linearisation_rows(error: dict[str, Any]) -> list[list[str]]:
     """What linear closures cost against finite motions."""
-    if found["status"] != "ok":
-        return [["linearisation error", found["status"]]]
+    if error["status"] != "ok":
+        return [["linearisation error", error["status"]]]
     return [
-        ["linearisation error, rotation [rad]", _size(found["rotation"])],
-        ["linearisation error, translation [m]", _size(found["translation"])],
-        ["linearisation error, energy", f"{100 * found['relative_energy']:+.3g} %"],
+        ["linearisation error, rotation [rad]", _size(error["rotation"])],
+        ["linearisation error, translation [m]", _size(error["translation"])],
+        ["linearisation error, energy", f"{100 * error['relative_energy']:+.3g} %"],
     ]
 
 
@@ -194,11 +194,11 @@ def _size(vector: NDArray) -> str:
 def _pose_error(results: StudyResults) -> str:
     """Bounds of (27) in each reading."""
     rows = []
-    for reading, found in results.error.items():
+    for reading, bounds in results.error.items():
         row = [reading]
         for key in ("rotation", "translation"):
-            row += [f"{1e3 * found[key][side]:.6g}" for side in ("lower", "upper")]
-        rows.append([*row, _PLAY_OF[reading]])
+            row += [f"{1e3 * bounds[key][side]:.6g}" for side in ("lower", "upper")]
+        rows.append([*row, _CLEARANCE_OF[reading]])
     head = ["reading", "rotation >=", "<= [mrad]", "translation >=", "<= [mm]", "play"]
     return (
         "<p>Largest error of the platform's pose, problem (27), between certified "
@@ -249,19 +249,19 @@ def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
     """Beam against finite elements."""
     from validation.crosscheck.plot import stiffness_figure
 
-    name, found = next(iter(stiffness.items()))
-    alike = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
-    fea, euler, timoshenko = (found[k] for k in ("fea", "euler", "timoshenko"))
+    name, compared = next(iter(stiffness.items()))
+    shared = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
+    fea, euler, timoshenko = (compared[k] for k in ("fea", "euler", "timoshenko"))
     rows = [
         [f"{SCREW[i]}, {SCREW[j]}", f"{euler[i, j]:.6g}", f"{timoshenko[i, j]:.6g}",
          f"{fea[i, j]:.6g}", f"{100 * (fea[i, j] / timoshenko[i, j] - 1):+.2f} %"]
         for i, j in zip(*np.nonzero(np.triu(_significant(euler))), strict=True)
     ]  # fmt: skip
-    count = found["mesh"].get("elements", "?")
+    count = compared["mesh"].get("elements", "?")
     return (
         f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
-        f"{html.escape(name)}{alike}, {count} cubic tetrahedra, estimated error "
-        f"{100 * found['relative_error_estimate']:.2g} %. A solid held at a "
+        f"{html.escape(name)}{shared}, {count} cubic tetrahedra, estimated error "
+        f"{100 * compared['relative_error_estimate']:.2g} %. A solid held at a "
         "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
         "shear (Euler-Bernoulli) is stiffer than one with it: a few per cent between "
         "the columns are physics, not an error.</p>"
@@ -289,14 +289,14 @@ def _maps(results: StudyResults) -> str:
 
     summary = map_summary(results.maps)
     rows = [
-        [said, *(f"{factor * v:.4g}" for v in summary[key])]
-        for key, said, factor in _MAPPED
+        [name, *(f"{factor * v:.4g}" for v in summary[key])]
+        for key, name, factor in _MAPPED
         if key in summary
     ]
-    said = html.escape(", ".join(f"{k}: {v}" for k, v in summary["status"].items()))
+    counts = html.escape(", ".join(f"{k}: {v}" for k, v in summary["status"].items()))
     share = summary["share_assemblable_free"]
     if share is None:
-        return f"<h2>Over the workspace</h2><p>{said}. No point has an answer.</p>"
+        return f"<h2>Over the workspace</h2><p>{counts}. No point has an answer.</p>"
     axes = [d for d in results.maps["energy"].dims if results.maps.sizes[d] > 1]
     picture = ""
     if len(axes) == 2:
@@ -306,7 +306,7 @@ def _maps(results: StudyResults) -> str:
             "anywhere.",
         )
     return (
-        f"<h2>Over the workspace</h2><p>{said}. Assembles rigidly with "
+        f"<h2>Over the workspace</h2><p>{counts}. Assembles rigidly with "
         f"compliant joints free at {100 * share:.1f} % of the points with an answer."
         "</p>" + html_table(["", "least", "median", "largest"], rows) + picture
     )
@@ -316,8 +316,8 @@ def _picture(results: StudyResults) -> str:
     """The robot, deformed."""
     from assembly.report.plot import robot_plotter
 
-    assert results.answer is not None
-    plotter = robot_plotter(results.answer)
+    assert results.assembly is not None
+    plotter = robot_plotter(results.assembly)
     pixels = plotter.screenshot(return_img=True)
     plotter.close()
     caption = (
@@ -337,16 +337,16 @@ def _crosscheck(results: StudyResults) -> str:
         return f"{head}Not compared: {html.escape(results.crosscheck_failure)}</p>"
     closing = ""
     if results.closing is not None:
-        drawn = closing_figure(check.posture, results.closing)
+        figure = closing_figure(check.posture, results.closing)
         closing = html_figure(
-            drawn, "The simulation pulls the open robot shut by force."
+            figure, "The simulation pulls the open robot shut by force."
         )
     return (
         head + "The same forced assembly, without "
         "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
         "A linearised model must differ from it by the square of the errors' size: "
         f"slope 2. {_slope_text(check.slope)} {html.escape(verdict_text(check))}.</p>"
-        + html_table(check.header(), check.rows())
+        + html_table(check.metric.header(), check.metric.rows())
         + html_figure(
             slope_figure(check), "Difference of the platform's pose, without play."
         )
@@ -362,7 +362,7 @@ def _slope_text(slope: float) -> str:
 
 
 def _left_out() -> str:
-    """What the model does not contain."""
+    """Limits of the model."""
     return (
         "<h2>What this leaves out</h2><p>Small screws: the closures are linear in "
         "them, and the cross-check above shows what that costs at these errors. Links "

@@ -19,8 +19,8 @@ _DIGITS = 6  # of commanded coordinates
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
-    """How a campaign is to be measured.
+class CampaignDesign:
+    """Design of a campaign.
 
     Attributes:
         configurations: number of different ones.
@@ -67,7 +67,7 @@ class Design:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class CampaignPlan:
     """The rows of a design on a robot.
 
     Attributes:
@@ -83,12 +83,14 @@ class Plan:
     columns: tuple[str, ...] = field(default_factory=tuple)
 
 
-def plan_campaign(robot: Robot, design: Design, rng: np.random.Generator) -> Plan:
+def plan_campaign(
+    robot: Robot, design: CampaignDesign, rng: np.random.Generator
+) -> CampaignPlan:
     """Draw configurations, loads and conditions.
 
     Args:
         robot: declared.
-        design: what is wanted.
+        design: of the campaign.
         rng: of the draws.
 
     Returns:
@@ -121,10 +123,12 @@ def plan_campaign(robot: Robot, design: Design, rng: np.random.Generator) -> Pla
         )
         for i in range(count)
     )
-    return Plan(rows, order, commands[order], columns)
+    return CampaignPlan(rows, order, commands[order], columns)
 
 
-def _configurations(robot: Robot, design: Design, rng: np.random.Generator) -> NDArray:
+def _configurations(
+    robot: Robot, design: CampaignDesign, rng: np.random.Generator
+) -> NDArray:
     """(k, n) joint coordinates at which the nominal closures hold."""
     home = home_posture(robot)
     spans = np.array([
@@ -133,16 +137,16 @@ def _configurations(robot: Robot, design: Design, rng: np.random.Generator) -> N
         for f in robot.frames
     ])  # fmt: skip
     actuated = np.array([f.actuated for f in robot.frames])
-    found: list[NDArray] = []
+    reachable: list[NDArray] = []
     for _ in range(_DRAWS):
         draws = rng.uniform(-1, 1, (design.configurations, len(spans)))
-        goal = (home.coordinates + spans * draws).round(_DIGITS)
-        target = Target(coordinates=np.where(actuated, goal, np.nan))
+        commanded = (home.coordinates + spans * draws).round(_DIGITS)
+        target = Target(coordinates=np.where(actuated, commanded, np.nan))
         track = follow(robot, home.coordinates, target)
-        good = track.reached & (track.mismatch < 1e-9)
-        found += list(track.coordinates[good])
-        if len(found) >= design.configurations:
-            return np.array(found[: design.configurations])
+        closed = track.reached & (track.mismatch < 1e-9)
+        reachable += list(track.coordinates[closed])
+        if len(reachable) >= design.configurations:
+            return np.array(reachable[: design.configurations])
     raise BadInput(
         f"{robot.name}: hardly any configuration closes within {design.reach:g} rad of "
         "home; expected a smaller reach"
@@ -150,7 +154,7 @@ def _configurations(robot: Robot, design: Design, rng: np.random.Generator) -> N
 
 
 def _commands(
-    robot: Robot, design: Design, coordinates: NDArray
+    robot: Robot, design: CampaignDesign, coordinates: NDArray
 ) -> tuple[NDArray, tuple[str, ...], NDArray]:
     """What is written as commanded, its columns, and what it makes the coordinates."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
@@ -170,14 +174,14 @@ def _commands(
     return poses, tuple(f"pose.{name}" for name in POSE), track.coordinates
 
 
-def _interleaved(design: Design, rng: np.random.Generator) -> NDArray:
+def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
     """(rows,) configuration of each row: every pass visits all in another order."""
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]
     return np.concatenate(orders)[: design.rows]
 
 
-def _loads(design: Design, order: NDArray, rng: np.random.Generator) -> NDArray:
+def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
     """(rows, 6) [N m, N]: of each configuration's rows two repeat an earlier load."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
@@ -210,7 +214,9 @@ def _direction(rng: np.random.Generator) -> NDArray:
     return vector / np.linalg.norm(vector)
 
 
-def _temperature(design: Design, time: NDArray, rng: np.random.Generator) -> NDArray:
+def _temperature(
+    design: CampaignDesign, time: NDArray, rng: np.random.Generator
+) -> NDArray:
     """(rows,) [K]."""
     if design.temperature == "constant":
         return np.full(len(time), 6.0)

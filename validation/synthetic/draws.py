@@ -1,4 +1,4 @@
-"""Plausible parameters of hidden effects, and how to make an effect stronger."""
+"""Plausible parameters of hidden effects, and effects scaled by a factor."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from validation.synthetic.outside import OUTSIDE
 
 
 class NotApplicable(ValueError):
-    """A robot has nothing that an effect could act on."""
+    """A robot has nothing on which an effect acts."""
 
 
 def draw_effect(
@@ -32,7 +32,7 @@ def draw_effect(
 
     Raises:
         BadInput: there is no such effect.
-        NotApplicable: the robot has nothing that it could act on.
+        NotApplicable: the robot has nothing on which it acts.
     """
     if name not in (*LIBRARY, *OUTSIDE):
         raise BadInput(
@@ -43,14 +43,14 @@ def draw_effect(
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
-    """The same effect, its contribution to the readings times about a factor.
+    """The same effect, its contribution to the readings scaled by about a factor.
 
     Args:
         effect: any.
         factor: [-] > 0.
 
     Returns:
-        Weaker springs, larger errors, whatever makes more of it.
+        The effect with weaker springs or larger errors.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
@@ -155,7 +155,7 @@ def _softer(robot: Robot, duration: float, rng: np.random.Generator) -> Paramete
     return dict.fromkeys(_some(_beams(robot), rng), 0.8)
 
 
-def _play(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+def _clearances(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
     joints = [f for f in robot.frames if f.actuated and f.clearance is None]
     given: dict[str, float] = {}
     for name in _some(joints, rng):
@@ -228,7 +228,7 @@ _DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
     "link_length": _lengths,
     "registration": _registered,
     "modulus_scale": _softer,
-    "joint_clearance": _play,
+    "joint_clearance": _clearances,
     "friction_hysteresis": _friction,
     "contact_stiffening": _contacts,
     "load_gain": _gain,

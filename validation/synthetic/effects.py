@@ -1,13 +1,13 @@
-"""Effects put into a simulated machine as what they physically are.
+"""Effects of a simulated machine, modelled by their physics.
 
-A machine is a robot of frames, and most effects are more frames: an elastic drive
-is a spring after its joint, an encoder that reads wrong is a finite turn after it, a
-yielding foundation is a spring below everything.  Others change a body (a beam is built
-longer or softer, a joint gets play), what acts on it (weight, a load that is not the
-one recorded), where the measuring frame stands, or the reading alone.
+A machine is a robot of frames, and most effects are additional frames: an elastic drive
+is a spring after its joint, an encoder error is a finite rotation after it, an
+elastic foundation is a spring below everything.  Others change a body (a beam is longer
+or softer, a joint gets clearance), the load (weight, a load that is not the recorded
+one), the measuring frame, or the reading alone.
 
-Nothing of this is shared with the effects that a diagnosis fits: a mistake in those
-must not reach the data they are judged by.  Names and parameters are the public ones;
+Nothing of this is shared with the effects that a diagnosis fits: an error in those must
+not reach the data by which they are tested.  Names and parameters are the public ones;
 joints are sprung, turned and slid about or along their own z.
 """
 
@@ -25,7 +25,7 @@ from validation.multibody.motion import placement, turned
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
-SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] rigid for all that matters; tells its load
+SENSOR = (1e9, 1e10)  # [N m/rad], [N/m] of a force sensor, practically rigid
 Parameters = Mapping[str, float]
 
 
@@ -45,7 +45,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Contact:
+class PowerLawSpring:
     """A joint spring with load = coefficient x abs(deflection)^exponent.
 
     Attributes:
@@ -63,8 +63,8 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Rattle:
-    """Play of a joint on an open chain, where the load leaves no choice.
+class ClearanceLaw:
+    """Clearance of a joint on an open chain, where the load determines its position.
 
     Attributes:
         clearance: its bounds.
@@ -75,33 +75,33 @@ class Rattle:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """What is simulated for a row.
+    """The simulated machine of a row.
 
     Attributes:
         robot: with the frames that effects have added; its platform is where the load
             acts and the pose is read.
         coordinates: [rad or m] of every joint, 0 where absent.
-        load: (6,) [N m, N] that acts in truth.
+        load: (6,) [N m, N] that acts.
         gravity: (3,) [m/s^2] base axes.
-        laws: by frame, what its spring or its place follows while the machine comes
-            to rest; see :mod:`validation.synthetic.rest`.
+        laws: by frame, nonlinear laws of its spring or position; see
+            :mod:`validation.synthetic.rest`.
     """
 
     robot: Robot
     coordinates: Mapping[str, float]
     load: NDArray
     gravity: NDArray = field(default_factory=lambda: np.zeros(3))
-    laws: Mapping[str, "Contact | Rattle"] = field(default_factory=dict)
+    laws: Mapping[str, "PowerLawSpring | ClearanceLaw"] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Where a machine comes to rest; rows are frames.
+    """Equilibrium of a machine; rows are frames.
 
     Attributes:
         transforms: (n, 4, 4) before the joint's own motion, seen from the base.
-        joint_wrenches: (n, 6) [N m, N] what joint springs carry, frame's axes.
-        joint_screws: (n, 6) [rad, m] how far they give way.
+        joint_wrenches: (n, 6) [N m, N] of joint springs, frame's axes.
+        joint_screws: (n, 6) [rad, m] their deformations.
     """
 
     transforms: NDArray
@@ -114,7 +114,7 @@ Moved = Callable[[NDArray, Row, Parameters], NDArray]
 
 
 def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
-    """A robot with a fixed frame between a joint and everything it carries."""
+    """A robot with a fixed frame between a joint and its children."""
     new = f"{name}~{suffix}"
     frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
     return replace(robot, frames=(*frames, Frame(new, name, **given)))
@@ -158,7 +158,7 @@ def with_frame(robot: Robot, frame: Frame) -> Robot:
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """A machine one of whose joints stands off its command [rad or m]."""
+    """A machine one of whose joints deviates from its command [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -240,19 +240,19 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
     robot, laws = machine.robot, dict(machine.laws)
     for name in dict.fromkeys(key.rpartition(".")[0] for key in given):
         kinds = ("radial", "axial", "tilt")
-        play = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
-        if robot.closures:  # who takes up how much is for the simulation to find
-            robot = with_frame(robot, replace(robot.frame(name), clearance=play))
+        clearance = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
+        if robot.closures:  # the simulation finds the joints' positions
+            robot = with_frame(robot, replace(robot.frame(name), clearance=clearance))
             continue
         K = np.repeat(SENSOR, 3)
         K[robot.frame(name).own_axis] = math.inf
         robot = insert_after(robot, name, "play", joint_stiffness=np.diag(K))
-        laws[f"{name}~play"] = Rattle(play)
+        laws[f"{name}~play"] = ClearanceLaw(clearance)
     return replace(machine, robot=robot, laws=laws)
 
 
 def _friction_hysteresis(machine: Machine, row: Row, given: Parameters) -> Machine:
-    # a constant torque on a linear spring: its rest position is shifted
+    # a constant torque on a linear spring shifts its equilibrium
     for name, torque in given.items():
         compliance = own_compliance(machine.robot.frame(name))
         change = -torque * row.covariates["approach"] * compliance
@@ -263,7 +263,7 @@ def _friction_hysteresis(machine: Machine, row: Row, given: Parameters) -> Machi
 def _contact_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
     robot, laws = machine.robot, dict(machine.laws)
     for name in named(given, "coefficient"):
-        law = Contact(given[f"{name}.coefficient"], given[f"{name}.exponent"])
+        law = PowerLawSpring(given[f"{name}.coefficient"], given[f"{name}.exponent"])
         K = sprung(robot.frame(name), law.secant(1e-5))
         robot = insert_after(robot, name, "contact", joint_stiffness=K)
         laws[f"{name}~contact"] = law
@@ -280,7 +280,7 @@ def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Mach
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """The point measured is off the reference point, the measuring frame stands off."""
+    """Offset of the measured point, and displacement of the measuring frame."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()

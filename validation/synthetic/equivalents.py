@@ -1,13 +1,13 @@
-"""Which effects could be mistaken for the hidden ones, on a campaign's own design.
+"""Effects that a campaign's design cannot distinguish from the hidden ones.
 
-Every public effect's signature, to first order and whitened by the noise, is taken from
-the program of springs, never from the model that is to be judged.  A set of effects
-whose signatures span what the hidden ones add, but for less than noise would hide,
-explains the data as well, and naming it is no false claim.
+Every public effect's signature, to first order and whitened by the noise, is computed
+by the program of springs, not by the model under test.  A set of effects whose
+signatures span the contribution of the hidden ones, to within the noise, explains the
+data as well, and naming it is not wrong.
 
 Signatures of one turned drive or lengthened beam depend on the configuration only, and
 those of temperature, approach and contact follow from them: 600 solutions for an arm,
-not 5000.  Play and geometric stiffening have no linear signature and are left out.
+not 5000.  Clearance and geometric stiffening have no linear signature and are left out.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,17 +30,17 @@ _SOFT = 1e9  # [N m/rad, N/m] of a spring put in for a finite difference
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """A set of effects held against what is hidden.
+    """A set of effects compared with the hidden ones.
 
     Attributes:
         names: of the effects.
         parameters: their number.
-        left: [-] chi square of what they cannot explain, noise apart.
+        residual: [-] chi square that they do not explain, without noise.
     """
 
     names: tuple[str, ...]
     parameters: int
-    left: float
+    residual: float
 
 
 def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
@@ -58,17 +58,17 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
     columns = {n: c[known.ravel()] for n, c in signatures(campaign).items()}
     frame = columns["registration"][:, :6]
     nuisance = frame if campaign.registration == "unknown" else frame[:, :0]
-    found = []
+    sets = []
     for count in range(1, size + 1):
         for names in combinations(columns, count):
             if len({name.partition("(")[0] for name in names}) < count:
                 continue
             A = np.hstack([nuisance, *(columns[name] for name in names)])
-            found.append(Alternative(names, A.shape[1], _left(A, target)))
-    return sorted(found, key=lambda one: one.left)
+            sets.append(Alternative(names, A.shape[1], _residual(A, target)))
+    return sorted(sets, key=lambda one: one.residual)
 
 
-def _left(A: NDArray, target: NDArray) -> float:
+def _residual(A: NDArray, target: NDArray) -> float:
     """Squared part of a vector outside the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
@@ -76,12 +76,12 @@ def _left(A: NDArray, target: NDArray) -> float:
         return float(target @ target)
     u, size, _ = np.linalg.svd(A, full_matrices=False)
     u = u[:, size > 1e-9 * size[0]]
-    rest = target - u @ (u.T @ target)
-    return float(rest @ rest)
+    remainder = target - u @ (u.T @ target)
+    return float(remainder @ remainder)
 
 
 def signatures(campaign: Synthetic) -> dict[str, NDArray]:
-    """Whitened columns of every public effect that the robot can have.
+    """Whitened columns of every public effect that applies to the robot.
 
     Args:
         campaign: whose design and noise are used.
@@ -89,18 +89,22 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
     Returns:
         By name ``(6 rows, parameters)``, drift by its time constant.
     """
-    found = dict(_raw(campaign))
+    raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
     return {
         name: columns.reshape(len(sigma), -1) / sigma[:, None]
-        for name, columns in found.items()
+        for name, columns in raw.items()
         if columns.size
     }
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     """(rows, 6, parameters) by effect."""
-    robot, rows, lab = campaign.robot, campaign.plan.rows, _Lab(campaign)
+    robot, rows, differences = (
+        campaign.robot,
+        campaign.plan.rows,
+        _FiniteDifferences(campaign),
+    )
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
@@ -108,9 +112,11 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
         name: np.array([row.covariates[name] for row in rows])[:, None]
         for name in ("temperature", "time", "approach")
     }
-    offsets = {n: lab.still("encoder_offset", n, _STEP) for n in drives}
-    lengths = [lab.still("link_length", f.name, _STEP) for f in beams]
-    softer = {n: lab.each("drive_compliance", n, _SOFT, 1 / _SOFT) for n in drives}
+    offsets = {n: differences.unloaded("encoder_offset", n, _STEP) for n in drives}
+    lengths = [differences.unloaded("link_length", f.name, _STEP) for f in beams]
+    softer = {
+        n: differences.loaded("drive_compliance", n, _SOFT, 1 / _SOFT) for n in drives
+    }
     yield "encoder_offset", _columns(list(offsets.values()))
     angles = {n: np.array([[row.coordinates[n]] for row in rows]) for n in turning}
     yield (
@@ -135,27 +141,29 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     yield (
         "base_compliance",
         _columns([
-            lab.each("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
+            differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
             for k in SCREW
         ]),
     )
     yield (
         "modulus_scale",
-        _columns([lab.each("modulus_scale", f.name, 0.99, 0.01) for f in beams]),
+        _columns([
+            differences.loaded("modulus_scale", f.name, 0.99, 0.01) for f in beams
+        ]),
     )
     yield (
         "self_weight",
-        _columns([lab.still("self_weight", f"g.{k}", 1.0) for k in "xyz"]),
+        _columns([differences.unloaded("self_weight", f"g.{k}", 1.0) for k in "xyz"]),
     )
-    pushed = [lab.still("load_gain", f"offset.{k}", 1.0) for k in WRENCH]
+    unit_loads = [differences.unloaded("load_gain", f"offset.{k}", 1.0) for k in WRENCH]
     loads = np.array([row.load for row in rows])
     recorded = [k for k in range(6) if loads[:, k].any()]
-    gain = sum(loads[:, [k]] * pushed[k] for k in range(6))
-    yield "load_gain", _columns([np.asarray(gain), *(pushed[k] for k in recorded)])
+    gain = sum(loads[:, [k]] * unit_loads[k] for k in range(6))
+    yield "load_gain", _columns([np.asarray(gain), *(unit_loads[k] for k in recorded)])
     yield (
         "registration",
         _columns([
-            lab.still("registration", key, _STEP)
+            differences.unloaded("registration", key, _STEP)
             for key in (*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz")
         ]),
     )
@@ -170,8 +178,8 @@ def _columns(screws: Sequence[NDArray]) -> NDArray:
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
-class _Lab:
-    """A campaign's robot without what is hidden, and its readings without noise."""
+class _FiniteDifferences:
+    """Readings of the declared machine, and their derivatives by effects."""
 
     def __init__(self, campaign: Synthetic) -> None:
         self._robot, self._point = campaign.robot, campaign.reference_point
@@ -185,19 +193,19 @@ class _Lab:
     def _read(self, rows: list[Row], effects: Sequence[Hidden]) -> NDArray:
         return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
-    def each(self, name: str, key: str, value: float, step: float) -> NDArray:
-        """(rows, 6) what an effect adds for a unit of its parameter."""
-        found = self._read(self._rows, [Hidden(name, {key: value})])
-        return (found - self._loaded_readings) / step
+    def loaded(self, name: str, key: str, value: float, step: float) -> NDArray:
+        """(rows, 6) derivative of the readings by a parameter of an effect."""
+        readings = self._read(self._rows, [Hidden(name, {key: value})])
+        return (readings - self._loaded_readings) / step
 
-    def still(self, name: str, key: str, step: float) -> NDArray:
+    def unloaded(self, name: str, key: str, step: float) -> NDArray:
         """The same of an effect that no load changes: once for each configuration."""
-        found = self._read(self._unloaded, [Hidden(name, {key: step})])
-        return ((found - self._unloaded_readings) / step)[self._of]
+        readings = self._read(self._unloaded, [Hidden(name, {key: step})])
+        return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
-    """A Hertz contact: the offset by its load^(2/3), which the drive's spring tells."""
+    """A Hertz contact: the offset times load^(2/3), known from the drive's spring."""
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # [1/m] lengths like angles
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)

@@ -1,12 +1,12 @@
 """Synthetic campaigns: measured data of a simulated machine with hidden effects.
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
-not by the model that is later to explain it.  Each effect is made as strong as asked
+not by the model that is fitted later.  Each effect is made as strong as asked
 for: the rms of what it alone adds to the readings is a multiple of the noise.  Weight
 and geometric stiffening have no strength of their own; with them the noise is set.
 
-The folder written holds what a measuring lab would hand over.  What was hidden is kept
-apart from it, in the layout of the practice campaigns' truth.
+The folder written holds what a measuring machine would hand over.  What was hidden is
+kept apart from it, in the layout of the practice campaigns' truth.
 """
 
 import shutil
@@ -22,7 +22,7 @@ from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import check_writable, unwritable, write_text
-from validation.synthetic.design import Design, Plan, plan_campaign
+from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row
 from validation.synthetic.machine import Hidden, simulate_readings
@@ -30,7 +30,9 @@ from validation.synthetic.machine import Hidden, simulate_readings
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
 _CLOSE = 0.05  # relative, of a strength to the one asked for
-_MOST = 1000.0  # times its plausible size: an effect that needs more hardly acts here
+_MOST = (
+    1000.0  # times its plausible size: an effect that needs more is hardly observable
+)
 _SMALL = 1e-2  # scale of errors and load at which the machine is linear
 _BLUNDER = 40.0  # [-] sigmas of an outlier
 
@@ -49,15 +51,15 @@ class Synthetic:
         sigma: (6,) [rad, m] of the noise.
         readings: (rows, 6) [rad, m] measured deviations, NaN where missing.
         exact: (rows, 6) [rad, m] the same without noise and blunders.
-        added: (rows, 6) [rad, m] what the hidden effects add, the frame apart.
+        added: (rows, 6) [rad, m] contribution of the hidden effects, without the frame.
         effects: hidden, with their parameters.
         strength: by name, rms of what each effect alone adds, in sigmas.
-        outliers: rows that were spoilt.
+        outliers: rows with a blunder.
         hidden_base: (6,) screw of the measuring frame, None if known.
     """
 
     robot: Robot
-    plan: Plan
+    plan: CampaignPlan
     reference_point: NDArray
     registration: str
     sigma: NDArray
@@ -74,7 +76,7 @@ class Synthetic:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What spoils the readings.
+    """Errors of the readings.
 
     Attributes:
         rotation: [rad] 1 sigma.
@@ -99,7 +101,7 @@ class Noise:
 def generate_campaign(
     robot: Robot,
     wanted: Mapping[str, float] | Sequence[tuple[Hidden, float]],
-    design: Design | None = None,
+    design: CampaignDesign | None = None,
     noise: Noise | None = None,
     reference_point: ArrayLike = (0.0, 0.0, 0.0),
     seed: int = 0,
@@ -113,7 +115,7 @@ def generate_campaign(
         wanted: effects by name, whose parameters are drawn, or effects with
             parameters; with the multiple of the noise that each alone is to reach.
         design: what is measured.
-        noise: what spoils it.
+        noise: errors of the readings.
         reference_point: (3,) [m] measured point, platform axes.
         seed: of all draws.
         program: ``"multibody"`` or, much faster, ``"springs"``.
@@ -128,7 +130,7 @@ def generate_campaign(
             readings hardly show it.
         SimulationFailed: a row has no equilibrium.
     """
-    design, noise = design or Design(), noise or Noise()
+    design, noise = design or CampaignDesign(), noise or Noise()
     rng = np.random.default_rng(seed)
     point = np.array(reference_point, dtype=float)
     plan = plan_campaign(robot, design, rng)
@@ -138,34 +140,46 @@ def generate_campaign(
         wanted = [(drawn[name], multiple) for name, multiple in wanted.items()]
     # what has no strength of its own sets the noise, before the others follow it
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
-    lab = _Lab(robot, point, plan.rows, program, update)
-    declared = lab.read((), "declared")
+    machine = _SimulatedMachine(robot, point, plan.rows, program, update)
+    declared = machine.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
-        declared = _linear(lab)
+        declared = _linear(machine)
     sigma, exact = noise.sigma, declared
     effects, strength = [], {}
     for effect, multiple in wanted:
-        effect, exact, sigma = _as_strong_as(lab, effect, multiple, sigma, declared)
+        effect, exact, sigma = _scaled_effect(
+            machine, effect, multiple, sigma, declared
+        )
         effects.append(effect)
         strength[effect.name] = _rms((exact - declared) / sigma)
     if len(effects) > 1:
-        exact = lab.read(effects, "all effects")
+        exact = machine.read(effects, "all effects")
     added = exact - declared
     base = noise.hidden_frame * rng.uniform(-1, 1, 6) if noise.hidden_frame else None
     if base is not None:
         keys = (f"base.{k}" for k in SCREW)
         frame = Hidden("registration", dict(zip(keys, base.tolist(), strict=True)))
-        exact = lab.read([*effects, frame], "hidden frame")
+        exact = machine.read([*effects, frame], "hidden frame")
     readings, outliers = _measured(exact, sigma, noise, rng)
     return Synthetic(
-        robot, plan, point, "known" if base is None else "unknown", sigma,
-        readings, exact, added, tuple(effects), strength, outliers, base,
-    )  # fmt: skip
+        robot=robot,
+        plan=plan,
+        reference_point=point,
+        registration="known" if base is None else "unknown",
+        sigma=sigma,
+        readings=readings,
+        exact=exact,
+        added=added,
+        effects=tuple(effects),
+        strength=strength,
+        outliers=outliers,
+        hidden_base=base,
+    )
 
 
 @dataclass(eq=False)
-class _Lab:
-    """A robot, the rows at which it is measured, and what was read already."""
+class _SimulatedMachine:
+    """A robot and the rows at which it is measured."""
 
     robot: Robot
     point: NDArray
@@ -182,14 +196,18 @@ class _Lab:
         )
 
 
-def _as_strong_as(
-    lab: _Lab, effect: Hidden, multiple: float, sigma: NDArray, declared: NDArray
+def _scaled_effect(
+    machine: _SimulatedMachine,
+    effect: Hidden,
+    multiple: float,
+    sigma: NDArray,
+    declared: NDArray,
 ) -> tuple[Hidden, NDArray, NDArray]:
-    """The effect at a strength, what is read then, and the noise (see the head)."""
+    """The effect scaled to a strength, its readings, and the noise."""
     factor = 1.0
     for attempt in range(_TRIES):
         tried = strengthened(effect, factor) if attempt else effect
-        exact = lab.read([tried], f"{effect.name}, strength {factor:.3g}")
+        exact = machine.read([tried], f"{effect.name}, strength {factor:.3g}")
         reached = _rms((exact - declared) / sigma)
         if reached == 0.0:
             raise BadInput(f"{effect.name}: adds nothing to any reading; try another")
@@ -206,13 +224,13 @@ def _as_strong_as(
     return tried, exact, sigma
 
 
-def _linear(lab: _Lab) -> NDArray:
+def _linear(machine: _SimulatedMachine) -> NDArray:
     """(rows, 6) readings of the machine linear in its errors and its load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
-        small = lab.robot.with_errors(scale * lab.robot.errors)
-        rows = [replace(row, load=scale * row.load) for row in lab.rows]
-        ends.append(replace(lab, robot=small, rows=rows).read((), "linear model"))
+        small = machine.robot.with_errors(scale * machine.robot.errors)
+        rows = [replace(row, load=scale * row.load) for row in machine.rows]
+        ends.append(replace(machine, robot=small, rows=rows).read((), "linear model"))
     return (ends[0] - ends[1]) / (2 * _SMALL)
 
 
@@ -226,22 +244,22 @@ def finite_part(campaign: Synthetic) -> NDArray:
         (rows, 6) [rad, m].
     """
     at = campaign.robot, campaign.reference_point, campaign.plan.rows
-    lab = _Lab(*at, "springs", None)
-    return lab.read((), "declared") - _linear(lab)
+    machine = _SimulatedMachine(*at, "springs", None)
+    return machine.read((), "declared") - _linear(machine)
 
 
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Readings with noise, blunders and gaps; and the rows spoilt."""
+    """Readings with noise, blunders and gaps; and the rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
-    spoilt = rng.choice(len(exact), noise.outliers, replace=False)
+    blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
-    readings[spoilt, columns] += _BLUNDER * sigma[columns]
+    readings[blunders, columns] += _BLUNDER * sigma[columns]
     gaps = rng.random(exact.shape) < noise.missing
     gaps[gaps.all(axis=1)] = False
     readings[gaps] = np.nan
-    return readings, tuple(sorted(spoilt.tolist()))
+    return readings, tuple(sorted(blunders.tolist()))
 
 
 def _rms(values: NDArray) -> float:
@@ -253,10 +271,10 @@ def check_folder(folder: Path | str) -> None:
     """Refuse a folder that a campaign cannot be written to, before the work.
 
     Args:
-        folder: to be new, or empty.
+        folder: new, or empty.
 
     Raises:
-        BadInput: it holds something already, or where it should be is closed to us.
+        BadInput: it holds something already, or cannot be written.
     """
     folder = Path(folder)
     check_writable(folder.parent / f"{folder.name}.new")

@@ -1,4 +1,4 @@
-"""What a simulated machine reads at the rows of a design, hidden effects included."""
+"""Readings of a simulated machine at the rows of a design, with hidden effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -59,7 +59,7 @@ def simulate_readings(
         reference_point: (3,) [m] where the load acts and the pose is read, platform
             axes.
         rows: commanded configurations, loads and covariates.
-        effects: what the machine has and the declared model lacks.
+        effects: of the machine, which the declared model lacks.
         program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
         update: called with the number of machines done and their total.
 
@@ -99,7 +99,7 @@ def with_point(robot: Robot, reference_point: NDArray) -> Robot:
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """(4, 4) platform of the robot as drawn, along the chain that leads to it."""
+    """(4, 4) nominal platform of the robot, along its chain."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
@@ -125,7 +125,7 @@ def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
 def _read(
     pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
 ) -> NDArray:
-    """(6,) [rad, m] what the measuring device says of a pose."""
+    """(6,) [rad, m] reading of the measuring device at a pose."""
     for effect in effects:
         if effect.name in POSES:
             pose = POSES[effect.name](pose, row, effect.parameters)

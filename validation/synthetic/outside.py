@@ -1,6 +1,6 @@
-"""Effects that no library has, to see whether a diagnosis admits it.
+"""Effects outside the library, to test whether a diagnosis reports them as such.
 
-Each is something a real machine does and none of the public effects describes.  Their
+Each occurs in real machines, and none of the public effects describes it.  Their
 names begin with an underscore.
 """
 
@@ -26,7 +26,7 @@ from validation.synthetic.effects import (
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """A drive's compliance is mean (1 + cos 3q): teeth in and out of mesh."""
+    """A drive's compliance is mean (1 + cos 3q): as gear teeth mesh."""
     robot = machine.robot
     for name, softest in given.items():
         share = 1.0 + math.cos(3 * row.coordinates[name])
@@ -53,7 +53,7 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
 
 
 def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """An encoder's error has twice the period of eccentricity: its disc wobbles."""
+    """An encoder's error has twice the period of eccentricity: a disc that wobbles."""
     for name in (key[: -len(".amplitude")] for key in given if "amplitude" in key):
         angle = 2 * row.coordinates[name] + given[f"{name}.phase"]
         change = given[f"{name}.amplitude"] * math.sin(angle)

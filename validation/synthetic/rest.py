@@ -1,14 +1,14 @@
-"""Where a simulated machine comes to rest, laws of its joints included.
+"""Equilibria of a simulated machine, nonlinear laws of its joints included.
 
-A law is settled from outside: the machine is simulated with a spring or a misfit in the
-joint's place, the joint's load is read, the law says what spring or misfit belongs to
-that load, and so on until nothing changes.
+A law is solved by fixed-point iteration: the machine is simulated with a linear spring
+or an offset in the joint, and its load determines the next spring or offset, until
+nothing changes.
 
-- A contact that stiffens takes its secant stiffness.  It moves less than its last
-  stiffness predicts, so each step leaves at most 1 - 1/n of the mistake.
-- A joint that rattles rests against its bounds where its load pushes it.  On an open
-  chain the load is known whatever the play.  Against less than a weak spring's push
-  (grease, seals) it stays near the middle: otherwise rounding would decide.
+- A stiffening contact takes its secant stiffness.  It moves less than its last
+  stiffness predicts, so each step reduces the error at least by 1 - 1/n.
+- A joint with clearance is displaced by its load up to its bounds.  On an open chain
+  the load does not depend on the clearance.  A weak spring (grease, seals) keeps it
+  near the middle under small loads: otherwise rounding would decide.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -23,9 +23,9 @@ from validation.multibody.simulation import (
     simulate_assembly,
 )
 from validation.synthetic.effects import (
-    Contact,
+    ClearanceLaw,
     Machine,
-    Rattle,
+    PowerLawSpring,
     Rest,
     sprung,
     with_frame,
@@ -34,8 +34,8 @@ from validation.synthetic.springs import rest_on_springs
 
 _ELEMENTS = 2  # of a beam; corrected ones need no more at deflections this small
 _STEPS = 60
-_SETTLED = 1e-11  # [rad, m] of contacts
-_SETTLED_PLAY = 5e-9  # [rad, m] of play: what a sensor's rounding makes of a weak push
+_SETTLED = 1e-11  # [rad, m] of power-law springs
+_SETTLED_CLEARANCE = 5e-9  # [rad, m] rounding of the sensor under a small load
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}  # [N/m, N m/rad]
 Progress = Callable[[int, int], None]
 _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
@@ -55,15 +55,15 @@ def rest_poses(
         (k, 4, 4) of their platforms, seen from the base.
 
     Raises:
-        SimulationFailed: one has none, or the joints' laws do not settle.
+        SimulationFailed: one has none, or the joints' laws do not converge.
     """
     poses = np.zeros((len(machines), 4, 4))
     waiting = dict(enumerate(machines))
     for _ in range(_STEPS):
-        found = PROGRAMS[program](list(waiting.values()))
-        for (i, machine), rest in zip(list(waiting.items()), found, strict=True):
-            waiting[i], left = _revised(machine, rest)
-            if left <= 1.0:
+        equilibria = PROGRAMS[program](list(waiting.values()))
+        for (i, machine), rest in zip(list(waiting.items()), equilibria, strict=True):
+            waiting[i], change = _updated(machine, rest)
+            if change <= 1.0:
                 poses[i] = rest.transforms[machine.robot.index(machine.robot.platform)]
                 del waiting[i]
                 if update is not None:
@@ -73,41 +73,41 @@ def rest_poses(
     raise SimulationFailed(machines[0].robot.name, "its joints' laws do not settle")
 
 
-def _revised(machine: Machine, answer: Rest) -> tuple[Machine, float]:
-    """The machine as its laws want it under these loads; the change, in tolerances."""
-    left, robot = 0.0, machine.robot
+def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
+    """The machine with its laws evaluated under these loads; change in tolerances."""
+    largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
         axis = robot.frame(frame.parent).own_axis
-        wrench, screw = answer.joint_wrenches[i], answer.joint_screws[i]
-        if isinstance(law, Contact):
-            bent = (abs(wrench[axis]) / law.coefficient) ** (1.0 / law.exponent)
-            left = max(left, abs(bent - abs(screw[axis])) / _SETTLED)
-            K = sprung(robot.frame(frame.parent), law.secant(bent))
+        wrench, screw = equilibrium.joint_wrenches[i], equilibrium.joint_screws[i]
+        if isinstance(law, PowerLawSpring):
+            deflection = (abs(wrench[axis]) / law.coefficient) ** (1.0 / law.exponent)
+            largest = max(largest, abs(deflection - abs(screw[axis])) / _SETTLED)
+            K = sprung(robot.frame(frame.parent), law.secant(deflection))
             new = replace(frame, joint_stiffness=K)
         else:
-            rest = _against_bounds(law, wrench)
-            change = float(np.abs(rest - frame.geometric_error).max())
-            left = max(left, change / _SETTLED_PLAY)
-            new = replace(frame, geometric_error=rest)
+            position = _clearance_position(law, wrench)
+            change = float(np.abs(position - frame.geometric_error).max())
+            largest = max(largest, change / _SETTLED_CLEARANCE)
+            new = replace(frame, geometric_error=position)
         robot = with_frame(robot, new)
-    return replace(machine, robot=robot), left
+    return replace(machine, robot=robot), largest
 
 
-def _against_bounds(law: Rattle, wrench: NDArray) -> NDArray:
-    """(6,) [rad, m] where a load pushes a joint that plays."""
-    rest = np.zeros(6)
+def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
+    """(6,) [rad, m] position of a joint within its clearance, under a load."""
+    position = np.zeros(6)
     for name, rows in _ROWS.items():
         bound = getattr(law.clearance, name) or 0.0
-        push = float(np.linalg.norm(wrench[rows]))
-        if push > 0.0:
-            rest[rows] = min(push / _CENTRING[name], bound) * wrench[rows] / push
-    return rest
+        load = float(np.linalg.norm(wrench[rows]))
+        if load > 0.0:
+            position[rows] = min(load / _CENTRING[name], bound) * wrench[rows] / load
+    return position
 
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Joint coordinates of a robot, as the simulation asks for them."""
+    """Joint coordinates of a robot, as the simulation takes them."""
 
     robot: Robot
     coordinates: NDArray
@@ -118,14 +118,14 @@ def _simulated(machines: Sequence[Machine]) -> Iterator[Rest]:
     for machine in machines:
         robot = machine.robot
         q = np.array([machine.coordinates.get(f.name, 0.0) for f in robot.frames])
-        found = simulate_assembly(
+        assembly = simulate_assembly(
             _Placed(robot, q),
             load=machine.load,
             gravity=machine.gravity if machine.gravity.any() else None,
             elements=_ELEMENTS,
             clearances=any(f.clearance is not None for f in robot.frames),
         )
-        yield Rest(found.transforms, found.joint_wrenches, found.joint_screws)
+        yield Rest(assembly.transforms, assembly.joint_wrenches, assembly.joint_screws)
 
 
 PROGRAMS: dict[str, Callable[[Sequence[Machine]], Iterable[Rest]]] = {

@@ -1,23 +1,23 @@
 """The same machine with springs at its beams' tips, all rows of a campaign at once.
 
-A second program, for campaigns by the hundred.  Motions are finite and the equilibrium
+A second, faster program.  Motions are finite and the equilibrium
 is found on the deformed machine, as in the multibody simulation; a beam is its
-compliance at its tip instead of elements, which differs where a beam bends so far that
-it is no spring any more.  Play in closed loops is left to the multibody simulation.
+compliance at its tip instead of elements, which differs under large deflections.
+Clearances in closed loops need the multibody simulation.
 
 Unknown are the passive joints' motions q and the wrench l of each closure.  Given them,
-every spring gives way under what it carries, the frames follow, and what is left is
+the springs deform under their wrenches, and the frames follow; the residuals are
 
-    r = what each closure leaves open,        t = moments about passive joints' axes.
+    r = errors of the closures,        t = moments about passive joints' axes.
 
-Newton's step uses the nominal posture, as springs hardly move: with a_j the axis of
+Newton's step uses the nominal posture, as springs deform little: with a_j the axis of
 joint j and s_kj = +1, -1 on the closure's first and second chain,
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
-S the compliance met by each pair of closures.  Steps are of least norm: idle rotations
-stay, and overconstrained rigid loops share as little as they can.  Screws and wrenches
+S the compliance between each pair of closures.  Steps are of least norm, in idle
+rotations and in the wrenches of overconstrained rigid loops.  Screws and wrenches
 are read at the base origin in base axes unless said otherwise.
 """
 
@@ -36,14 +36,14 @@ from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
-_STILL = 1e-12  # [rad, m] of the last step
-_LOST = 1e3  # [rad, m] of a coordinate: the steps diverge
+_CONVERGED = 1e-12  # [rad, m] of the last step
+_DIVERGED = 1e3  # [rad, m] of a coordinate: the steps diverge
 _RANK = 1e-10  # singular values below it, relative, are of idle motions
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
-    """Machines of one structure taken apart; k machines of n frames.
+class _SpringModel:
+    """Arrays of k machines of one structure, with n frames.
 
     Attributes:
         robot: one of theirs.
@@ -53,7 +53,7 @@ class _Parts:
         passive: rows whose motion is free.
         pairs: (closures, 2) rows.
         signs: (closures, n) +1 on the first chain, -1 on the second.
-        shut: (k, closures, 4, 4) second frame seen from the first, nominally.
+        closed: (k, closures, 4, 4) second frame seen from the first, nominally.
     """
 
     robot: Robot
@@ -63,20 +63,20 @@ class _Parts:
     passive: list[int]
     pairs: NDArray
     signs: NDArray
-    shut: NDArray
+    closed: NDArray
 
 
 def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     """Equilibria of machines whose links are springs.
 
     Args:
-        machines: of one structure, without play in their joints.
+        machines: of one structure, without clearances.
 
     Returns:
-        Where everything of each is.
+        The equilibrium of each.
 
     Raises:
-        SimulationFailed: a joint plays, or there is no equilibrium.
+        SimulationFailed: a joint has clearance, or there is no equilibrium.
     """
     robot = machines[0].robot
     if any(f.clearance is not None for m in machines for f in m.robot.frames):
@@ -84,7 +84,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     q = np.array([
         [m.coordinates.get(f.name, 0.0) for f in m.robot.frames] for m in machines
     ])
-    parts = _taken_apart(machines, q)
+    parts = _spring_model(machines, q)
     newton, unit = _newton(parts, q)
     size = 6 * len(parts.pairs)
     wrenches = np.zeros((len(q), len(parts.pairs), 6))
@@ -92,53 +92,59 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # a spring answers what it carries half-way: read at an end, it would not be
-        # the derivative of an energy
-        halfway = ends @ np.linalg.inv(_deflected(screws / 2))
+        # wrenches are read half-way along the deformation: read at an end, they would
+        # not be the derivative of an energy
+        halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
-        still = np.abs(new - screws).max() < _STILL
+        converged = np.abs(new - screws).max() < _CONVERGED
         screws = new
         ends = _forward(parts, q, screws)
-        left = _left_open(parts, ends[1]).reshape(len(q), size)
+        errors = _closure_errors(parts, ends[1]).reshape(len(q), size)
         axes = _axes(parts, ends[1])
         moments = np.einsum("kai,kai->ka", axes, carried[1][:, parts.passive])
-        residual = np.concatenate([left, unit * moments], axis=1)
+        residual = np.concatenate([errors, unit * moments], axis=1)
         move = np.einsum("kij,kj->ki", newton, residual)
         wrenches = wrenches + move[:, :size].reshape(wrenches.shape) / unit
         q[:, parts.passive] += move[:, size:]
-        if not np.abs(q).max() < _LOST:
+        if not np.abs(q).max() < _DIVERGED:
             break
-        open_ = max(np.abs(left).max(initial=0), np.abs(move[:, size:]).max(initial=0))
-        if still and open_ < _STILL:
-            met = _at_frames(ends[1], carried[1])
-            return [Rest(*one) for one in zip(ends[1], met, screws[1], strict=True)]
+        step = np.abs(move[:, size:]).max(initial=0)
+        if converged and max(np.abs(errors).max(initial=0), step) < _CONVERGED:
+            wrench = _at_frames(ends[1], carried[1])
+            return [Rest(*one) for one in zip(ends[1], wrench, screws[1], strict=True)]
     raise SimulationFailed(robot.name, "springs do not come to rest")
 
 
-def _taken_apart(machines: Sequence[Machine], q: NDArray) -> _Parts:
+def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     """Compliances, places and chains of machines."""
     robot = machines[0].robot
     drawn = _placements(np.array([
         [[*f.rotation, *f.translation] for f in m.robot.frames] for m in machines
     ]))  # fmt: skip
     placed = drawn @ _placements(np.array([m.robot.errors for m in machines]))
-    nominal = _chained(robot, drawn, np.broadcast_to(np.eye(4), drawn.shape), q)
+    nominal = _chain(robot, drawn, np.broadcast_to(np.eye(4), drawn.shape), q)
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     on_path = robot.on_path.astype(float)
     signs = [on_path[a] - on_path[b] for a, b in pairs]
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
-    shut = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
+    closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
     known: dict[int, tuple[NDArray, NDArray]] = {}  # frames are shared among rows
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
             known[id(frame)] = _compliances(frame)
     compliances = [[known[id(f)] for f in m.robot.frames] for m in machines]
-    return _Parts(
-        robot, placed, np.moveaxis(np.array(compliances), 2, 0), nominal, passive,
-        np.stack([first, second], axis=1), np.reshape(signs, (-1, q.shape[1])), shut,
-    )  # fmt: skip
+    return _SpringModel(
+        robot=robot,
+        placed=placed,
+        compliances=np.moveaxis(np.array(compliances), 2, 0),
+        nominal=nominal,
+        passive=passive,
+        pairs=np.stack([first, second], axis=1),
+        signs=np.reshape(signs, (-1, q.shape[1])),
+        closed=closed,
+    )
 
 
 def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
@@ -162,7 +168,7 @@ def _placements(screws: NDArray) -> NDArray:
     return T
 
 
-def _deflected(screws: NDArray) -> NDArray:
+def _deflections(screws: NDArray) -> NDArray:
     """(..., 4, 4) of springs' screws (..., 6), translations in axes turned half-way."""
     half = screws.copy()
     half[..., :3] /= 2
@@ -172,13 +178,13 @@ def _deflected(screws: NDArray) -> NDArray:
     return T
 
 
-def _chained(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """(k, n, 4, 4) frames; a step leads to each body's end, another through its joint.
+def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
+    """(k, n, 4, 4) frames by products along the chains.
 
     Args:
         robot: whose tree it is.
         steps: (k, n, 4, 4) from the parent's joint.
-        ends: (k, n, 4, 4) what comes then, before the joint's own motion.
+        ends: (k, n, 4, 4) after the step, before the joint's own motion.
         q: (k, n) [rad or m] the joints' own motions.
 
     Returns:
@@ -198,10 +204,10 @@ def _chained(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray
     return T
 
 
-def _forward(parts: _Parts, q: NDArray, screws: NDArray) -> NDArray:
+def _forward(parts: _SpringModel, q: NDArray, screws: NDArray) -> NDArray:
     """(2, k, n, 4, 4) frames at the bodies' ends, and behind the joints' springs."""
-    links, joints = _deflected(screws)
-    before = _chained(parts.robot, parts.placed @ links, joints, q)
+    links, joints = _deflections(screws)
+    before = _chain(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
 
 
@@ -214,7 +220,7 @@ def _maps(T: NDArray) -> NDArray:
     return A
 
 
-def _axes(parts: _Parts, T: NDArray) -> NDArray:
+def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
     """(k, passive, 6) screws of unit motions."""
     own = [parts.robot.frames[i].own_axis for i in parts.passive]
     maps = _maps(T[:, parts.passive])
@@ -222,22 +228,22 @@ def _axes(parts: _Parts, T: NDArray) -> NDArray:
     return np.stack(columns, axis=1) if columns else np.zeros((len(T), 0, 6))
 
 
-def _newton(parts: _Parts, q: NDArray) -> tuple[NDArray, float]:
-    """Inverses of the matrix of the head, and the compliance that scales wrenches."""
+def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
+    """Inverses of Newton's matrix, and the compliance that scales wrenches."""
     # rows of one configuration and the same springs have the same matrix
-    told_apart = np.hstack([
+    distinct = np.hstack([
         q,
         parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
     ])
-    first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)[
+    first, same = np.unique(distinct, axis=0, return_index=True, return_inverse=True)[
         1:
     ]
     nominal, C = parts.nominal[first], parts.compliances.sum(axis=0)[first]
     machines, passive = len(first), len(parts.passive)
     size = 6 * len(parts.pairs)
     maps, s = _maps(nominal), parts.signs
-    met = maps @ C @ np.swapaxes(maps, -1, -2)
-    S = np.einsum("an,bn,knij->kaibj", s, s, met, optimize=True)
+    at_base = maps @ C @ np.swapaxes(maps, -1, -2)
+    S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
     # a closure's wrench passes a joint if the joint is on one of its chains only
@@ -253,7 +259,7 @@ def _newton(parts: _Parts, q: NDArray) -> tuple[NDArray, float]:
 
 
 def _carried(
-    machines: Sequence[Machine], parts: _Parts, ends: NDArray, closing: NDArray
+    machines: Sequence[Machine], parts: _SpringModel, ends: NDArray, closing: NDArray
 ) -> NDArray:
     """(2, k, n, 6) wrenches through each body's end and through its joint."""
     robot, (bodies, before) = parts.robot, ends
@@ -266,7 +272,7 @@ def _carried(
         carried[1, :, b] -= closing[:, k]
     gravity = np.array([m.gravity for m in machines])
     if gravity.any():
-        _weigh(machines, gravity, bodies, carried)
+        _add_weights(machines, gravity, bodies, carried)
     for i in range(before.shape[1] - 1, -1, -1):  # parents come first
         carried[0, :, i] += carried[1, :, i]
         if robot.parents[i] >= 0:
@@ -274,7 +280,7 @@ def _carried(
     return carried
 
 
-def _weigh(
+def _add_weights(
     machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
 ) -> None:
     """Weights of the first machine's bodies; a beam's at its ends, with end moments."""
@@ -315,10 +321,10 @@ def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
     return np.einsum("...ij,...i->...j", _maps(T), wrenches)
 
 
-def _left_open(parts: _Parts, before: NDArray) -> NDArray:
-    """(k, closures, 6) [rad, m] of second frames from where they should be."""
+def _closure_errors(parts: _SpringModel, before: NDArray) -> NDArray:
+    """(k, closures, 6) [rad, m] of second frames from their closed positions."""
     first, second = parts.pairs.T
-    target, T = before[:, first] @ parts.shut, before[:, second]
+    target, T = before[:, first] @ parts.closed, before[:, second]
     turn = (T[..., :3, :3] @ np.swapaxes(target[..., :3, :3], -1, -2)).reshape(-1, 3, 3)
     angles = Rotation.from_matrix(turn).as_rotvec() if len(turn) else np.zeros((0, 3))
     angles = angles.reshape(*T.shape[:2], 3)

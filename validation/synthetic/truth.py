@@ -1,4 +1,4 @@
-"""What is hidden in a synthetic campaign, in the layout of the practice campaigns."""
+"""Hidden effects of a synthetic campaign, in the practice campaigns' layout."""
 
 from typing import Any
 
@@ -45,8 +45,8 @@ def truth_of(
 
     Args:
         campaign: with what is hidden in it.
-        verdict: what an honest diagnosis says; if absent, the one of a design that
-            tells the effects apart.
+        verdict: of a correct diagnosis; if absent, that of a design that distinguishes
+            the effects.
         accept: sets of effects that explain the data as well.
         note: why.
 

@@ -10,10 +10,14 @@ from stiffness.beam.sections import round_section
 from stiffness.fem.adaptive_step import estimated_error, solve_level
 from stiffness.fem.condensation import condense, rigid_motions
 from stiffness.fem.elements import integration, isoparametric, lame
-from stiffness.fem.error_indicator import error_matrices, shape_errors, traction_errors
+from stiffness.fem.error_indicator import (
+    error_matrices,
+    geometry_errors,
+    traction_errors,
+)
 from stiffness.fem.material import Material
 from stiffness.link import inverted, scaled
-from stiffness.mesh.edge_grading import without_chords
+from stiffness.mesh.edge_grading import split_joining_edges
 from stiffness.mesh.lagrange import lattice, quadrature
 from stiffness.surface.primitives import Cone
 from tests.solids_for_tests import Z, bar_solid, box_solid, with_plane_sides
@@ -128,7 +132,7 @@ def shifted(excess, kind="distributing-both"):
     solution = condense(mesh, lam, mu, np.array([[0, 0, 0], [0, 0, 0.25]]), kind)
     side = Cone(np.zeros(3), Z, R * (1 + excess))
     shapes = (*solid.shapes[:2], side)
-    each = shape_errors(mesh, shapes, solution.fields, lam, mu)
+    each = geometry_errors(mesh, shapes, solution.fields, lam, mu)
     return inverted(solution.stiffness), each
 
 
@@ -154,7 +158,7 @@ def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess)
 def test_only_round_faces_of_bent_elements_can_leave_their_shapes():
     """Interfaces are planes; a face's share is that of its own piece of the side."""
     level = bar(1, 6)
-    each = shape_errors(
+    each = geometry_errors(
         level.mesh, level.solid.shapes, level.solution.fields, *constants(level.mesh)
     )
     side = level.mesh.patch == 2
@@ -261,7 +265,7 @@ def test_each_motion_has_its_own_factor():
 
 def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
     """The same tetrahedra without parts: more than twice the error in bending."""
-    solid = without_chords(bar_solid(2, 12, R, L), (0, 1))
+    solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))
     mesh = isoparametric(solid)
     centers = np.array([[0, 0, 0], [0, 0, L]])
     whole = condense(mesh, *constants(mesh), centers).stiffness

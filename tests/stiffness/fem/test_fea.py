@@ -13,7 +13,7 @@ from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.fem.sparse_solver import SolverFailed, solve, solver_name
 from stiffness.link import inverted, scaled
-from stiffness.mesh.edge_grading import layered, without_chords
+from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import lattice
 from stiffness.mesh.mesh import Solid
 from stiffness.screws import rotation_matrix, screw_map
@@ -47,7 +47,7 @@ def crooked(rng):
 
 
 def curved_mesh(order, layers=False):
-    solid = without_chords(bar_solid(1, 3, 0.04, 0.2), (0, 1))
+    solid = split_joining_edges(bar_solid(1, 3, 0.04, 0.2), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
     assert mesh.curved.sum() > 30
@@ -90,7 +90,7 @@ def test_six_rigid_motions_cost_nothing(order, layers):
 )
 def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
     """The patch test: inner nodes find the linear field that the boundary has."""
-    solid = without_chords(crooked(rng), (0, 1))
+    solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
     upper = assemble(mesh, *constants(mesh))

@@ -42,9 +42,9 @@ def test_inner_edges_without_a_fillet_are_named():
     do its clamped outlines count, which are further away than is looked."""
     whole = notched(lambda x: np.full(len(x), True))
     notch = notched(lambda x: (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1))
-    assert not whole.inner_edges
+    assert not whole.reentrant_edges
     assert "inner edges" not in whole.region
-    assert notch.inner_edges
+    assert notch.reentrant_edges
     assert "inner edges without a fillet" in notch.region
 
 

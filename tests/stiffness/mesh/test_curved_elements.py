@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
-from stiffness.fem.error_indicator import shape_errors
-from stiffness.mesh.curved_elements import curved, without_folds
-from stiffness.mesh.edge_grading import layered, without_chords
+from stiffness.fem.error_indicator import geometry_errors
+from stiffness.mesh.curved_elements import curved_elements, refine_inverted
+from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import lattice, shape_functions
 from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.surface.primitives import Plane, Sphere
@@ -43,7 +43,7 @@ def shell(counts, inner, outer):
 
 def layers_of_bar(rings, layers, order):
     held = (0, 1)
-    solid = without_chords(bar_solid(rings, layers, 0.04, 0.2), held)
+    solid = split_joining_edges(bar_solid(rings, layers, 0.04, 0.2), held)
     return isoparametric(solid, order), isoparametric(
         solid, order, layered(solid, held)
     )
@@ -132,7 +132,7 @@ def test_a_wall_off_its_shape_is_energy_density_times_volume(number, sign):
     for excess in (0, 1e-4):
         shapes = list(solid.shapes)
         shapes[number] = Sphere(np.zeros(3), radius * (1 + excess))
-        each = shape_errors(mesh, shapes, field, lam * ones, mu * ones)
+        each = geometry_errors(mesh, shapes, field, lam * ones, mu * ones)
         found.append(each[mesh.patch == number].sum() / density)
     taken = sign * SOLID_ANGLE * radius**3 * 1e-4
     assert found[1] - found[0] == pytest.approx(taken, rel=1e-5)
@@ -149,8 +149,8 @@ def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
     """A face that bulges by a quarter of the wall would fold its tetrahedron: these
     are straightened; each has the hand of its straight corners everywhere."""
     solid = shell(counts, inner, 1.0)
-    bent = curved(solid, order)
-    assert bent.folded.any()
+    bent = curved_elements(solid, order)
+    assert bent.inverted.any()
     corners = solid.points[bent.cells[:, :4]]
     hand = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     _, dN = shape_functions(order, lattice(order) / order)
@@ -166,12 +166,12 @@ def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
     solid = shell(counts, inner, 1.0)
     error = [
         abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)
-        for s in (solid, without_folds(solid, 3))
+        for s in (solid, refine_inverted(solid, 3))
     ]
     assert error[1] < error[0] / 2
 
 
 def test_what_does_not_fold_is_left_as_it_is():
     for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
-        assert not curved(solid, 3).folded.any()
-        assert without_folds(solid, 3) is solid
+        assert not curved_elements(solid, 3).inverted.any()
+        assert refine_inverted(solid, 3) is solid

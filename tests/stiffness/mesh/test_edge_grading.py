@@ -10,7 +10,12 @@ from hypothesis import strategies as st
 from stiffness.fem.condensation import KINDS, condense
 from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
 from stiffness.link import scaled
-from stiffness.mesh.edge_grading import SHARE, layered, singular_edges, without_chords
+from stiffness.mesh.edge_grading import (
+    LAYER_SHARE,
+    layered,
+    singular_edges,
+    split_joining_edges,
+)
 from stiffness.mesh.lagrange import FACES
 from stiffness.mesh.refine import edges_of
 from tests.solids_for_tests import (
@@ -109,7 +114,7 @@ def check_layers(solid, held):
 
 @pytest.mark.parametrize("held", CLAMPED)
 def test_layers_of_an_l_conform_and_lose_nothing(held):
-    solid = without_chords(corner_post(), held)
+    solid = split_joining_edges(corner_post(), held)
     check_chordless(solid, held)
     assert solid.volumes().sum() == pytest.approx(0.75 * SIZE.prod(), rel=1e-12)
     mesh, _ = check_layers(solid, held)
@@ -129,7 +134,9 @@ def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
         i, j, k = np.floor(centers / SIZE * counts).astype(int).T
         return np.array(kept)[4 * i + 2 * j + k]
 
-    solid = without_chords(with_plane_sides(masked_solid(counts, SIZE, keep)), held)
+    solid = split_joining_edges(
+        with_plane_sides(masked_solid(counts, SIZE, keep)), held
+    )
     check_chordless(solid, held)
     share = sum(kept) / len(kept)
     assert solid.volumes().sum() == pytest.approx(share * SIZE.prod(), rel=1e-12)
@@ -137,17 +144,17 @@ def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
 
 
 def test_the_layer_takes_its_share_of_each_edge():
-    """New corners lie at SHARE of the way from a singular corner to one that is not;
+    """New corners lie at LAYER_SHARE of the way from a singular corner to another one;
     old corners stay, and tetrahedra away from singular edges stay whole."""
     held = (0, 1)
-    solid = without_chords(corner_post(), held)
+    solid = split_joining_edges(corner_post(), held)
     parts = layered(solid, held)
     new = parts.corners >= len(solid.points)
     corners = np.sort(solid.cells, axis=1)[parts.parent]
     on = touched(solid, held)[corners]
     places = parts.places[new]
     of = np.broadcast_to(on[:, None, :], parts.places.shape)[new]
-    shares = np.tile([0, 0, SHARE, 1 - SHARE], (len(places), 1))
+    shares = np.tile([0, 0, LAYER_SHARE, 1 - LAYER_SHARE], (len(places), 1))
     np.testing.assert_allclose(np.sort(places, axis=1), shares, rtol=1e-12)
     assert of[places > 0.5].all()
     assert not of[(places > 0) & (places < 0.5)].any()
@@ -158,7 +165,7 @@ def test_the_layer_takes_its_share_of_each_edge():
 
 def test_a_layer_of_another_share_is_as_thin():
     held = (0,)
-    solid = without_chords(box_solid((2, 2, 2), (0.2, 0.2, 0.2)), held)
+    solid = split_joining_edges(box_solid((2, 2, 2), (0.2, 0.2, 0.2)), held)
     new = layered(solid, held, share=0.1).places
     found = np.unique(np.round(new, 12))
     np.testing.assert_allclose(found, [0, 0.1, 0.9, 1])
@@ -172,7 +179,7 @@ def test_a_richer_space_gives_a_softer_link(kind):
     """On a box the geometry is exact: quadratic fields are cubic ones, and those of
     whole elements are those of their parts; K falls in every direction."""
     held = (0, 1)
-    solid = without_chords(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
+    solid = split_joining_edges(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), held)
     parts = layered(solid, held)
     centers = np.array([[0.025, 0.04, 0], [0.025, 0.04, 0.2]])
 
@@ -195,6 +202,6 @@ def test_a_richer_space_gives_a_softer_link(kind):
 def test_a_smooth_box_stays_whole():
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     assert len(singular_edges(solid, ())) == 0
-    assert without_chords(solid, ()).cells.shape == solid.cells.shape
+    assert split_joining_edges(solid, ()).cells.shape == solid.cells.shape
     mesh = isoparametric(solid, 3, layered(solid, ()))
     assert len(mesh.nodes) == prod(3 * n + 1 for n in (2, 2, 3))

@@ -18,19 +18,16 @@ from stiffness.beam.sections import rectangular_section, round_section
 from stiffness.fem.adaptive_step import estimated_error, solve_level
 from stiffness.fem.material import Material
 from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.report import library as library_module
+from stiffness.report import library_build
 from stiffness.report.export import library_csv, stiffness_for, translations_first
 from stiffness.report.library import (
     Entry,
-    Spec,
-    build_library,
-    entry_key,
     look_up,
     read_compliance,
     read_entry,
     read_library,
-    read_spec,
 )
+from stiffness.report.library_build import Spec, build_library, entry_key, read_spec
 from stiffness.report.library_surface import SurfaceLink
 from stiffness.surface.beam_surfaces import SHAPES, shape_beam, shape_surface
 from tests.solids_for_tests import bar_solid
@@ -69,7 +66,7 @@ def test_entries_hold_what_they_were_made_for(spec):
 
 def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
     made = []
-    whole = library_module._make_entry
+    whole = library_build._make_entry
 
     def stops_after_four(spec, point):
         if len(made) == 4:
@@ -77,13 +74,13 @@ def test_a_build_goes_on_where_it_was_stopped(spec, monkeypatch):
         made.append(point)
         whole(spec, point)
 
-    monkeypatch.setattr(library_module, "_make_entry", stops_after_four)
+    monkeypatch.setattr(library_build, "_make_entry", stops_after_four)
     with pytest.raises(KeyboardInterrupt):
         build_library(spec)
     assert len(read_library(spec.folder)) == 4
     seen = []
     monkeypatch.setattr(
-        library_module, "_make_entry", lambda s, p: (seen.append(p), whole(s, p))
+        library_build, "_make_entry", lambda s, p: (seen.append(p), whole(s, p))
     )
     build_library(spec)
     assert len(seen) == 5
@@ -540,7 +537,7 @@ def test_a_build_that_fails_leaves_no_folder(tmp_path, monkeypatch):
     def fail(*_):
         raise BadInput("no link")
 
-    monkeypatch.setattr("stiffness.report.library._solve_point", fail)
+    monkeypatch.setattr("stiffness.report.library_build._solve_point", fail)
     with pytest.raises(BadInput, match="no link"):
         build_library(spec)
     assert not spec.folder.exists()

@@ -11,7 +11,7 @@ from assembly.model.error_distributions import read_sources
 from forcefit.inputs.table import BadInput
 from tests.campaigns_for_tests import HEAD, NOISE, ROWS, write_campaign
 from validation.campaign.campaign_file import read_campaign
-from validation.study.study import read_study
+from validation.study.study_file import read_study
 
 LIGHT = settings(
     max_examples=300,

@@ -14,7 +14,7 @@ from stiffness.fem.elements import assemble, isoparametric, lame
 from tests.solids_for_tests import box_solid
 from validation.crosscheck.crosscheck import crosscheck
 from validation.crosscheck.link_models import link_models
-from validation.multibody.exudyn_parts import MeshBody, Solid
+from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 from validation.multibody.motion import placement
 from validation.multibody.simulation import simulate_assembly
 
@@ -34,7 +34,7 @@ def block():
     centers = np.array([[*SIZE[:2] / 2, 0], [*SIZE[:2] / 2, SIZE[2]]])
     upper = assemble(mesh, *constants)
     turn = placement(TURN, np.zeros(3))[:3, :3]
-    meshed = Solid(
+    meshed = MeshedSolid(
         nodes=mesh.nodes,
         stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
         base=np.unique(mesh.faces[mesh.patch == 0]),
@@ -104,7 +104,7 @@ def test_a_robot_of_meshed_links_passes_with_solids():
     posture = home_posture(Robot("meshed", "a", frames, (("a", "b"),)))
     answer = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
     assert answer.passed, answer.checks
-    assert max(check.value for check in answer.limits.values()) < 1e-3
+    assert max(check.value for check in answer.metric.limits.values()) < 1e-3
 
 
 def test_an_unknown_kind_of_link_is_refused():

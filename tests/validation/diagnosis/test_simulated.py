@@ -6,14 +6,14 @@ import pytest
 from assembly.model.robot import BeamLink, Frame, Robot
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.diagnose import diagnose
-from validation.synthetic.design import Design
+from validation.synthetic.design import CampaignDesign
 from validation.synthetic.effects import LIBRARY
 from validation.synthetic.equivalents import SAME, alternatives
 from validation.synthetic.generator import generate_campaign, write_campaign
 
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
-DESIGN = Design(configurations=16, rows=80, load=40.0, reach=0.8)
+DESIGN = CampaignDesign(configurations=16, rows=80, load=40.0, reach=0.8)
 WIDE = {"geometric_stiffening": 30.0}  # needs larger errors to show
 
 
@@ -39,7 +39,7 @@ def understood(wanted, seed, tmp_path):
         reference_point=[0.02, 0.05, 0.03],
     )  # fmt: skip
     write_campaign(made, tmp_path / "campaign")
-    same = [one for one in alternatives(made, len(wanted)) if one.left < SAME]
+    same = [one for one in alternatives(made, len(wanted)) if one.residual < SAME]
     allowed = {tuple(sorted(n.partition("(")[0] for n in one.names)) for one in same}
     found = diagnose(read_campaign(tmp_path / "campaign"))
     return found, allowed | {tuple(sorted(wanted))}

@@ -16,9 +16,10 @@ from assembly.report.pose_errors import pose_error_of
 from assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
-from validation.study.headline import worst_play
+from validation.study.headline import worst_clearance
 from validation.study.report import report_page, results_table, verdict, write_study
-from validation.study.study import read_study, run_study
+from validation.study.study import run_study
+from validation.study.study_file import read_study
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "irsbot2.toml"
 SMALL = """
@@ -217,7 +218,7 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"
     found = run_study(read_study(study_file(tmp_path, text)))
-    worst = worst_play(found)
+    worst = worst_clearance(found)
     bounds = pose_error_of(place_robot(found.robot, found.study.pose), ["frozen"])
     here = bounds["error"]["frozen"]["translation"]["upper"]
     assert worst["pose"]["translation"] == pytest.approx(here, abs=1e-6)

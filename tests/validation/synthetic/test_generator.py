@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from assembly.model.robot import BeamLink, Frame, Robot
-from validation.synthetic.design import Design
+from validation.synthetic.design import CampaignDesign
 from validation.synthetic.effects import Row
 from validation.synthetic.generator import generate_campaign
 from validation.synthetic.machine import Hidden, simulate_readings
@@ -218,7 +218,7 @@ def test_what_a_linear_model_misses_is_added(added):
     """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
-    design = Design(configurations=2, rows=2, load=0.0)
+    design = CampaignDesign(configurations=2, rows=2, load=0.0)
     wanted = [(Hidden("geometric_stiffening", {}), 5.0)]
     campaign = generate_campaign(robot, wanted, design, seed=3)
     for i, where in enumerate(campaign.plan.rows):

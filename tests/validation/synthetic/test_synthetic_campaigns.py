@@ -21,7 +21,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
 from validation.campaign.campaign_file import read_campaign
 from validation.multibody.simulation import without_clearance
-from validation.synthetic.design import Design, plan_campaign
+from validation.synthetic.design import CampaignDesign, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import LIBRARY, Row
 from validation.synthetic.equivalents import alternatives
@@ -32,7 +32,7 @@ from validation.synthetic.truth import truth_of
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))
-SMALL = Design(configurations=8, rows=40, load=20.0)
+SMALL = CampaignDesign(configurations=8, rows=40, load=20.0)
 TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 
@@ -102,7 +102,7 @@ def test_both_programs_agree(name):
     rng = np.random.default_rng(5)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(5e-5 * rng.uniform(-1, 1, (len(robot.frames), 6)))
-    design = Design(configurations=2, rows=2, reach=0.1, load=20.0)
+    design = CampaignDesign(configurations=2, rows=2, reach=0.1, load=20.0)
     rows = plan_campaign(robot, design, rng).rows
     drives = {f.name: 2e-5 for f in robot.frames if f.actuated}
     effects = [Hidden("encoder_offset", drives), Hidden("self_weight", {"g.z": -9.81})]
@@ -119,7 +119,7 @@ def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
     rng = np.random.default_rng(6)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
-    design = Design(configurations=3, rows=3, reach=0.1, load=80.0)
+    design = CampaignDesign(configurations=3, rows=3, reach=0.1, load=80.0)
     rows = plan_campaign(robot, design, rng).rows
     point = np.array([0.03, 0.05, 0.02])
     springs = simulate_readings(robot, point, rows, (), "springs")
@@ -167,7 +167,7 @@ def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):
 
 def test_a_pose_can_be_commanded(tmp_path):
     robot = without_clearance(load_robot("hexapod"))
-    design = Design(configurations=3, rows=3, reach=0.1, command="pose")
+    design = CampaignDesign(configurations=3, rows=3, reach=0.1, command="pose")
     campaign = quick({}, robot, design=design)
     write_campaign(campaign, tmp_path / "c")
     read = read_campaign(tmp_path / "c")
@@ -226,7 +226,7 @@ def test_committed_campaigns_are_what_their_truth_says(name):
 
 def left(campaign):
     """What each effect leaves of 240 readings at 5 sigma, 6000; second order: < 0.1."""
-    return {one.names[0]: one.left for one in alternatives(campaign)}
+    return {one.names[0]: one.residual for one in alternatives(campaign)}
 
 
 def test_a_warm_link_is_a_long_one_only_while_the_temperature_stays():
@@ -251,10 +251,10 @@ def test_softer_links_are_a_larger_load_if_nothing_else_yields():
 )
 def test_an_effect_is_its_own_best_explanation(name):
     found = alternatives(quick({name: 5.0}, seed=6))
-    own = min(one.left for one in found if one.names[0].startswith(name))
+    own = min(one.residual for one in found if one.names[0].startswith(name))
     bound = 60.0 if name in ("drift", "contact_stiffening") else 1.0
     assert own < bound  # a time constant and contacts beside springs are not linear
-    assert own <= min(one.left for one in found) + 1.0
+    assert own <= min(one.residual for one in found) + 1.0
 
 
 def test_what_cannot_be_hidden_is_refused():
@@ -262,15 +262,15 @@ def test_what_cannot_be_hidden_is_refused():
     with pytest.raises(NotApplicable):
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
     # loads too small to show it; a drive none reaches is the same
-    away = Design(configurations=8, rows=40, load=1e-3)
+    away = CampaignDesign(configurations=8, rows=40, load=1e-3)
     with pytest.raises(NotApplicable, match="hardly show it"):
         quick({"drive_compliance": 5.0}, design=away)
     with pytest.raises(BadInput, match='found "gravity"'):
         draw_effect("gravity", two_axes(), 1.0, rng)
     with pytest.raises(BadInput, match="configurations"):
-        Design(configurations=5, rows=4)
+        CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
-        Design(temperature="warm")
+        CampaignDesign(temperature="warm")
 
 
 def test_stronger_effects_keep_their_shape():

@@ -11,14 +11,14 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
-from validation.crosscheck.playcheck import playcheck
+from validation.crosscheck.crosscheck import crosscheck
 from validation.crosscheck.verdict import verdict
 from validation.multibody.contact import (
-    Cone,
-    Play,
+    ClearanceCone,
+    JointClearance,
     cone_energy,
-    cone_pushes,
-    joint_play,
+    cone_forces,
+    joint_clearance,
 )
 from validation.multibody.exudyn_parts import OutOfTime
 from validation.multibody.simulation import simulate_assembly
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.exudyn
 E, NU = 60e9, 0.3
 ROUND = BeamLink({"radius": 0.04}, E, NU)
 AREA, SECOND = math.pi * 0.04**2, math.pi * 0.04**4 / 4
-DISC = Cone((3, 4), 3e-5, 1e12)
+DISC = ClearanceCone((3, 4), 3e-5, 1e12)
 
 
 def coaxial(error, clearance, length=0.4):
@@ -46,7 +46,7 @@ def coaxial(error, clearance, length=0.4):
 def push(cone, screw, width):
     """(6,) all that a contact pushes with."""
     wrench = np.zeros(6)
-    for row, value in cone_pushes(cone, screw, width):
+    for row, value in cone_forces(cone, screw, width):
         wrench[row] += value
     return wrench
 
@@ -86,11 +86,11 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
     At z = h the axis is at (TX + h RY, TY - h RX).
     """
     play = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
-    bushes = joint_play(Frame("f", clearance=play), bushes=True)
+    bushes = joint_clearance(Frame("f", clearance=play), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
         ((5,), 1e-5, 0.0), ((3, 4), 3e-5, 0.04), ((3, 4), 3e-5, -0.04)
     ]  # fmt: skip
-    assert bushes.loose == (0, 1, 3, 4, 5)
+    assert bushes.unlocked == (0, 1, 3, 4, 5)
     _, far, near = bushes.cones
     tilted = [0, 7.5e-4, 0, 0, 0, 0]
     assert far.offsets(tilted) == pytest.approx([3e-5, 0])
@@ -103,17 +103,17 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
 def test_a_joints_play_follows_the_format():
     """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
     play = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
-    fixed = joint_play(Frame("f", clearance=play), scale=0.5)
+    fixed = joint_clearance(Frame("f", clearance=play), scale=0.5)
     assert [(c.rows, c.size) for c in fixed.cones] == [
         ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
     ]  # fmt: skip
     assert fixed.free == ()
     pin = Frame("p", joint="revolute", clearance=replace(play, spin=None))
-    assert joint_play(pin).free == (2,)
-    assert sorted(joint_play(pin).loose) == [0, 1, 2, 3, 4]
+    assert joint_clearance(pin).free == (2,)
+    assert sorted(joint_clearance(pin).unlocked) == [0, 1, 2, 3, 4]
     slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
-    assert [c.rows for c in joint_play(slide).cones] == [(3, 4), (5,)]
-    assert joint_play(Frame("none")) == Play((), ())
+    assert [c.rows for c in joint_clearance(slide).cones] == [(3, 4), (5,)]
+    assert joint_clearance(Frame("none")) == JointClearance((), ())
 
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
@@ -142,9 +142,9 @@ def test_a_slow_simulation_ends_in_time_and_says_so(pause, monkeypatch):
 
     def slowly(*args):
         time.sleep(pause)
-        return cone_pushes(*args)
+        return cone_forces(*args)
 
-    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", slowly)
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_forces", slowly)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5, radial=1e-5))
     limit = 0.3 if pause else 0.03
     started = time.monotonic()
@@ -169,7 +169,7 @@ def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_pushes", interrupted)
+    monkeypatch.setattr(validation.multibody.exudyn_model, "cone_forces", interrupted)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
         simulate_assembly(posture, clearances=True)
@@ -200,11 +200,15 @@ def irsbot2():
 @pytest.mark.slow
 def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
     """Within 2 per cent at no error; the optimality gap falls with the square."""
-    answer = playcheck(place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25))
+    answer = crosscheck(
+        place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}),
+        (1.0, 0.5, 0.25),
+        clearances=True,
+    )
     assert answer.passed, answer.checks
     # contacts of 1e9 N m/rad yield 4e-4 of what links of 1e6 N m/rad do
-    assert answer.limits["spring deformation"].value < 5e-3
-    assert answer.gaps[0] > answer.gaps[1] > answer.gaps[2] > 0
+    assert answer.metric.limits["spring deformation"].value < 5e-3
+    assert answer.metric.gaps[0] > answer.metric.gaps[1] > answer.metric.gaps[2] > 0
 
 
 def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
@@ -213,27 +217,27 @@ def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
     Contacts leave 0.3 per cent at most; the linear energy is off by several.
     """
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
-    answer = playcheck(posture, (1.0, 0.5), links="spring")
+    answer = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert answer.passed, answer.checks
-    assert abs(answer.energies["exact"][0]) < 3e-3
-    assert abs(answer.energies["linear"][0]) > 1e-2
+    assert abs(answer.metric.energies["exact"][0]) < 3e-3
+    assert abs(answer.metric.energies["linear"][0]) > 1e-2
 
 
 @pytest.mark.slow
 def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
     """Clearances a fifth larger in the linear model move its least energy."""
     import assembly.linear.closure
-    import validation.crosscheck.playcheck
+    import validation.crosscheck.crosscheck
 
     right = assembly.linear.closure.clearance_bounds
     monkeypatch.setattr(
         assembly.linear.closure, "clearance_bounds", lambda *args: 1.2 * right(*args)
     )
     monkeypatch.setattr(
-        validation.crosscheck.playcheck, "exact_answer", lambda *_: None
+        validation.crosscheck.crosscheck, "exact_solution", lambda *_: None
     )
     posture = place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
-    assert not playcheck(posture, (0.5, 0.25)).passed
+    assert not crosscheck(posture, (0.5, 0.25), clearances=True).passed
 
 
 def heavy(length=0.4):
@@ -257,11 +261,13 @@ def test_weight_acts_beside_play(links):
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
-    answer = playcheck(heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0])
+    answer = crosscheck(
+        heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
+    )
     assert answer.passed, answer.text()
-    assert abs(answer.energies["exact"][0]) < 0.02
+    assert abs(answer.metric.energies["exact"][0]) < 0.02
     assert (answer.pairs[0].between > 0) == (links == "beam")
-    light = playcheck(heavy(), (1.0, 0.5), links=links)
+    light = crosscheck(heavy(), (1.0, 0.5), links=links, clearances=True)
     ratio = answer.pairs[0].linear.energy / light.pairs[0].linear.energy
     assert abs(ratio - 1) > 0.1
 
@@ -274,7 +280,9 @@ def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
     monkeypatch.setattr(
         assembly.linear.energy, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
     )
-    answer = playcheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0])
+    answer = crosscheck(
+        heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True
+    )
     assert not answer.passed
 
 
@@ -298,7 +306,7 @@ def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
     That says something of the overconstrained robot only: the others close without
     energy whatever their play.
     """
-    answer = playcheck(drawn(name, size, pose), (1.0, 0.5))
+    answer = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert answer.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert answer.pairs[0].simulated.energy < 1e-8
     assert verdict(answer) == said
@@ -314,6 +322,8 @@ def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):
 
     Parts of the five-bar stay loose under its load.
     """
-    answer = playcheck(home_posture(load_robot(name)), (1.0, 0.5), load=load)
+    answer = crosscheck(
+        home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
+    )
     assert answer.passed
-    assert 0 <= answer.gaps[0] < 0.02
+    assert 0 <= answer.metric.gaps[0] < 0.02

@@ -1,0 +1,217 @@
+"""Energies and springs of two models with clearances.
+
+Where no load acts on a clearance the minimum is not unique in the pose, so poses are
+not compared.  Unique are the least energy and the springs' deformations and wrenches.
+The simulated clearance screws are also put into the linear model: their energy there,
+beyond the least, is the optimality gap.  With springs as links the energy must also be
+that of the exact virtual-joint model, at full size.  Errors, clearances and load are
+scaled together by s; the linear energy is proportional to s^2, and the relative gap
+falls as s^2 too, down to the compliance of the contacts.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.linear.closure import linearise
+from assembly.linear.reduction import reduce_problem
+from assembly.model.links import link_compliance
+from assembly.model.robot import Robot
+from assembly.solvers.conic import into_cones
+from validation.crosscheck.limits import extrapolate, limit_difference, limit_of
+from validation.crosscheck.pair import Pair
+from validation.crosscheck.verdict import Check
+
+TOLERANCE = 0.02  # relative, of limits: contacts are compliant and smoothed
+FLOOR_ENERGY = 1e-4  # [J] at scale 1: of the springs that centre clearances
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceMetric:
+    """Differences of the energy and of springs, and the optimality gap.
+
+    Attributes:
+        robot: with its clearances.
+        pairs: both solutions at each scale, largest first.
+        springs: whether all links are springs in the simulation too.
+    """
+
+    robot: Robot
+    pairs: tuple[Pair, ...]
+    springs: bool
+
+    @property
+    def slope(self) -> float:
+        """NaN: poses are not unique, and not compared."""
+        return math.nan
+
+    @property
+    def scales(self) -> NDArray:
+        """(k,) factors, largest first."""
+        return np.array([pair.scale for pair in self.pairs])
+
+    @cached_property
+    def gaps(self) -> NDArray:
+        """(k,) optimality gap of the simulated clearance screws, relative.
+
+        The reference is the energy of closing without clearances, or the energy stored
+        under the load if that is more.
+        """
+        return np.array([optimality_gap(pair) for pair in self.pairs])
+
+    @cached_property
+    def signal(self) -> bool:
+        """Whether clearances or springs deform by more than the noise.
+
+        Inside an assembly zone both energies are zero, which is a result only if
+        closing without clearances would cost energy.
+        """
+        linear, s = self.pairs[0].linear, self.pairs[0].scale
+        return (
+            max(linear.energy_without_clearance, linear.energy) >= FLOOR_ENERGY * s**2
+        )
+
+    @cached_property
+    def limits(self) -> dict[str, Check]:
+        """Relative differences extrapolated to no imperfection."""
+        ours = np.array([pair.linear_energy for pair in self.pairs])
+        theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
+        gap = limit_of(self.scales**2, self.gaps)
+        energy = limit_difference(
+            self.scales, ours, theirs, 2, 0.0, TOLERANCE, FLOOR_ENERGY
+        )
+        limits = {
+            "energy": energy,
+            "spring deformation": self._strain_limit(),
+            "optimality gap": Check(gap[0], TOLERANCE, gap[1]),
+        }
+        return {k: replace(check, signal=self.signal) for k, check in limits.items()}
+
+    def _strain_limit(self) -> Check:
+        """Difference of all springs' deformations in the energy norm."""
+        frames = self.robot.frames
+        K = {"link_screws": np.zeros((len(frames), 6, 6))}
+        K["joint_screws"] = np.zeros((len(frames), 6, 6))
+        for i, frame in enumerate(frames):
+            if frame.link is not None:
+                K["link_screws"][i] = np.linalg.inv(link_compliance(frame))
+            if frame.joint_stiffness is not None:
+                given = frame.joint_stiffness
+                K["joint_screws"][i] = np.where(np.isfinite(given), given, 0.0)
+        first = self.pairs[0]
+        energy = max(first.linear.energy / first.scale**2, FLOOR_ENERGY)
+
+        def size(screws: dict[str, NDArray]) -> float:
+            cost = sum(
+                np.einsum("ni,nij,nj", s, K[kind], s) / 2 for kind, s in screws.items()
+            )
+            return float(np.sqrt(cost / energy))
+
+        differences = {
+            kind: np.array([
+                (getattr(p.simulated, kind) - getattr(p.linear, kind)) / p.scale
+                for p in self.pairs
+            ])
+            for kind in K
+        }
+        limit = {kind: extrapolate(self.scales, v) for kind, v in differences.items()}
+        fewer = {
+            kind: extrapolate(self.scales[1:], v[1:]) for kind, v in differences.items()
+        }
+        change = {kind: limit[kind] - fewer[kind] for kind in K}
+        return Check(size(limit), TOLERANCE, 2 * size(change))
+
+    @cached_property
+    def energies(self) -> dict[str, NDArray]:
+        """(k,) energy, simulated minus linear or exact, relative to the latter.
+
+        NaN where the exact model has no solution.
+        """
+        relative: dict[str, list[float]] = {"linear": [], "exact": []}
+        for pair in self.pairs:
+            least = FLOOR_ENERGY * pair.scale**2
+            for name, model in (("linear", pair.linear), ("exact", pair.exact)):
+                known = math.nan if model is None else model.energy + pair.between
+                difference = pair.simulated.rigid_energy - known
+                relative[name].append(difference / max(known, least))
+        return {name: np.array(values) for name, values in relative.items()}
+
+    @cached_property
+    def checks(self) -> dict[str, Check]:
+        """What must hold, by name."""
+        checks = {f"limit of {name}": check for name, check in self.limits.items()}
+        exact = abs(float(self.energies["exact"][0]))
+        if self.springs:
+            compared = self.signal and not math.isnan(exact)
+            checks["energy against finite rotations"] = Check(
+                exact, TOLERANCE, signal=compared
+            )
+        return checks
+
+    def table(self) -> dict[str, Any]:
+        """Its own keys of the public format."""
+        return {
+            "clearances": "on both sides; poses are not unique and not judged",
+            "slope": None,
+            "optimality_gaps": self.gaps,
+            "relative_energy_differences": self.energies,
+            "limits": {name: check.value for name, check in self.limits.items()},
+        }
+
+    def header(self) -> list[str]:
+        """Names of the columns of :meth:`rows`."""
+        return [
+            "scale of imperfections",
+            "energy, simulated [J]",
+            "minus linear [%]",
+            "minus exact [%]",
+            "optimality gap [-]",
+        ]
+
+    def rows(self) -> list[list[str]]:
+        """One row for each scale, as text."""
+        return [
+            [
+                f"{pair.scale:.4g}",
+                f"{pair.simulated.rigid_energy:.6g}",
+                f"{100 * linear:.3g}",
+                f"{100 * exact:.3g}",
+                f"{gap:.2e}",
+            ]
+            for pair, linear, exact, gap in zip(
+                self.pairs, *self.energies.values(), self.gaps, strict=True
+            )
+        ]
+
+    def notes(self) -> list[str]:
+        """Lines of text before the table of scales."""
+        return ["with clearances"]
+
+
+def optimality_gap(pair: Pair) -> float:
+    """Energy of the simulated clearance screws in the linear model, beyond the least.
+
+    Args:
+        pair: both solutions, of a robot with clearances.
+
+    Returns:
+        [-] energy minus the load's work at the simulated clearance screws, projected
+        onto their cones, minus the least one; relative to the energy stored without
+        clearances, or with them under the load if that is more, or to
+        :data:`FLOOR_ENERGY`.
+    """
+    best = pair.linear
+    small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
+    cones = best.joints.cones
+    # a column of cones has one entry, its bound
+    u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
+    u = into_cones(u, best.joints.group)
+    strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h
+    cost = (strain @ strain - least @ least) / 2 - small.d @ (u - best.clearances)
+    least_reference = FLOOR_ENERGY * pair.scale**2
+    reference = max(small.energy_without_clearance, best.energy, least_reference)
+    return float(cost / reference)

@@ -1,0 +1,250 @@
+"""A study file: one robot, and every check to be run on it.
+
+TOML; ``docs/study.md`` describes it, ``examples/irsbot2.toml`` is one.  Everything in
+it is read and checked before any work begins.
+"""
+
+import os.path
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import POSE
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
+from assembly.model.robot import BeamLink, MeshLink, Robot
+from assembly.robots import BUILT_IN, load_robot
+from assembly.sweeps.targets import parse_grid
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from stiffness.surface.surface import UNITS
+from validation.crosscheck.verdict import SCALES, check_scales
+
+_CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """The content of a study file.
+
+    Attributes:
+        title: of the report.
+        robot: with its errors, before links are replaced.
+        errors: one sentence on where the errors come from.
+        source: of the links' stiffness, ``"beam"`` (as declared) or ``"fea"``.
+        meshes: mesh link by frame, for the comparison and for ``"fea"``.
+        accuracy: asked of the finite elements.
+        pose: nominal platform pose of the detailed checks.
+        grid: axes of the maps by pose component; empty for none.
+        scales: of the errors in the cross-check; empty for none.
+        checks: names of the checks to run.
+        asked: those of them that the file asks for by name, by a grid or by scales.
+        folder: to write.
+    """
+
+    title: str
+    robot: Robot
+    errors: str
+    source: str
+    meshes: dict[str, MeshLink]
+    accuracy: float
+    pose: dict[str, float]
+    grid: dict[str, NDArray]
+    scales: tuple[float, ...]
+    checks: tuple[str, ...]
+    asked: tuple[str, ...]
+    folder: Path
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
+    """A study from its file.
+
+    Args:
+        path: of the TOML file.
+        folder: to write, instead of the one the file names.
+
+    Returns:
+        The study, everything in it checked.
+
+    Raises:
+        BadInput: the file, or the robot it names, breaks a rule.
+    """
+    path = Path(path)
+    root = read_toml(path)
+    robot = _robot(root, path.parent)
+    robot, errors = _errors(root, robot)
+    source, meshes, accuracy = _links(root, robot)
+    pose = _pose(root)
+    grid = root.text("grid", " ").strip()
+    by_key = {"maps": "grid", "crosscheck": "scales"}
+    asked_by_key = {check for check, key in by_key.items() if root.has(key)}
+    scales = _scales(root)
+    checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
+    wanted = tuple(c for c in checks if c in named | asked_by_key)
+    asked = root.text("output", f"{path.stem}_study")
+    title = root.text("title", f"{robot.name}: forced assembly")
+    root.finish()
+    try:
+        axes = parse_grid(grid) if grid else {}
+    except BadInput as error:
+        raise root.bad("", str(error)) from None
+    folder = Path(folder or asked)
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise BadInput(f"{folder}: found a file, expected a folder or nothing")
+    return Study(
+        title=title,
+        robot=robot,
+        errors=errors,
+        source=source,
+        meshes=meshes,
+        accuracy=accuracy,
+        pose=pose,
+        grid=axes,
+        scales=scales,
+        checks=checks,
+        asked=wanted,
+        folder=folder,
+    )
+
+
+def _robot(root: Table, folder: Path) -> Robot:
+    """The robot: built in, or a file beside the study's."""
+    name = root.text("robot", expected="a built-in robot or a robot file")
+    if name in BUILT_IN:
+        return load_robot(name)
+    if not os.path.isfile(folder / name):
+        problem = (
+            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+        )
+        raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
+    return load_robot(folder / name)
+
+
+def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
+    """The robot with the errors asked for, and a sentence about them."""
+    if not root.has("errors"):
+        return robot, "geometric errors as in the robot file"
+    table = root.table("errors")
+    if table.has("explicit"):
+        rows = table.table("explicit")
+        errors = np.zeros((len(robot.frames), 6))
+        for name in rows.content:
+            for frame in _known(rows, name, robot, [name]):
+                errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
+        table.finish()
+        return robot.with_errors(errors), "geometric errors given in the study file"
+    draw = ErrorDraw(
+        _frames(table, robot, [f.name for f in robot.frames]),
+        tuple(table.array("least", (6,), "rad, m")),
+        tuple(table.array("most", (6,), "rad, m")),
+        table.integer("seed"),
+        table.choice("signs", SIGNS, "literal"),
+    )
+    least, most = np.array(draw.least), np.array(draw.most)
+    if not ((least >= 0) & (least <= most) & (most <= LARGEST_LENGTH)).all():
+        expected = f"expected 0 <= least <= most <= {LARGEST_LENGTH:g}"
+        raise table.bad("least", f"{expected} in every component")
+    table.finish()
+    signs = "all positive" if draw.signs == "literal" else "random signs"
+    sentence = f"geometric errors drawn with seed {draw.seed}, {signs}"
+    return robot.with_errors(draw_errors(robot, draw)), sentence
+
+
+def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
+    """Frames named by the key ``frames``."""
+    names = table.get("frames", default)
+    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        raise table.bad("frames", "expected a list of frame names")
+    return _known(table, "frames", robot, names)
+
+
+def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
+    """Full names of frames; an unknown one is named with its place in the file."""
+    try:
+        return frames_named(robot, names)
+    except BadInput as error:
+        raise table.bad(key, str(error)) from None
+
+
+def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
+    """Where link stiffnesses come from, and the meshes of beams to compare."""
+    if not root.has("links"):
+        return "beam", {}, 0.005
+    table = root.table("links")
+    source = table.choice("source", ("beam", "fea"), "beam")
+    accuracy = table.number("accuracy", "-", 0.005, above=0.0, below=0.5)
+    meshes: dict[str, MeshLink] = {}
+    if table.has("surface"):
+        surface = Path(root.file).parent / table.text("surface")
+        if not os.path.isfile(surface):
+            raise table.bad("surface", f"no such file: {surface}")
+        beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
+        wanted = _frames(table, robot, [f.name for f in beams])
+        base, tip = table.text("base"), table.text("tip")
+        unit = table.choice("unit", UNITS, "m")
+        for frame in beams:
+            link = frame.link
+            if frame.name in wanted and isinstance(link, BeamLink):
+                meshes[frame.name] = MeshLink(
+                    surface=surface,
+                    base=base,
+                    tip=tip,
+                    young=link.young,
+                    poisson=link.poisson,
+                    density=link.density,
+                    unit=unit,
+                    axis=link.axis,
+                )
+    elif source == "fea":
+        raise table.bad("surface", 'missing; expected the surface file of source "fea"')
+    table.finish()
+    return source, meshes, accuracy
+
+
+def _pose(root: Table) -> dict[str, float]:
+    """The pose of the detailed checks; home if not given."""
+    if not root.has("pose"):
+        return {}
+    table = root.table("pose")
+    pose = {k: table.number(k, "m or rad") for k in POSE if table.has(k)}
+    table.finish()
+    return pose
+
+
+def _scales(root: Table) -> tuple[float, ...]:
+    """Scales of the cross-check."""
+    if not root.has("scales"):
+        return SCALES
+    value = root.get("scales")
+    if not isinstance(value, list) or len(value) > 20:
+        raise root.bad("scales", "expected a list of factors")
+    if not value:
+        return ()
+    try:
+        given = root.array("scales", (len(value),), "-").tolist()
+        return tuple(check_scales(given))
+    except BadInput as error:
+        message = str(error).removeprefix(f"{root.file}: ")
+        raise root.bad("", message.replace("scale:", "scales:")) from None
+
+
+def _checks(
+    root: Table, meshes: bool, grid: bool, scales: bool
+) -> tuple[tuple[str, ...], set[str]]:
+    """Checks to run, all that the file gives the input of; and those it names."""
+    possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
+    if not root.has("checks"):
+        return tuple(c for c in _CHECKS if possible.get(c, True)), set()
+    table = root.table("checks")
+    named = {c for c in _CHECKS if table.has(c)}
+    chosen = tuple(c for c in _CHECKS if table.boolean(c, possible.get(c, True)))
+    for check in chosen:
+        if not possible.get(check, True):
+            need = {"stiffness": "[links] surface", "maps": "grid"}.get(check, "scales")
+            raise table.bad(check, f'this check needs "{need}" in the study file')
+    table.finish()
+    return chosen, named
