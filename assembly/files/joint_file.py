@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, Clearance
-from forcefit.inputs.table import Table, find_fault, number_array
+from forcefit.inputs.number_arrays import find_fault, number_array
+from forcefit.inputs.table import Table
 
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 

@@ -73,14 +73,14 @@ def zone(
     joint: JointOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Whether the robot goes together by play alone; the margin."""
+    """Whether clearances alone let the robot assemble; the margin."""
     from assembly.report.results import zone_of, zone_text
 
-    found = zone_of(posture_of(robot, pose, joint))
-    write_json({"robot": robot, "zone": found}, json)
+    margins = zone_of(posture_of(robot, pose, joint))
+    write_json({"robot": robot, "zone": margins}, json)
     if json != "-":
-        print(zone_text(found))
-    if found["status"] != "ok":
+        print(zone_text(margins))
+    if margins["status"] != "ok":
         raise typer.Exit(1)
 
 
@@ -209,7 +209,7 @@ def show(
         ),
     ] = None,
 ) -> None:
-    """Draw the nominal and the forced robot, and its errors."""
+    """Plot the nominal and the forced robot, and its errors."""
     from assembly.linear.energy import CannotAssemble, solve_assembly
     from assembly.linear.error_body import PARTS
     from assembly.linear.reach import READINGS
@@ -241,9 +241,9 @@ def show(
     for line in remark_lines(posture.robot.remarks):
         print(line)
     try:
-        answer = solve_assembly(posture, wrench)
+        assembly = solve_assembly(posture, wrench)
         plotter = plot_assembly(
-            answer, exaggeration, error_body, reading, output is not None
+            assembly, exaggeration, error_body, reading, output is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
