@@ -19,19 +19,18 @@ from pathlib import Path
 import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
+from validity_models import bush_margin, halves_cost, with_bars
 
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.solvers.conic import SolverFailed
-from validation.assumptions.bushes import bush_margin
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
-    halves_cost,
     link_cost,
     spread_cost,
 )

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from random_robots import draw_robot
 
 from forcefit.inputs.table import BadInput
@@ -37,11 +38,10 @@ from validation.synthetic.equivalents import SAME, Alternative, alternatives
 from validation.synthetic.generator import (
     Noise,
     Synthetic,
-    finite_part,
     generate_campaign,
     write_campaign,
 )
-from validation.synthetic.machine import Hidden
+from validation.synthetic.machine import Hidden, simulate_readings
 from validation.synthetic.outside import OUTSIDE
 from validation.synthetic.truth import truth_of
 
@@ -50,8 +50,22 @@ STRENGTHS = (2.0, 5.0, 9.0)
 TRIES = 12  # draws of a case until its robot can have the effects
 FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
 VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
+SMALL = 1e-2  # scale of errors and load at which the machine is linear
 WITHIN_90 = 1.645  # [-] standard deviations
 VERDICTS = ("explained", "none_needed", "ambiguous", "outside_library")
+
+
+def finite_part(campaign: Synthetic) -> NDArray:
+    """(rows, 6) [rad, m] finite minus linear readings of the declared machine."""
+    robot, rows = campaign.robot, campaign.plan.rows
+
+    def readings(scale: float) -> NDArray:
+        scaled = [replace(row, load=scale * row.load) for row in rows]
+        machine = robot.with_errors(scale * robot.errors)
+        point = campaign.reference_point
+        return simulate_readings(machine, point, scaled, (), "springs")
+
+    return readings(1.0) - (readings(SMALL) - readings(-SMALL)) / (2 * SMALL)
 
 
 def draw_case(seed: int) -> tuple[str, Synthetic]:

@@ -21,7 +21,6 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.energy import Assembly, solve_with
 from assembly.linear.load import forces_on
-from assembly.linear.zone import Zone, margin_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
@@ -69,21 +68,3 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     joints = bush_joints(virtual_joints(posture.robot))
     return solve_with(linearise(posture), joints, wrench, forces_on(posture, wrench))
-
-
-def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
-    """Factor on all clearances at which a rigid manipulator on bushes just assembles.
-
-    Args:
-        posture: where the robot stands.
-        compliant: ``"rigid"`` or ``"free"``, as for
-            ``assembly.linear.zone.zone_margin``.
-
-    Returns:
-        The margin with a certified lower bound.
-
-    Raises:
-        SolverFailed: the cone solver gave up.
-    """
-    joints = bush_joints(virtual_joints(posture.robot, compliant))
-    return margin_with(linearise(posture), joints)[0]

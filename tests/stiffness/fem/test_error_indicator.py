@@ -7,7 +7,12 @@ import pytest
 
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import round_section
-from stiffness.fem.adaptive_step import estimated_error, solve_level
+from stiffness.fem.adaptive_step import (
+    DEFAULT_EFFECTIVITY,
+    SAFETY_FACTOR,
+    estimated_error,
+    solve_level,
+)
 from stiffness.fem.condensation import condense, rigid_motions
 from stiffness.fem.elements import integration, isoparametric, lame
 from stiffness.fem.error_indicator import (
@@ -201,14 +206,14 @@ def test_what_the_elements_indicate_is_what_they_miss():
 
 
 def test_stiffness_falls_and_two_meshes_tell_the_fall():
-    """The factor is between a safety's and twice a blind one's; the estimate covers."""
+    """The index is between the safety factor and that times twice the default."""
     history = [bar(*mesh).totals() for mesh in ((1, 6), (2, 12))]
     error, factor = estimated_error(history)
     K = history[1][0]
     assert history[0][0][0, 0] > K[0, 0] > BENDING
     true = K[0, 0] / BENDING - 1
     assert true < -error[0, 0] / K[0, 0] < 5 * true
-    assert 1.3 <= factor <= 5.2
+    assert SAFETY_FACTOR <= factor <= 2 * SAFETY_FACTOR * DEFAULT_EFFECTIVITY
 
 
 # --- what is left on free surfaces ---------------------------------------------------

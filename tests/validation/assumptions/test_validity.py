@@ -16,16 +16,16 @@ from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
+from benchmarks.validity_models import bush_margin, halves_cost, with_bars
 from forcefit.commands.validation import app
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.assumptions.assumptions import assumption_costs
-from validation.assumptions.bushes import bush_joints, bush_margin, solve_bushes
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
+from validation.assumptions.bushes import bush_joints, solve_bushes
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
-    halves_cost,
     link_cost,
     spread_cost,
 )
