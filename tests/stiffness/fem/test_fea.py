@@ -143,7 +143,7 @@ def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
     A = rng.normal(size=(len(powers), 3))
     u = (mesh.nodes[:, None] ** powers).prod(axis=2) @ A
     upper = assemble(mesh, *constants(mesh))
-    found = 2 * u.ravel() @ (upper @ u.ravel()) - u.ravel() ** 2 @ upper.diagonal()
+    energies = 2 * u.ravel() @ (upper @ u.ravel()) - u.ravel() ** 2 @ upper.diagonal()
     point, weight = np.polynomial.legendre.leggauss(4)
     grid = np.stack(np.meshgrid(point, point, point), axis=-1).reshape(-1, 3)
     x = (1 + grid) / 2 * size
@@ -157,7 +157,7 @@ def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
     strain = (slope + slope.swapaxes(1, 2)) / 2
     trace = np.trace(strain, axis1=1, axis2=2)
     energy = LAM * trace**2 + 2 * MU * (strain**2).sum(axis=(1, 2))
-    assert found == pytest.approx(w @ energy, rel=1e-12)
+    assert energies == pytest.approx(w @ energy, rel=1e-12)
 
 
 @both_orders
@@ -218,10 +218,10 @@ def test_millimetres_give_the_same_link(order):
 def test_reading_at_another_tip_is_a_screw_map(order):
     """The same mesh, K read elsewhere: K' = A^T K A with A from there to here."""
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
-    here, there = np.array([0.02, 0.04, 0.2]), np.array([0.1, -0.2, 0.3])
-    _, one = solved(solid, order, tip=here)
+    near, there = np.array([0.02, 0.04, 0.2]), np.array([0.1, -0.2, 0.3])
+    _, one = solved(solid, order, tip=near)
     _, other = solved(solid, order, tip=there)
-    A = screw_map(there - here)
+    A = screw_map(there - near)
     expected = A.T @ one.stiffness @ A
     assert np.abs(scaled(other.stiffness - expected, expected)).max() < 1e-11
 

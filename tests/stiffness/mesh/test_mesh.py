@@ -266,9 +266,9 @@ def test_a_shape_is_found_from_points_on_it(fit, shape, rng):
     R, shift = rotation_matrix(rng.normal(size=3)), rng.normal(size=3)
     points = samples(shape, rng)
     normals = shape.signed(points)[1]
-    found = fit(points @ R.T + shift, normals @ R.T)
+    fitted = fit(points @ R.T + shift, normals @ R.T)
     fresh = samples(shape, rng) @ R.T + shift
-    assert np.abs(found.signed(fresh)[0]).max() < 1e-10
+    assert np.abs(fitted.signed(fresh)[0]).max() < 1e-10
 
 
 @pytest.mark.parametrize(("fit", "shape"), SHAPES)
@@ -513,8 +513,8 @@ def test_a_mesh_with_a_breach_is_refused(tmp_path, monkeypatch):
 def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shells):
     """Two a shell, the forearm's cavity has one of its own, less two a hole."""
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
-    found = euler_characteristic(surface.triangles)
-    assert found == 2 * shells - 2 * ways_through
+    characteristic = euler_characteristic(surface.triangles)
+    assert characteristic == 2 * shells - 2 * ways_through
 
 
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])

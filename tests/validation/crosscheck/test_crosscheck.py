@@ -64,13 +64,13 @@ def triangle(error):
 
 def test_the_pose_difference_of_the_papers_robot_falls_as_the_square(posture):
     """Slope 2.0 within 0.1, and every limit within a thousandth."""
-    answer = crosscheck(posture)
-    assert answer.passed
-    for slope in answer.metric.slopes.values():
+    result = crosscheck(posture)
+    assert result.passed
+    for slope in result.metric.slopes.values():
         assert slope == pytest.approx(2.0, abs=0.1)
     # what is left of the limits is of the order of the product of the scales, 1/64,
     # of a fourth-order term: far below the bound
-    assert max(check.value for check in answer.metric.limits.values()) < 2e-5
+    assert max(check.value for check in result.metric.limits.values()) < 2e-5
 
 
 @pytest.mark.slow
@@ -106,8 +106,8 @@ def test_a_difference_that_finite_rotations_leave_fails(posture, monkeypatch):
         return right(replace(place, robot=robot))
 
     monkeypatch.setattr(validation.crosscheck.pair, "solve_exact", wrong)
-    answer = crosscheck(posture, links="spring")
-    failed = [name for name, check in answer.checks.items() if check.verdict == "fails"]
+    result = crosscheck(posture, links="spring")
+    failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
     assert failed == [
         "rotation that finite rotations do not explain",
         "translation that finite rotations do not explain",
@@ -116,10 +116,10 @@ def test_a_difference_that_finite_rotations_leave_fails(posture, monkeypatch):
 
 def test_a_load_is_scaled_with_the_errors(irsbot2):
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
-    answer = crosscheck(posture, load=[5.0, -8.0, 3.0, 100.0, 300.0, -200.0])
-    assert answer.passed
-    for pair in answer.pairs:
-        np.testing.assert_array_equal(pair.linear.load, pair.scale * answer.load)
+    check = crosscheck(posture, load=[5.0, -8.0, 3.0, 100.0, 300.0, -200.0])
+    assert check.passed
+    for pair in check.pairs:
+        np.testing.assert_array_equal(pair.linear.load, pair.scale * check.load)
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
@@ -134,15 +134,15 @@ def test_weight_is_the_same_on_both_sides(links):
         for f in posture.robot.frames
     )
     posture = home_posture(replace(posture.robot, frames=frames))
-    answer = crosscheck(posture, links=links, gravity=[1.0, -2.0, -9.81])
-    assert answer.passed, answer.checks
+    check = crosscheck(posture, links=links, gravity=[1.0, -2.0, -9.81])
+    assert check.passed, check.checks
     light = crosscheck(posture, links=links)
-    moved = answer.pairs[0].linear.platform_screw - light.pairs[0].linear.platform_screw
+    moved = check.pairs[0].linear.platform_screw - light.pairs[0].linear.platform_screw
     assert np.abs(moved[3:]).max() > 1e-5
-    assert (answer.pairs[0].between > 0) == (links == "beam")
+    assert (check.pairs[0].between > 0) == (links == "beam")
     if links == "spring":
         # two codes with finite rotations; measured 2e-4, as without weight
-        assert max(answer.metric.unexplained.values()) < 1e-3
+        assert max(check.metric.unexplained.values()) < 1e-3
 
 
 def erring(name, density):
@@ -167,9 +167,9 @@ def test_weight_and_moment_act_alike_in_both_finite_models(name):
     """
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
-    answer = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])
-    assert answer.passed, answer.text()
-    assert max(answer.metric.unexplained.values()) < 1e-4
+    check = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])
+    assert check.passed, check.text()
+    assert max(check.metric.unexplained.values()) < 1e-4
 
 
 def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
@@ -182,8 +182,8 @@ def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
         "dead_loads",
         lambda at, w, b, g, p: right(at, w, b, 1.05 * np.asarray(g), p),
     )
-    answer = crosscheck(erring("3rrr", 2700.0), links="spring", gravity=[2, -3, -9.81])
-    failed = [name for name, check in answer.checks.items() if check.verdict == "fails"]
+    result = crosscheck(erring("3rrr", 2700.0), links="spring", gravity=[2, -3, -9.81])
+    failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
     assert failed
     assert all("do not explain" in name for name in failed)
 
@@ -211,11 +211,11 @@ def test_two_scales_at_full_errors_are_made_enough(irsbot2):
     at = place_robot(
         drawn(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )
-    answer = crosscheck(at, (1.0, 0.5))
-    assert answer.passed, answer.text()
-    assert answer.asked == 2
-    assert len(answer.pairs) > 2
-    table = answer.table()
+    check = crosscheck(at, (1.0, 0.5))
+    assert check.passed, check.text()
+    assert check.asked == 2
+    assert len(check.pairs) > 2
+    table = check.table()
     assert [entry["scale"] for entry in table["scales"]] == [1.0, 0.5]
     assert table["added_scales"][0]["scale"] == 0.25
     assert table["verdict"] == "passed"
@@ -227,16 +227,16 @@ def test_two_scales_at_full_errors_are_made_enough(irsbot2):
 def test_two_scales_find_a_broken_term_too(irsbot2, name, broken):
     broken(MUTATIONS[name])
     at = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
-    answer, _ = attempt("irsbot2", lambda: crosscheck(at, (1.0, 0.5), LOAD))
-    assert answer is None or answer.table()["verdict"] == "failed"
+    check, _ = attempt("irsbot2", lambda: crosscheck(at, (1.0, 0.5), LOAD))
+    assert check is None or check.table()["verdict"] == "failed"
 
 
 def test_clearances_are_left_out_on_both_sides():
     """The play of 10 um would swallow the error of 8 um."""
-    answer = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
-    assert answer.posture.robot.frame("a").clearance is None
-    assert answer.passed
-    assert answer.pairs[0].simulated.energy > 1e-6
+    check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
+    assert check.posture.robot.frame("a").clearance is None
+    assert check.passed
+    assert check.pairs[0].simulated.energy > 1e-6
 
 
 def test_a_serial_robot_has_no_energy_and_still_a_slope():
@@ -245,61 +245,61 @@ def test_a_serial_robot_has_no_energy_and_still_a_slope():
         Frame("b", "a", translation=[0.5, 0, 0],
               geometric_error=[0.02, -0.01, 0.01, 0, 1e-3, 0]),
     )  # fmt: skip
-    answer = crosscheck(home_posture(Robot("serial", "b", frames)))
-    assert answer.passed
-    assert answer.slope == pytest.approx(2.0, abs=0.1)
-    assert answer.pairs[0].simulated.energy == 0.0
+    check = crosscheck(home_posture(Robot("serial", "b", frames)))
+    assert check.passed
+    assert check.slope == pytest.approx(2.0, abs=0.1)
+    assert check.pairs[0].simulated.energy == 0.0
 
 
 def test_without_errors_and_load_nothing_is_compared_and_nothing_passes():
-    answer = crosscheck(triangle(np.zeros(6)))
-    assert {check.verdict for check in answer.checks.values()} == {"no signal"}
-    assert not answer.passed
-    assert answer.table()["verdict"] == "no signal"
-    assert answer.text().splitlines()[-1].startswith("NOT CHECKED: nothing stands out")
-    assert math.isnan(answer.slope)
-    assert answer.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
+    result = crosscheck(triangle(np.zeros(6)))
+    assert {check.verdict for check in result.checks.values()} == {"no signal"}
+    assert not result.passed
+    assert result.table()["verdict"] == "no signal"
+    assert result.text().splitlines()[-1].startswith("NOT CHECKED: nothing stands out")
+    assert math.isnan(result.slope)
+    assert result.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
 
 
 def test_what_a_serial_robot_cannot_compare_is_counted_beside_what_passed():
     """No spring carries anything: only the platform's pose says something."""
     error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
     frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
-    answer = crosscheck(home_posture(Robot("bar", "b", (frame, Frame("b", "a")))))
-    silent = {k for k, check in answer.checks.items() if check.verdict == "no signal"}
+    result = crosscheck(home_posture(Robot("bar", "b", (frame, Frame("b", "a")))))
+    silent = {k for k, check in result.checks.items() if check.verdict == "no signal"}
     parts = ("link rotation", "link translation", "link moment", "link force", "energy")
     assert {f"limit of {part}" for part in parts} <= silent
-    assert answer.checks["limit of platform rotation"].verdict == "ok"
-    assert answer.passed
-    said = answer.text().splitlines()
-    counted = f"{len(silent)} of {len(answer.checks)}"
-    assert said[-1] == f"passed; {counted} checks had nothing to compare"
+    assert result.checks["limit of platform rotation"].verdict == "ok"
+    assert result.passed
+    outcome = result.text().splitlines()
+    counted = f"{len(silent)} of {len(result.checks)}"
+    assert outcome[-1] == f"passed; {counted} checks had nothing to compare"
 
 
 @pytest.mark.parametrize("more", [[], ["--clearances"]])
 def test_the_command_does_not_pass_a_robot_without_errors(more):
-    said = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
-    assert said.exit_code == 1
-    assert "NOT CHECKED" in said.output
-    assert "passed" not in said.output
-    assert not re.search(r"\bok\b", said.output)
+    outcome = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
+    assert outcome.exit_code == 1
+    assert "NOT CHECKED" in outcome.output
+    assert "passed" not in outcome.output
+    assert not re.search(r"\bok\b", outcome.output)
 
 
 def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
     """The errors of the file replace the robot's; the seed says which draw."""
     target, root = tmp_path / "check.json", Path(__file__).parents[3]
     example = root / "examples" / "irsbot2_errors.toml"
-    said = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
-    assert said in (root / "README.md").read_text(encoding="utf-8")
+    outcome = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
+    assert outcome in (root / "README.md").read_text(encoding="utf-8")
     words = ["irsbot2", "--errors", str(example), "--pose", "tx=0,tz=-0.5"]
-    said = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
-    assert said.exit_code == 0, said.output
-    found = json.loads(target.read_text())
-    assert {check["verdict"] for check in found["checks"].values()} == {"ok"}
-    assert found["scales"][0]["vjm"]["energy"] > 0.1
+    outcome = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
+    assert outcome.exit_code == 0, outcome.output
+    table = json.loads(target.read_text())
+    assert {check["verdict"] for check in table["checks"].values()} == {"ok"}
+    assert table["scales"][0]["vjm"]["energy"] > 0.1
     again = run(*words, "--scale", "1,0.5,0.25", "--seed", "2", "--json", "-")
     other = json.loads(again.output)["scales"][0]["vjm"]["energy"]
-    assert other != found["scales"][0]["vjm"]["energy"]
+    assert other != table["scales"][0]["vjm"]["energy"]
 
 
 def test_a_failed_simulation_says_so_in_a_table():
@@ -308,8 +308,8 @@ def test_a_failed_simulation_says_so_in_a_table():
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
     )
     posture = home_posture(Robot("block", "a", frames, (("a", "b"),)))
-    answer, failure = attempt(posture.robot.name, lambda: crosscheck(posture))
-    assert answer is None
+    check, failure = attempt(posture.robot.name, lambda: crosscheck(posture))
+    assert check is None
     assert failure["status"] == "cannot assemble"
     assert failure["passed"] is False
 
@@ -483,8 +483,8 @@ def test_a_broken_term_is_found_out(irsbot2, mutation, broken):
     """The simulation shares none of these terms, so each breaks the agreement."""
     broken(mutation)
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
-    answer, _ = attempt("irsbot2", lambda: crosscheck(posture, load=LOAD))
-    assert answer is None or not answer.passed
+    check, _ = attempt("irsbot2", lambda: crosscheck(posture, load=LOAD))
+    assert check is None or not check.passed
 
 
 @pytest.mark.parametrize("mutation", BEAM_MUTATIONS.values(), ids=BEAM_MUTATIONS.keys())
@@ -493,8 +493,8 @@ def test_a_broken_beam_is_found_out(mutation, broken):
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
     assert crosscheck(triangle(error), load=LOAD).passed
     broken(mutation)
-    answer = crosscheck(triangle(error), load=LOAD)
-    assert not answer.passed
+    check = crosscheck(triangle(error), load=LOAD)
+    assert not check.passed
 
 
 def run(*arguments):
@@ -504,16 +504,16 @@ def run(*arguments):
 def test_the_command_writes_the_public_keys(tmp_path):
     target = tmp_path / "check.json"
     picture = tmp_path / "slope.png"
-    said = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
                "--scale", "1,0.5", "--json", str(target),
                "--figure", str(picture))  # fmt: skip
-    assert said.exit_code == 0, said.output
-    assert "passed" in said.output
-    found = json.loads(target.read_text())
-    assert found["passed"] is True
-    assert found["slope"] == pytest.approx(2.0, abs=0.1)
-    assert [entry["scale"] for entry in found["scales"]] == [1.0, 0.5]
-    entry = found["scales"][0]
+    assert outcome.exit_code == 0, outcome.output
+    assert "passed" in outcome.output
+    table = json.loads(target.read_text())
+    assert table["passed"] is True
+    assert table["slope"] == pytest.approx(2.0, abs=0.1)
+    assert [entry["scale"] for entry in table["scales"]] == [1.0, 0.5]
+    entry = table["scales"][0]
     for side in ("vjm", "multibody", "difference"):
         assert len(entry[side]["platform_screw"]) == 6
         assert isinstance(entry[side]["energy"], float)
@@ -526,23 +526,23 @@ def test_the_command_writes_the_public_keys(tmp_path):
 def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
     target, file = tmp_path / "check.json", tmp_path / "robot.toml"
     write_robot(irsbot2, file)
-    said = run(str(file), "--pose", "tx=0.0,tz=-0.5", "--clearances",
+    outcome = run(str(file), "--pose", "tx=0.0,tz=-0.5", "--clearances",
                "--scale", "0.5,0.25", "--json", str(target))  # fmt: skip
-    assert said.exit_code == 0, said.output
-    found = json.loads(target.read_text())
-    assert found["passed"] is True
-    assert found["slope"] is None
-    assert [entry["scale"] for entry in found["scales"]] == [0.5, 0.25]
-    assert len(found["optimality_gaps"]) == 2 + len(found["added_scales"])
+    assert outcome.exit_code == 0, outcome.output
+    table = json.loads(target.read_text())
+    assert table["passed"] is True
+    assert table["slope"] is None
+    assert [entry["scale"] for entry in table["scales"]] == [0.5, 0.25]
+    assert len(table["optimality_gaps"]) == 2 + len(table["added_scales"])
     refused = run(str(file), "--clearances", "--figure", "slope.png")
     assert isinstance(refused.exception, BadInput)
 
 
 def test_the_command_fails_with_status_1(monkeypatch):
     MUTATIONS["lever arm missing"](monkeypatch)
-    said = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100")
-    assert said.exit_code == 1
-    assert "FAIL" in said.output or "cannot" in said.output
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100")
+    assert outcome.exit_code == 1
+    assert "FAIL" in outcome.output or "cannot" in outcome.output
 
 
 @pytest.mark.parametrize(
@@ -553,27 +553,27 @@ def test_the_command_fails_with_status_1(monkeypatch):
     ],
 )
 def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
-    said = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
                "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
-    assert isinstance(said.exception, BadInput)
-    assert message in str(said.exception)
+    assert isinstance(outcome.exception, BadInput)
+    assert message in str(outcome.exception)
 
 
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
 def test_the_command_refuses_bad_scales(text):
-    said = run("irsbot2", "--scale", text)
-    assert isinstance(said.exception, BadInput)
-    assert f'--scale: found "{text}", expected at least two' in str(said.exception)
+    outcome = run("irsbot2", "--scale", text)
+    assert isinstance(outcome.exception, BadInput)
+    assert f'--scale: found "{text}", expected at least two' in str(outcome.exception)
 
 
 def test_the_slope_figure_shows_what_was_found(posture):
     from validation.crosscheck.plot import slope_figure
 
-    answer = crosscheck(posture, scales=(1.0, 0.5))
-    panels = slope_figure(answer).axes
+    check = crosscheck(posture, scales=(1.0, 0.5))
+    panels = slope_figure(check).axes
     assert [p.get_title() for p in panels] == ["rotation", "translation"]
     shown = panels[0].lines[0].get_ydata()
-    np.testing.assert_allclose(shown, 1e3 * answer.metric.differences["rotation"])
+    np.testing.assert_allclose(shown, 1e3 * check.metric.differences["rotation"])
 
 
 def test_the_stiffness_figure_scales_by_the_diagonal():
@@ -601,8 +601,8 @@ def test_the_crosscheck_of_one_pose_ignores_another_robots_errors(posture):
 def test_every_built_in_robot_passes_under_a_load(name):
     """Their drives are springs about one axis and rigid in the other five."""
     posture = home_posture(load_robot(name))
-    found = crosscheck(posture, (1.0, 0.5, 0.25), load=[0, 0, 0, 10.0, 20.0, -50.0])
-    assert found.passed, found.text()
+    check = crosscheck(posture, (1.0, 0.5, 0.25), load=[0, 0, 0, 10.0, 20.0, -50.0])
+    assert check.passed, check.text()
     assert all(
-        abs(slope - 2) < 0.1 for slope in found.metric.slopes.values() if slope == slope
+        abs(slope - 2) < 0.1 for slope in check.metric.slopes.values() if slope == slope
     )

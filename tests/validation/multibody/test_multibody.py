@@ -65,12 +65,12 @@ def test_an_axial_or_twist_misfit_stores_half_g_squared_k(row, stiffness):
     """E = g^2 EA / (2 (2 L)), and GJ for a twist: exact at any size of g."""
     error = np.zeros(6)
     error[row] = 1e-3
-    answer = simulate_assembly(coaxial(error))
-    assert answer.energy == pytest.approx(1e-6 * stiffness / 2, rel=1e-9)
+    assembly = simulate_assembly(coaxial(error))
+    assert assembly.energy == pytest.approx(1e-6 * stiffness / 2, rel=1e-9)
     # the misfit is shared: a moves back by half of it, pressed by k g
-    assert answer.platform_screw[row] == pytest.approx(0.5e-3, rel=1e-9)
-    assert answer.link_wrenches[0, row] == pytest.approx(-1e-3 * stiffness, rel=1e-9)
-    assert answer.link_wrenches[2, row] == pytest.approx(1e-3 * stiffness, rel=1e-9)
+    assert assembly.platform_screw[row] == pytest.approx(0.5e-3, rel=1e-9)
+    assert assembly.link_wrenches[0, row] == pytest.approx(-1e-3 * stiffness, rel=1e-9)
+    assert assembly.link_wrenches[2, row] == pytest.approx(1e-3 * stiffness, rel=1e-9)
 
 
 def test_a_small_general_misfit_stores_the_series_energy(rng):
@@ -105,19 +105,21 @@ def test_the_corrected_element_bends_exactly(elements, theory):
     along, across = 0.05**3 * 0.02 / 12, 0.02**3 * 0.05 / 12
     shear = 10 * (1 + NU) / (12 + 11 * NU) if theory == "timoshenko" else math.inf
     for axis, second in ((4, along), (5, across)):
-        answer = simulate_assembly(posture, load=P * np.eye(6)[axis], elements=elements)
+        assembly = simulate_assembly(
+            posture, load=P * np.eye(6)[axis], elements=elements
+        )
         expected = P * L**3 / (3 * E * second) + P * L / (G * 1e-3 * shear)
-        assert answer.platform_screw[axis] == pytest.approx(expected, rel=1e-8)
-        assert answer.energy == pytest.approx(P * expected / 2, rel=1e-8)
+        assert assembly.platform_screw[axis] == pytest.approx(expected, rel=1e-8)
+        assert assembly.energy == pytest.approx(P * expected / 2, rel=1e-8)
 
 
 def test_an_end_moment_bends_a_beam_to_an_arc():
     """Curvature M/EI is constant, so the tip is at (sin a, 1 - cos a) L / a: a = 1."""
     L = 0.5
     moment = E * SECOND / L
-    answer = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
+    assembly = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
     expected = [0, 0, 1, L * (math.sin(1) - 1), L * (1 - math.cos(1)), 0]
-    np.testing.assert_allclose(answer.platform_screw, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(assembly.platform_screw, expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["link", "joint_stiffness"])
@@ -128,17 +130,17 @@ def test_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
     turn = np.array([0.3, -0.4, 0.5])
     more = {"link": MatrixLink(K)} if kind == "link" else {"joint_stiffness": K}
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], rotation=turn, **more)
-    answer = simulate_assembly(
+    assembly = simulate_assembly(
         home_posture(Robot("spring", "tip", (frame,))), load=wrench
     )
     R = placement(turn, np.zeros(3))[:3, :3]
     own = np.concatenate([R.T @ wrench[:3], R.T @ wrench[3:]])
     screw = np.linalg.solve(K, own)
-    got = answer.link_screws if kind == "link" else answer.joint_screws
+    got = assembly.link_screws if kind == "link" else assembly.joint_screws
     size = np.abs(screw * UNIT).max()
     assert np.abs((got[0] - screw) * UNIT).max() < 1e-7 * size
-    assert answer.energy == pytest.approx(own @ screw / 2, rel=1e-7)
-    wrenches = answer.link_wrenches if kind == "link" else answer.joint_wrenches
+    assert assembly.energy == pytest.approx(own @ screw / 2, rel=1e-7)
+    wrenches = assembly.link_wrenches if kind == "link" else assembly.joint_wrenches
     np.testing.assert_allclose(wrenches[0], own, rtol=1e-6)
 
 
@@ -160,10 +162,10 @@ def test_a_cantilever_sags_under_its_weight(links, elements):
     expected += P * L**3 / (3 * E * second) + P * L / (G * area)
     expected += P * offset * L**2 / (2 * E * second)
     K = {"tip": tip_stiffness(posture.robot.frame("tip"))}
-    answer = simulate_assembly(
+    assembly = simulate_assembly(
         posture, links=links, stiffness=K, gravity=[0, -g, 0], elements=elements
     )
-    assert answer.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
+    assert assembly.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
 
 
 def test_a_heavy_beam_converges_with_the_fourth_order():
@@ -197,8 +199,8 @@ def test_a_couple_of_dead_forces_does_the_work_of_its_sine():
     )  # fmt: skip
     posture = home_posture(Robot("spring", "hand", frames))
     z = placement([0.4, -0.3, 0.7], np.zeros(3))[:3, 2]
-    answer = simulate_assembly(posture, couple=1.0 * z)
-    turn = answer.joint_screws[0][2]
+    assembly = simulate_assembly(posture, couple=1.0 * z)
+    turn = assembly.joint_screws[0][2]
     assert turn > 0.4
     assert 2 * turn == pytest.approx(np.cos(turn), rel=1e-9)
 
@@ -213,9 +215,11 @@ def test_an_infinite_stiffness_locks_its_axis():
         Frame("tip", "drive", translation=[0.3, 0, 0]),
     )
     posture = home_posture(Robot("drive", "tip", frames))
-    answer = simulate_assembly(posture, load=[5.0, 7.0, 2e-3, 0, 0, 11.0])
-    np.testing.assert_allclose(answer.platform_screw[:3], [0, 0, 1e-6], atol=1e-14)
-    np.testing.assert_allclose(answer.joint_screws[0], 1e-6 * np.eye(6)[2], atol=1e-14)
+    assembly = simulate_assembly(posture, load=[5.0, 7.0, 2e-3, 0, 0, 11.0])
+    np.testing.assert_allclose(assembly.platform_screw[:3], [0, 0, 1e-6], atol=1e-14)
+    np.testing.assert_allclose(
+        assembly.joint_screws[0], 1e-6 * np.eye(6)[2], atol=1e-14
+    )
 
 
 @pytest.mark.parametrize("play", [None, Clearance(radial=1e-5)])
@@ -234,16 +238,18 @@ def test_a_bearing_turns_freely_and_yields_otherwise(play):
         Frame("end", "wall"),
     )  # fmt: skip
     posture = home_posture(Robot("hub", "tip", frames, (("tip", "end"),)))
-    answer = simulate_assembly(posture, clearances=play is not None)
+    assembly = simulate_assembly(posture, clearances=play is not None)
     linear = solve_assembly(posture)
     assert linear.energy > 0.1
-    assert answer.energy == pytest.approx(linear.energy, rel=2e-3)
-    assert abs(answer.joint_wrenches[0][2]) < 1e-6 * abs(answer.joint_wrenches[0][1])
-    ours, theirs = linear.joint_screws[0], answer.joint_screws[0]
+    assert assembly.energy == pytest.approx(linear.energy, rel=2e-3)
+    assert abs(assembly.joint_wrenches[0][2]) < 1e-6 * abs(
+        assembly.joint_wrenches[0][1]
+    )
+    ours, theirs = linear.joint_screws[0], assembly.joint_screws[0]
     np.testing.assert_allclose(theirs[[1, 5]], ours[[1, 5]], rtol=5e-3)
     turned = linear.clearance_screws[0][2]
     assert turned > 2e-3
-    assert answer.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
+    assert assembly.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
 
 
 def test_a_serial_chain_composes_its_errors_exactly():
@@ -256,7 +262,7 @@ def test_a_serial_chain_composes_its_errors_exactly():
               actuated=True, position=0.2, geometric_error=error[::-1] / 3),
         Frame("hand", "slide", rotation=[0, 1.0, 0], geometric_error=-error),
     )  # fmt: skip
-    answer = simulate_assembly(home_posture(Robot("arm", "hand", frames)))
+    assembly = simulate_assembly(home_posture(Robot("arm", "hand", frames)))
 
     def about(axis, angle):
         a, b = [k for k in range(3) if k != axis]
@@ -285,7 +291,7 @@ def test_a_serial_chain_composes_its_errors_exactly():
     turn = along([0, 0, 1]) @ about(0, 0.2) @ slip(error)
     slide = turn @ about(2, 0.7) @ along([0.5, 0, 0]) @ slip(error[::-1] / 3)
     hand = slide @ along([0, 0, 0.2]) @ about(1, 1.0) @ slip(-error)
-    for T, expected in zip(answer.transforms, (turn, slide, hand), strict=True):
+    for T, expected in zip(assembly.transforms, (turn, slide, hand), strict=True):
         np.testing.assert_allclose(T, expected, rtol=0, atol=1e-14)
 
 
@@ -317,14 +323,14 @@ def test_a_four_bar_with_a_long_coupler_closes_as_trigonometry_says():
         Frame("rocker_end", "rocker", translation=[2, 0, 0]),
     )  # fmt: skip
     closure = (("coupler_end", "rocker_end"),)
-    answer = simulate_assembly(
+    assembly = simulate_assembly(
         home_posture(Robot("four-bar", "coupler_end", frames, closure))
     )
     np.testing.assert_allclose(
-        answer.platform_screw[3:5], shut - pin, rtol=0, atol=1e-9
+        assembly.platform_screw[3:5], shut - pin, rtol=0, atol=1e-9
     )
-    assert answer.gap <= 1e-12
-    assert answer.energy == 0.0
+    assert assembly.gap <= 1e-12
+    assert assembly.energy == 0.0
 
 
 def overconstrained(rng, errors):
@@ -350,24 +356,24 @@ def test_every_spring_carries_what_its_closures_say(rng):
     """Statics on the deformed table: a wrench is the sum of the closures' beyond it."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     load = np.array([3.0, -2.0, 5.0, 40.0, 30.0, -100.0])
-    answer = simulate_assembly(posture, load=load)
+    assembly = simulate_assembly(posture, load=load)
     robot, P = posture.robot, posture.platform[:3, 3]
-    moved = P + answer.platform_screw[3:]
+    moved = P + assembly.platform_screw[3:]
     load = load + np.concatenate([np.cross(moved - P, load[3:]), np.zeros(3)])
-    on_leg = [answer.closure_wrenches.sum(axis=0) + load, *-answer.closure_wrenches]
+    on_leg = [assembly.closure_wrenches.sum(axis=0) + load, *-assembly.closure_wrenches]
     for frame in robot.frames:
         row, leg = robot.index(frame.name), int(frame.name[3])
-        R, p = answer.transforms[row, :3, :3], answer.transforms[row, :3, 3]
+        R, p = assembly.transforms[row, :3, :3], assembly.transforms[row, :3, 3]
         w = on_leg[leg]
         own = np.concatenate([R.T @ (w[:3] - np.cross(p - P, w[3:])), R.T @ w[3:]])
         if frame.joint_stiffness is not None:
             # Exudyn reads a spring half-way between its ends: 1e-3 rad of turning
             np.testing.assert_allclose(
-                answer.joint_wrenches[row], own, rtol=0, atol=3e-3 * np.abs(own).max()
+                assembly.joint_wrenches[row], own, rtol=0, atol=3e-3 * np.abs(own).max()
             )
         if frame.name.endswith("top"):
             np.testing.assert_allclose(
-                answer.link_wrenches[row], own, rtol=0, atol=1e-6 * np.abs(own).max()
+                assembly.link_wrenches[row], own, rtol=0, atol=1e-6 * np.abs(own).max()
             )
 
 
@@ -383,14 +389,14 @@ def test_turning_the_whole_robot_turns_its_answer(rng):
         for f in posture.robot.frames
     )
     turned_robot = replace(posture.robot, frames=(pole, *legs))
-    here = simulate_assembly(posture)
+    placed = simulate_assembly(posture)
     there = simulate_assembly(home_posture(turned_robot))
-    assert there.energy == pytest.approx(here.energy, rel=1e-8)
+    assert there.energy == pytest.approx(placed.energy, rel=1e-8)
     screw = np.concatenate([
         R.T @ there.platform_screw[:3],
         R.T @ there.platform_screw[3:],
     ])
-    np.testing.assert_allclose(screw, here.platform_screw, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(screw, placed.platform_screw, rtol=0, atol=1e-10)
 
 
 def tip_stiffness(frame):
