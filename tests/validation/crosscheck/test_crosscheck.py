@@ -1,49 +1,22 @@
 """The two models agree to first order, and a broken one is found out."""
 
-import json
 import math
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
-from forcefit.commands.validation import app
 from forcefit.inputs.table import BadInput
+from tests.mutations_for_tests import BEAM_MUTATIONS, MUTATIONS
+from tests.robots_for_tests import with_papers_errors
 from validation.crosscheck.crosscheck import attempt, crosscheck
-from validation.crosscheck.limits import extrapolate, fit_slope
 
 pytestmark = pytest.mark.exudyn
 
 STEEL = BeamLink({"radius": 0.01}, 200e9, 0.3)
-ERRORS_AT = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-
-
-def drawn(robot, seed, frames=ERRORS_AT, signed=False):
-    """Errors of the paper's size: up to 2e-2 rad and 2e-4 m at its frames."""
-    rng = np.random.default_rng(seed)
-    size = np.array([2e-2] * 3 + [2e-4] * 3)
-    errors = np.zeros((len(robot.frames), 6))
-    for i, frame in enumerate(robot.frames):
-        if frame.name.split(".")[-1] in frames:
-            errors[i] = rng.uniform(-1.0 if signed else 0.0, 1.0, 6) * size
-    return robot.with_errors(errors)
-
-
-@pytest.fixture(scope="module")
-def irsbot2():
-    return drawn(load_robot("irsbot2"), seed=1)
-
-
-@pytest.fixture(scope="module")
-def posture(irsbot2):
-    return place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
 
 
 def triangle(error):
@@ -79,7 +52,9 @@ def test_slopes_hold_over_poses_and_draws(signed):
     robot = load_robot("irsbot2")
     for seed in range(3):
         for tx, tz in ((0.2, -0.45), (-0.4, -0.35), (0.1, -0.15), (-0.15, -0.6)):
-            place = place_robot(drawn(robot, seed, signed=signed), {"tx": tx, "tz": tz})
+            place = place_robot(
+                with_papers_errors(robot, seed, signed=signed), {"tx": tx, "tz": tz}
+            )
             assert crosscheck(place).passed, (seed, tx, tz)
 
 
@@ -209,7 +184,7 @@ def test_two_scales_at_full_errors_are_made_enough(irsbot2):
     Of 30 draws on two scales alone, slopes were 1.92 to 2.21.
     """
     at = place_robot(
-        drawn(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
+        with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )
     check = crosscheck(at, (1.0, 0.5))
     assert check.passed, check.text()
@@ -276,32 +251,6 @@ def test_what_a_serial_robot_cannot_compare_is_counted_beside_what_passed():
     assert outcome[-1] == f"passed; {counted} checks had nothing to compare"
 
 
-@pytest.mark.parametrize("more", [[], ["--clearances"]])
-def test_the_command_does_not_pass_a_robot_without_errors(more):
-    outcome = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
-    assert outcome.exit_code == 1
-    assert "NOT CHECKED" in outcome.output
-    assert "passed" not in outcome.output
-    assert not re.search(r"\bok\b", outcome.output)
-
-
-def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
-    """The errors of the file replace the robot's; the seed says which draw."""
-    target, root = tmp_path / "check.json", Path(__file__).parents[3]
-    example = root / "examples" / "irsbot2_errors.toml"
-    outcome = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
-    assert outcome in (root / "README.md").read_text(encoding="utf-8")
-    words = ["irsbot2", "--errors", str(example), "--pose", "tx=0,tz=-0.5"]
-    outcome = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
-    assert outcome.exit_code == 0, outcome.output
-    table = json.loads(target.read_text())
-    assert {check["verdict"] for check in table["checks"].values()} == {"ok"}
-    assert table["scales"][0]["vjm"]["energy"] > 0.1
-    again = run(*words, "--scale", "1,0.5,0.25", "--seed", "2", "--json", "-")
-    other = json.loads(again.output)["scales"][0]["vjm"]["energy"]
-    assert other != table["scales"][0]["vjm"]["energy"]
-
-
 def test_a_failed_simulation_says_so_in_a_table():
     frames = (
         Frame("a", translation=[1, 0, 0]),
@@ -320,162 +269,7 @@ def test_scales_that_give_no_slope_are_refused(posture, scales):
         crosscheck(posture, scales)
 
 
-def test_extrapolation_is_exact_for_polynomials():
-    """Three points, a parabola: 3 - 2 s + 5 s^2 is 3 at s = 0."""
-    s = np.array([1.0, 0.5, 0.25])
-    values = np.array([3 - 2 * s + 5 * s**2, s]).T
-    np.testing.assert_allclose(extrapolate(s, values), [3, 0], atol=1e-14)
-
-
-def test_a_slope_ignores_what_is_below_the_floor():
-    scales = [1.0, 0.1, 0.01]
-    assert fit_slope(scales, [1e-3, 1e-5, 1e-6], 1e-5 / 2) == pytest.approx(2.0)
-    assert math.isnan(fit_slope(scales, [1e-3, 1e-9, 1e-9], 1e-5))
-
-
-def test_a_third_order_term_does_not_spoil_the_slope():
-    """d = s^2 + s^3/2: the plain fit says 2.21, the one with a correction 2.02."""
-    s = np.array([1.0, 0.5, 0.25, 0.125])
-    assert fit_slope(s, s**2 + s**3 / 2, 0.0) == pytest.approx(2.0, abs=0.03)
-
-
-def test_a_first_order_term_of_two_per_cent_shows_in_the_slope():
-    """d = s^2 + s/50, two per cent of a difference that is itself one per cent."""
-    s = np.array([1.0, 0.5, 0.25, 0.125])
-    assert fit_slope(s, s**2 + s / 50, 0.0) < 2.0 - 0.1
-
-
-# One term of the virtual-joint model broken at a time.  Each must be found out.
-
-
-def _scaled(where, name, factor):
-    def mutate(monkeypatch):
-        import importlib
-
-        module = importlib.import_module(where)
-        right = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *a, **k: factor * right(*a, **k))
-
-    return mutate
-
-
-def _lever(change):
-    """The adjoint's block [p_j - p]x R, changed."""
-
-    def mutate(monkeypatch):
-        import assembly.kinematics.posture
-
-        right = assembly.kinematics.posture.screw_map
-
-        def wrong(offset, rotation=None):
-            A = right(offset, rotation).copy()
-            A[..., 3:, :3] = change(A[..., 3:, :3])
-            return A
-
-        monkeypatch.setattr(assembly.kinematics.posture, "screw_map", wrong)
-
-    return mutate
-
-
-def _signs(change):
-    def mutate(monkeypatch):
-        import assembly.linear.closure
-
-        right = assembly.linear.closure.closure_signs
-        monkeypatch.setattr(
-            assembly.linear.closure, "closure_signs", lambda robot: change(right(robot))
-        )
-
-    return mutate
-
-
-def _beam(row, column, factor):
-    """One entry of K_E^-1 of every beam, in section axes."""
-
-    def mutate(monkeypatch):
-        import stiffness.beam.beam
-
-        right = stiffness.beam.beam._compliance_in_section_axes
-
-        def wrong(*args):
-            C = right(*args)
-            C[row, column] *= factor
-            C[column, row] = C[row, column]
-            return C
-
-        monkeypatch.setattr(stiffness.beam.beam, "_compliance_in_section_axes", wrong)
-
-    return mutate
-
-
-def _shifted_errors(monkeypatch):
-    """Eq. (14) as printed: errors read at the parent frame instead of the frame."""
-    from assembly.kinematics.posture import Posture
-    from stiffness.screws import screw_map
-
-    def wrong(self):
-        T = np.concatenate([np.eye(4)[None], self.transforms])[self.robot.parents + 1]
-        return screw_map(T[:, :3, 3] - self.platform[:3, 3], T[:, :3, :3])
-
-    monkeypatch.setattr(Posture, "paths", property(wrong))
-
-
-def _no_rotation(monkeypatch):
-    import assembly.kinematics.posture
-
-    right = assembly.kinematics.posture.screw_map
-    monkeypatch.setattr(
-        assembly.kinematics.posture,
-        "screw_map",
-        lambda offset, rotation=None: right(offset),
-    )
-
-
-MUTATIONS = {
-    "lever arm missing": _lever(lambda block: 0.0 * block),
-    "lever arm of the wrong sign": _lever(lambda block: -block),
-    "lever arm one per cent short": _lever(lambda block: 0.99 * block),
-    "axes of the frames forgotten": _no_rotation,
-    "eq. (14) as printed": _shifted_errors,
-    "second chain added, not subtracted": _signs(np.abs),
-    "second chain counted twice": _signs(lambda s: np.where(s < 0, 2 * s, s)),
-    "links twice as soft": _scaled("assembly.linear.closure", "link_compliances", 2.0),
-    "links half a per cent stiff": _scaled(
-        "assembly.linear.closure", "link_compliances", 0.995
-    ),
-    "joints twice as soft": _scaled(
-        "assembly.linear.closure", "joint_compliances", 2.0
-    ),
-    "joints rigid": _scaled("assembly.linear.closure", "joint_compliances", 1e-9),
-}
-
-BEAM_MUTATIONS = {
-    "torsion halved": _beam(0, 0, 0.5),
-    "bending about y a tenth stiffer": _beam(1, 1, 0.9),
-    "bending about z a tenth softer": _beam(2, 2, 1.1),
-    "axial compliance doubled": _beam(3, 3, 2.0),
-    "deflection along y L^3/3.75": _beam(4, 4, 0.8),
-    "deflection along z L^3/2.7": _beam(5, 5, 1.1),
-    "coupling in the x-z plane of the wrong sign": _beam(1, 5, -1.0),
-    "coupling in the x-y plane of the wrong sign": _beam(2, 4, -1.0),
-    "coupling in the x-y plane gone": _beam(2, 4, 0.0),
-}
-
-
 LOAD = [5.0, -8.0, 3.0, 100.0, 300.0, -200.0]
-
-
-@pytest.fixture
-def broken(monkeypatch):
-    """Breaks a term; columns made before it broke, or while it was, are forgotten."""
-    from assembly.linear.closure import _virtual_joints
-
-    def breaks(mutation):
-        mutation(monkeypatch)
-        _virtual_joints.cache_clear()
-
-    yield breaks
-    _virtual_joints.cache_clear()
 
 
 @pytest.mark.parametrize("mutation", MUTATIONS.values(), ids=MUTATIONS.keys())
@@ -495,75 +289,6 @@ def test_a_broken_beam_is_found_out(mutation, broken):
     broken(mutation)
     check = crosscheck(triangle(error), load=LOAD)
     assert not check.passed
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, ["crosscheck", *arguments])
-
-
-def test_the_command_writes_the_public_keys(tmp_path):
-    target = tmp_path / "check.json"
-    picture = tmp_path / "slope.png"
-    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
-               "--scale", "1,0.5", "--json", str(target),
-               "--figure", str(picture))  # fmt: skip
-    assert outcome.exit_code == 0, outcome.output
-    assert "passed" in outcome.output
-    table = json.loads(target.read_text())
-    assert table["passed"] is True
-    assert table["slope"] == pytest.approx(2.0, abs=0.1)
-    assert [entry["scale"] for entry in table["scales"]] == [1.0, 0.5]
-    entry = table["scales"][0]
-    for side in ("vjm", "multibody", "difference"):
-        assert len(entry[side]["platform_screw"]) == 6
-        assert isinstance(entry[side]["energy"], float)
-        assert len(entry[side]["links"]["leg1.link_a"]) == 6
-    a, b, d = (entry[s]["energy"] for s in ("vjm", "multibody", "difference"))
-    assert d == pytest.approx(b - a)
-    assert picture.stat().st_size > 1000
-
-
-def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
-    target, file = tmp_path / "check.json", tmp_path / "robot.toml"
-    write_robot(irsbot2, file)
-    outcome = run(str(file), "--pose", "tx=0.0,tz=-0.5", "--clearances",
-               "--scale", "0.5,0.25", "--json", str(target))  # fmt: skip
-    assert outcome.exit_code == 0, outcome.output
-    table = json.loads(target.read_text())
-    assert table["passed"] is True
-    assert table["slope"] is None
-    assert [entry["scale"] for entry in table["scales"]] == [0.5, 0.25]
-    assert len(table["optimality_gaps"]) == 2 + len(table["added_scales"])
-    refused = run(str(file), "--clearances", "--figure", "slope.png")
-    assert isinstance(refused.exception, BadInput)
-
-
-def test_the_command_fails_with_status_1(monkeypatch):
-    MUTATIONS["lever arm missing"](monkeypatch)
-    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100")
-    assert outcome.exit_code == 1
-    assert "FAIL" in outcome.output or "cannot" in outcome.output
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("slope.txt", "expected a picture: .png or .svg or .pdf"),
-        ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
-    ],
-)
-def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
-    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
-               "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
-    assert isinstance(outcome.exception, BadInput)
-    assert message in str(outcome.exception)
-
-
-@pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
-def test_the_command_refuses_bad_scales(text):
-    outcome = run("irsbot2", "--scale", text)
-    assert isinstance(outcome.exception, BadInput)
-    assert f'--scale: found "{text}", expected at least two' in str(outcome.exception)
 
 
 def test_the_slope_figure_shows_what_was_found(posture):
