@@ -46,11 +46,11 @@ def paper_sources(share: float) -> ErrorSources:
 def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
     """Draws without energy, certified, and slower, of one block; drawing included."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
-    found = one.solve(errors)
+    draws = one.solve(errors)
     h = errors.reshape(BLOCK, -1) @ one.misfit.T
-    allowed = 1e-8 * found.energy + 1e-12 * (h**2).sum(axis=1) / 2
-    fine = found.energy - found.bound <= allowed
-    return np.array([np.sum(found.energy <= 1e-20), fine.sum(), found.fallback.sum()])
+    allowed = 1e-8 * draws.energy + 1e-12 * (h**2).sum(axis=1) / 2
+    fine = draws.energy - draws.bound <= allowed
+    return np.array([np.sum(draws.energy <= 1e-20), fine.sum(), draws.fallback.sum()])
 
 
 def run(one: OnePosture, sources: ErrorSources, blocks: int, threads: int) -> tuple:
