@@ -136,7 +136,7 @@ def _load_parts(function: Callable) -> None:
         callee = function.__globals__.get(name)
         if isinstance(callee, Dispatcher):
             _load_parts(callee.py_func)
-        elif isinstance(callee, Callable) and callee in _parts:
+        elif callable(callee) and callee in _parts:
             _parts[callee].load()
 
 
