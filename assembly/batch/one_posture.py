@@ -24,7 +24,7 @@ from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN
 from assembly.solvers.conic import (
     GAP,
-    GAP_WITHOUT_PLAY,
+    GAP_WITHOUT_CLEARANCE,
     SolverFailed,
     minimise_energy,
 )
@@ -207,7 +207,7 @@ def _solve_loaded(one: OnePosture, loads: PostureLoads, errors: NDArray) -> Draw
     residual = parts @ one.left.T + one.closures @ loads.screws
     residual = np.abs(residual).max(axis=1, initial=0.0)
     infeasible = np.abs(e @ one.infeasible.T).max(axis=1, initial=0.0)
-    allowed = GAP * energy + GAP_WITHOUT_PLAY * (h**2).sum(axis=1) / 2
+    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * (h**2).sum(axis=1) / 2
     # written so that NaN is not certified
     certified = (gap <= allowed) & (residual <= OPEN) & (infeasible <= INFEASIBLE)
     certified &= (np.abs(motions) <= one.ranges).all(axis=1)

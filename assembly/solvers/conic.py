@@ -24,7 +24,7 @@ _TOLERANCE = 1e-13
 # robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # gap that counts as proved: of the energy, and of the energy without clearance
-GAP, GAP_WITHOUT_PLAY = 1e-8, 1e-12
+GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _SHARE = 0.1  # of it that is asked here: the problem before elimination adds to it
 _STOP = 1e-2  # Newton's method stops at this fraction of it
 _STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
@@ -136,7 +136,7 @@ def minimise_energy(
 
 def _proved(least: LeastEnergy, h: NDArray) -> bool:
     """Whether the certified gap of a scaled problem is small enough."""
-    allowed = GAP * abs(least.value) + GAP_WITHOUT_PLAY * float(h @ h) / 2
+    allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
 
@@ -210,7 +210,7 @@ def _certified(
     u, y = u.copy(), np.concatenate([h, -rigid])
     newton(
         Gt, right, d, len(h), _starts(group), _STOP * GAP,
-        _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _FIRST_SIGMA, u, y,
+        _STOP * GAP_WITHOUT_CLEARANCE * size, _STEPS, _FIRST_SIGMA, u, y,
     )  # fmt: skip
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():

@@ -2,14 +2,14 @@
 
     minimise  |G u + h|^2 / 2 - d.u    subject to  H u = k,  |u_k| <= 1 for each cone k
 
-Nesterov-Todd scaling, Mehrotra's predictor and corrector.  The start, u = 0 with the
-multipliers that balance it, satisfies everything but H u = k, and stays so: the gap is
-then the sum of s.z over the cones.  Each step solves one symmetric system of the size
-of G's and H's rows together, about 10 by 10, whatever the number of clearances.
+Nesterov-Todd scaling, Mehrotra's predictor and corrector.  The start, u = 0 with its
+multipliers, satisfies everything but H u = k, and so do all iterates: the gap is the
+sum of s.z over the cones.  Each step solves one symmetric system of the size of G's and
+H's rows together, about 10 by 10, whatever the number of clearances.
 
-Arranged for speed: the columns are sorted into layers, the first of every cone, then
-the second of every cone that has one, and so on, the largest cones first; what is done
-to each cone is done along a layer, several cones at once in the processor's registers.
+For speed the columns are sorted into layers, the first of every cone, then the second
+of every cone that has one, and so on, the largest cones first: loops over the cones run
+along a layer, several cones at once in the processor's vector registers.
 
 Sources:
     Nesterov, Todd (1997), Self-scaled barriers and interior-point methods for convex
@@ -32,7 +32,7 @@ from assembly.solvers.compiled import (
 )
 
 _ITERATIONS = 60
-_BACK_OFF = 0.99  # of the way to the nearest cone's boundary
+_BACK_OFF = 0.99  # of the step to the nearest boundary of a cone
 # 3 is usual; on these problems 2 takes a seventh, 1.5 a sixth less iterations
 _CENTRING = 1.5
 _FAR = 1e30
@@ -64,11 +64,11 @@ def interior_point(
     p, cones = len(k), len(starts) - 1
     m = r + p
     order, layers = layers_of(starts)
-    # rows end in zeros, so that none is left over when sixteen are taken at a time
+    # rows are padded with zeros to a multiple of the vector registers
     width = nu + -nu % LANES
-    M, push = np.zeros((m, width)), np.zeros(width)
+    M, linear = np.zeros((m, width)), np.zeros(width)
     for j in range(nu):
-        push[j] = -d[order[j]]
+        linear[j] = -d[order[j]]
         for i in range(r):
             M[i, j] = G[i, order[j]]
         for i in range(p):
@@ -87,10 +87,10 @@ def interior_point(
     across, along, sums = heads[7], heads[8], heads[9:]
     B, S = np.zeros((m, width)), np.empty((m, m))
     # multipliers of all rows: springs' own, v = G u + h, and n
-    y, right, left = np.zeros(m), np.empty(m), np.empty(p)
+    y, right, residual = np.zeros(m), np.empty(m), np.empty(p)
     for i in range(r):
         y[i] = h[i]
-    _pull(M, y, push, z1)
+    _dual(M, y, linear, z1)
     _sum(layers, z1, z1, sums[0])
     for c in range(cones):
         z0[c] = np.sqrt(sums[0, c]) + 1.0
@@ -102,8 +102,8 @@ def interior_point(
             gap += z0[c]
         worst = 0.0
         for i in range(p):
-            left[i] = k[i] - dot(M[r + i], u)
-            worst = max(worst, abs(left[i]))
+            residual[i] = k[i] - dot(M[r + i], u)
+            worst = max(worst, abs(residual[i]))
         energy = 0.0
         for i in range(r):
             energy += 0.5 * y[i] * y[i]
@@ -124,15 +124,15 @@ def interior_point(
             r0[c] = -z0[c] - sums[0, c]
         for j in range(width):
             t1[j] = -l1[j]
-        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1, left, r,
-                   sums, e, f, right, du, dz0, dz1)  # fmt: skip
+        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1,
+                   residual, r, sums, e, f, right, du, dz0, dz1)  # fmt: skip
         step = min(1.0, _longest(layers, u, du, z0, z1, dz0, dz1, sums))
         sigma = (1.0 - step) ** _CENTRING
         # corrector: centre, and what the predictor's product of steps leaves
         _corrected(layers, eta, w0, w1, l0, l1, du, dz0, dz1, sigma * mu, sums,
                    t0, t1, r0)  # fmt: skip
-        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1, left, r,
-                   sums, e, f, right, du, dz0, dz1)  # fmt: skip
+        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1,
+                   residual, r, sums, e, f, right, du, dz0, dz1)  # fmt: skip
         step = min(1.0, _BACK_OFF * _longest(layers, u, du, z0, z1, dz0, dz1, sums))
         if not step >= 1e-10:
             break
@@ -140,16 +140,16 @@ def interior_point(
             u[j] += step * du[j]
         for c in range(cones):
             z0[c] += step * dz0[c]
-        # the balance holds by construction; found anew it cannot drift
+        # the balance holds by construction; computed anew it cannot drift
         for i in range(r):
             y[i] = h[i] + dot(M[i], u)
         for i in range(r, m):
             y[i] += step * right[i]
-        _pull(M, y, push, z1)
-    answer = np.empty(nu)
+        _dual(M, y, linear, z1)
+    minimiser = np.empty(nu)
     for j in range(nu):
-        answer[order[j]] = u[j]
-    return answer, y[r:].copy(), taken
+        minimiser[order[j]] = u[j]
+    return minimiser, y[r:].copy(), taken
 
 
 @part
@@ -180,7 +180,7 @@ def layers_of(starts: GivenIndices) -> tuple[Indices, Indices]:
 
 @kernel(fastmath=FAST)
 def dot(a: NDArray, b: NDArray) -> float:
-    """Inner product of two rows, quick where they end in zeros to a length of LANES.
+    """Inner product of two rows, fast where they are padded to a multiple of LANES.
 
     Args:
         a: (width,).
@@ -202,17 +202,17 @@ def add(weight: float, row: NDArray, total: NDArray) -> None:
     Args:
         weight: which multiple.
         row: (width,).
-        total: (width,) leaves larger by it.
+        total: (width,) incremented in place.
     """
     for j in range(len(total)):
         total[j] += weight * row[j]
 
 
 @kernel(fastmath=FAST)
-def _pull(M: NDArray, y: NDArray, push: NDArray, z1: NDArray) -> None:
-    """z1 = M^T y + push."""
+def _dual(M: NDArray, y: NDArray, linear: NDArray, z1: NDArray) -> None:
+    """z1 = M^T y + linear."""
     for j in range(len(z1)):
-        z1[j] = push[j]
+        z1[j] = linear[j]
     for i in range(len(y)):
         add(y[i], M[i], z1)
 
@@ -240,7 +240,7 @@ def _scalings(
     """Nesterov-Todd points of all cones, W = eta (w), and the scaled point l = W z.
 
     D^-1 = W^2 is ``across`` across w and ``along`` along it; w grows without bound, so
-    the two are kept apart.  ``sums[5]`` leaves holding 1 / w.w.
+    the two are kept apart.  ``sums[5]`` is overwritten with 1 / w.w.
 
     Returns:
         Whether all cones have such points.
@@ -269,9 +269,9 @@ def _scalings(
         return False
     for layer in range(len(layers) - 1):
         a, b = layers[layer], layers[layer + 1]
-        own, pull, w = u[a:b], z1[a:b], w1[a:b]
+        own, dual, w = u[a:b], z1[a:b], w1[a:b]
         for c in range(len(own)):
-            w[c] = s_part[c] * own[c] - z_part[c] * pull[c]
+            w[c] = s_part[c] * own[c] - z_part[c] * dual[c]
     ww, wz = ss, zz
     _sum(layers, w1, w1, ww)
     _sum(layers, w1, z1, wz)
@@ -283,9 +283,9 @@ def _scalings(
         inverse[c] = 1.0 / (ww[c] if ww[c] > 0.0 else 1.0)
     for layer in range(len(layers) - 1):
         a, b = layers[layer], layers[layer + 1]
-        pull, w, scaled = z1[a:b], w1[a:b], l1[a:b]
+        dual, w, scaled = z1[a:b], w1[a:b], l1[a:b]
         for c in range(len(w)):
-            scaled[c] = eta[c] * (pull[c] + wz[c] * w[c])
+            scaled[c] = eta[c] * (dual[c] + wz[c] * w[c])
     return True
 
 
@@ -319,10 +319,10 @@ def _fill_system(
 def _cholesky(S: Matrix) -> bool:
     """Factor the lower half in place; rows lost to rounding get a huge pivot.
 
-    The diagonal leaves holding its inverse.
+    The diagonal is overwritten with its inverse.
 
     Returns:
-        Whether every number is one.
+        Whether every number is finite.
     """
     for i in range(len(S)):
         own, diagonal = S[i], S[i, i]
@@ -355,24 +355,24 @@ def _square_scaled(
         part[c] *= inverse[c]
     for layer in range(len(layers) - 1):
         a, b = layers[layer], layers[layer + 1]
-        own, w, found = x[a:b], w1[a:b], out[a:b]
+        own, w, product = x[a:b], w1[a:b], out[a:b]
         for c in range(len(w)):
             lengthwise = part[c] * w[c]
-            found[c] = across[c] * (own[c] - lengthwise) + along[c] * lengthwise
+            product[c] = across[c] * (own[c] - lengthwise) + along[c] * lengthwise
 
 
 @part(fastmath=FAST)
 def _direction(
     layers: Indices, M: Matrix, S: Matrix, eta: Vector, w0: Vector, w1: Vector,
     across: Vector, along: Vector, t0: Vector, t1: Vector, r0: Vector, u: Vector,
-    z1: Vector, left: Vector, r: int, sums: Matrix, e: Vector,
+    z1: Vector, residual: Vector, r: int, sums: Matrix, e: Vector,
     f: Vector, right: Vector, du: Vector, dz0: Vector, dz1: Vector,
 ) -> None:  # fmt: skip
     """Step for the scaled right sides t, with M's rows eliminated.
 
     dz1 comes from the balance and dz0 from s.dz + z.ds = r0, the first row of the
-    scaled complementarity: W^-1 t - W^-2 ds, the same thing, cancels near the end.
-    ``right`` leaves holding (G du, dn).
+    scaled complementarity: the equal W^-1 t - W^-2 ds cancels near the solution.
+    ``right`` is overwritten with (G du, dn).
     """
     m = len(S)
     part, other = sums[0], sums[1]
@@ -389,7 +389,7 @@ def _direction(
     for i in range(m):
         right[i] = dot(M[i], e)
     for i in range(m - r):
-        right[r + i] -= left[i]
+        right[r + i] -= residual[i]
     for i in range(m):
         total = right[i]
         for j in range(i):
@@ -487,5 +487,5 @@ def _root(a: float, b: float, c: float) -> float:
     inside = b * b - a * c
     below = b + np.sqrt(inside if inside > 0.0 else 0.0)
     crosses = inside >= 0.0 and below > 0.0
-    found = -c / (below if crosses else 1.0)
-    return found if crosses else _FAR
+    smallest = -c / (below if crosses else 1.0)
+    return smallest if crosses else _FAR
