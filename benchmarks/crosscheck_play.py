@@ -51,10 +51,10 @@ def main() -> None:
                 seconds.append(time.perf_counter() - started)
             converged += 1
             best = solve_assembly(case)
-            for values, answer in ((linear, best), (exact, exact_solution(best))):
-                if answer is not None:
-                    size = max(answer.energy, FLOOR_ENERGY)
-                    values.append(abs(simulated.rigid_energy - answer.energy) / size)
+            for values, model in ((linear, best), (exact, exact_solution(best))):
+                if model is not None:
+                    size = max(model.energy, FLOOR_ENERGY)
+                    values.append(abs(simulated.rigid_energy - model.energy) / size)
         print(
             f"{name:10} {converged}/{draws}    {np.median(seconds):.2f} "
             f"{max(seconds):.2f}   "

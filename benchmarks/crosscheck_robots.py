@@ -65,14 +65,14 @@ def hexapod(play: bool = False) -> Robot:
                   joint="revolute", joint_stiffness=bush,
                   clearance=PLAY if play else None),
         ]  # fmt: skip
-        here = R @ Rotation.from_euler("X", np.pi).as_matrix()
-        here = here @ Rotation.from_euler("Y", np.pi / 2).as_matrix()
+        rotation = R @ Rotation.from_euler("X", np.pi).as_matrix()
+        rotation = rotation @ Rotation.from_euler("Y", np.pi / 2).as_matrix()
         frames.append(
             Frame(
                 f"{name}.tip",
                 f"{name}.ball3",
-                rotation=_vector(here.T),
-                translation=here.T @ (np.array([0, 0, 0.6]) - b),
+                rotation=_vector(rotation.T),
+                translation=rotation.T @ (np.array([0, 0, 0.6]) - b),
             )
         )
         if k:

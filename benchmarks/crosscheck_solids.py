@@ -29,14 +29,14 @@ def main() -> None:
         )
         for links in ("spring", "fem"):
             started = time.perf_counter()
-            answer = crosscheck(posture, links=links)
-            first = answer.pairs[0]
+            check = crosscheck(posture, links=links)
+            first = check.pairs[0]
             energy = first.simulated.energy / first.exact.energy - 1
             print(
-                f"{seed:4}  {links:7} {answer.passed!s:6}  {answer.slope:.4f}  "
-                f"{max(c.value for c in answer.metric.limits.values()):.1e}  "
-                f"{answer.metric.unexplained['rotation']:.1e}        "
-                f"{answer.metric.unexplained['translation']:.1e}           {energy:.1e}"
+                f"{seed:4}  {links:7} {check.passed!s:6}  {check.slope:.4f}  "
+                f"{max(c.value for c in check.metric.limits.values()):.1e}  "
+                f"{check.metric.unexplained['rotation']:.1e}        "
+                f"{check.metric.unexplained['translation']:.1e}           {energy:.1e}"
                 f"              {time.perf_counter() - started:.1f}"
             )
 

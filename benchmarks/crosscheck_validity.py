@@ -19,19 +19,18 @@ from pathlib import Path
 import numpy as np
 from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
+from validity_models import bush_margin, halves_cost, with_bars
 
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.solvers.conic import SolverFailed
-from validation.assumptions.bushes import bush_margin
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
-    halves_cost,
     link_cost,
     spread_cost,
 )
@@ -100,24 +99,24 @@ def row(
     cost: Callable[..., Cost], *arguments: object,
 ) -> dict:  # fmt: skip
     """Median and largest cost over cases, at a robot, assumption, case and x."""
-    found = []
+    costs = []
     for posture in cases:
         try:
-            found.append(cost(posture, *arguments))
+            costs.append(cost(posture, *arguments))
         except SolverFailed as error:
             print(*head, error, file=sys.stderr)
-    columns = {k: [getattr(c, k) for c in found] for k in vars(found[0])}
+    columns = {k: [getattr(c, k) for c in costs] for k in vars(costs[0])}
     spread = {k: [float(np.median(v)), float(max(v))] for k, v in columns.items()}
-    beyond = float(np.mean([c.matters for c in found]))
+    beyond = float(np.mean([c.matters for c in costs]))
     named = dict(zip(("robot", "assumption", "case", "x"), head, strict=True))
-    return named | spread | {"beyond": beyond, "cases": len(found)}
+    return named | spread | {"beyond": beyond, "cases": len(costs)}
 
 
 def bar_compliances() -> dict[float, np.ndarray]:
     """Unit compliance of round bars by slenderness, good to 0.2 per cent."""
     if not KEPT.is_file():
-        found = {ratio: bar_compliance(ratio, 0.3, 0.002).tolist() for ratio in BARS}
-        KEPT.write_text(json.dumps(found, indent=0) + "\n")
+        costs = {ratio: bar_compliance(ratio, 0.3, 0.002).tolist() for ratio in BARS}
+        KEPT.write_text(json.dumps(costs, indent=0) + "\n")
     kept = json.loads(KEPT.read_text())
     return {float(ratio): np.array(C) for ratio, C in kept.items()}
 
@@ -181,8 +180,8 @@ def print_margins(name: str) -> None:
             if disc and bushes:
                 factors.append(bushes / disc)
         if factors:
-            found = np.percentile(factors, [0, 50, 100])
-            print(name, f"margin, compliant {compliant}: bushes / disc", found.round(3))
+            costs = np.percentile(factors, [0, 50, 100])
+            print(name, f"margin, compliant {compliant}: bushes / disc", costs.round(3))
 
 
 def forks() -> Iterable[dict]:
@@ -281,15 +280,15 @@ def main() -> None:
     bars = bar_compliances()
     for name in POSES:
         for part in (closures(name), beams(name, bars), weights(name), discs(name)):
-            found = list(part)
-            print(f"\n{name}: {found[0]['assumption']}\n")
-            print_table(found)
-            rows += found
+            costs = list(part)
+            print(f"\n{name}: {costs[0]['assumption']}\n")
+            print_table(costs)
+            rows += costs
         print_margins(name)
     print("\nreal shape\n")
-    found = [*forks(), *rods()]
-    print_table(found)
-    rows += found
+    costs = [*forks(), *rods()]
+    print_table(costs)
+    rows += costs
     maps = {name: over_poses(name) for name in POSES}
     validity_figure(rows).savefig(folder / "validity.png", dpi=80)
     pose_figure(maps).savefig(folder / "validity_poses.png", dpi=80)

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from random_robots import draw_robot
 
 from forcefit.inputs.table import BadInput
@@ -37,11 +38,10 @@ from validation.synthetic.equivalents import SAME, Alternative, alternatives
 from validation.synthetic.generator import (
     Noise,
     Synthetic,
-    finite_part,
     generate_campaign,
     write_campaign,
 )
-from validation.synthetic.machine import Hidden
+from validation.synthetic.machine import Hidden, simulate_readings
 from validation.synthetic.outside import OUTSIDE
 from validation.synthetic.truth import truth_of
 
@@ -50,8 +50,22 @@ STRENGTHS = (2.0, 5.0, 9.0)
 TRIES = 12  # draws of a case until its robot can have the effects
 FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
 VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
+SMALL = 1e-2  # scale of errors and load at which the machine is linear
 WITHIN_90 = 1.645  # [-] standard deviations
 VERDICTS = ("explained", "none_needed", "ambiguous", "outside_library")
+
+
+def finite_part(campaign: Synthetic) -> NDArray:
+    """(rows, 6) [rad, m] finite minus linear readings of the declared machine."""
+    robot, rows = campaign.robot, campaign.plan.rows
+
+    def readings(scale: float) -> NDArray:
+        scaled = [replace(row, load=scale * row.load) for row in rows]
+        machine = robot.with_errors(scale * robot.errors)
+        point = campaign.reference_point
+        return simulate_readings(machine, point, scaled, (), "springs")
+
+    return readings(1.0) - (readings(SMALL) - readings(-SMALL)) / (2 * SMALL)
 
 
 def draw_case(seed: int) -> tuple[str, Synthetic]:
@@ -191,11 +205,11 @@ def answer(folder: Path, seed: int) -> None:
         return
     started = time.perf_counter()
     try:
-        said = table(diagnose(read_campaign(folder / "campaigns" / name)))
+        diagnosis = table(diagnose(read_campaign(folder / "campaigns" / name)))
     except Exception:  # a crash is an answer too, and is counted
-        said = {"verdict": "crashed", "why": traceback.format_exc()}
-    said["seconds"] = time.perf_counter() - started
-    write_json(said, str(target))
+        diagnosis = {"verdict": "crashed", "why": traceback.format_exc()}
+    diagnosis["seconds"] = time.perf_counter() - started
+    write_json(diagnosis, str(target))
 
 
 def score(folder: Path) -> dict[str, Any]:
@@ -215,26 +229,26 @@ def score(folder: Path) -> dict[str, Any]:
     seconds: list[float] = []
     wrong: list[str] = []
     for path in sorted((folder / "answers").glob("*.json")):
-        said = json.loads(path.read_text())
+        diagnosis = json.loads(path.read_text())
         truth = json.loads((folder / "truths" / path.name).read_text())[path.stem]
         names = sorted(effect["name"] for effect in truth["effects"])
-        result = _judge(truth, said)
+        result = _judge(truth, diagnosis)
         strength = min(truth["contribution_rms"].values(), default=0.0)
         for group in (truth["kind"], f"{truth['kind']} {_band(strength)}", "all"):
             outcome[group][result] += 1
-        confusion["+".join(names) or "none"][_told(said)] += 1
-        seconds.append(said.get("seconds", 0.0))
+        confusion["+".join(names) or "none"][_told(diagnosis)] += 1
+        seconds.append(diagnosis.get("seconds", 0.0))
         if result in ("false claim", "false outside", "crashed", "missed"):
-            claimed = "+".join(sorted(e["name"] for e in said.get("effects", [])))
+            claimed = "+".join(sorted(e["name"] for e in diagnosis.get("effects", [])))
             sizes = {k: round(v, 1) for k, v in truth["contribution_rms"].items()}
             wrong.append(
                 f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
-                f"{said['verdict']} {claimed}: {result}"
+                f"{diagnosis['verdict']} {claimed}: {result}"
             )
-        if result == "right" and said["verdict"] == "explained":
-            ratios.append(said["error"]["after"]["normalised"])
-            inside += _inside(truth, said)
-        probabilities = said.get("probabilities") or {}
+        if result == "right" and diagnosis["verdict"] == "explained":
+            ratios.append(diagnosis["error"]["after"]["normalised"])
+            inside += _inside(truth, diagnosis)
+        probabilities = diagnosis.get("probabilities") or {}
         if probabilities and truth["kind"] in ("single", "pair", "none"):
             squares = [(p - (n in names)) ** 2 for n, p in probabilities.items()]
             brier.append(float(np.mean(squares)))
@@ -249,12 +263,12 @@ def score(folder: Path) -> dict[str, Any]:
     }
 
 
-def _judge(truth: dict, said: dict) -> str:
+def _judge(truth: dict, diagnosis: dict) -> str:
     """right, abstained, false claim, false outside, missed or crashed."""
-    verdict = said["verdict"]
+    verdict = diagnosis["verdict"]
     if verdict == "crashed":
         return "crashed"
-    claimed = sorted(effect["name"] for effect in said.get("effects", []))
+    claimed = sorted(effect["name"] for effect in diagnosis.get("effects", []))
     accepted = [sorted(names) for names in truth["accept_effects"]]
     loose = len(truth["accept_verdicts"]) == len(VERDICTS)
     if verdict == "ambiguous":
@@ -270,11 +284,11 @@ def _judge(truth: dict, said: dict) -> str:
     return "right" if claimed in accepted and claimed else "false claim"
 
 
-def _told(said: dict) -> str:
+def _told(diagnosis: dict) -> str:
     """What was claimed, in a word."""
-    if said["verdict"] == "explained":
-        return "+".join(sorted(effect["name"] for effect in said["effects"]))
-    return str(said["verdict"])
+    if diagnosis["verdict"] == "explained":
+        return "+".join(sorted(effect["name"] for effect in diagnosis["effects"]))
+    return str(diagnosis["verdict"])
 
 
 def _band(strength: float) -> str:
@@ -289,7 +303,7 @@ def _band(strength: float) -> str:
     )
 
 
-def _inside(truth: dict, said: dict) -> list[bool]:
+def _inside(truth: dict, diagnosis: dict) -> list[bool]:
     """For every parameter found: is the truth within the 90 % interval?"""
     known = {
         (effect["name"], parameter["name"]): parameter["value"]
@@ -297,7 +311,7 @@ def _inside(truth: dict, said: dict) -> list[bool]:
         for parameter in effect["parameters"]
     }
     inside = []
-    for effect in said["effects"]:
+    for effect in diagnosis["effects"]:
         for parameter in effect["parameters"]:
             key = effect["name"], parameter["name"]
             if key in known and parameter["std"]:
@@ -344,9 +358,9 @@ def main() -> None:
                 answer(asked.folder, seed)
             print(f"case {seed}: {time.perf_counter() - started:.0f} s", flush=True)
     if not asked.make:
-        found = score(asked.folder)
-        write_json(found, str(asked.folder / "score.json"))
-        print(json.dumps(found, indent=1))
+        scores = score(asked.folder)
+        write_json(scores, str(asked.folder / "score.json"))
+        print(json.dumps(scores, indent=1))
 
 
 if __name__ == "__main__":

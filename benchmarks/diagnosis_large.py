@@ -65,13 +65,13 @@ def main() -> None:
             make(folder, case)
         campaign = read_campaign(folder)
         started = time.process_time()
-        found = diagnose(campaign)
+        diagnosis = diagnose(campaign)
         seconds = time.process_time() - started
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         print(
-            f"{kind:9s} {rows} rows, hidden {hidden}: {found.verdict} "
-            f"{' + '.join(found.best_by_score)}; {seconds:.0f} s, at most {memory:.1f} "
-            "GB so far",
+            f"{kind:9s} {rows} rows, hidden {hidden}: {diagnosis.verdict} "
+            f"{' + '.join(diagnosis.best_by_score)}; {seconds:.0f} s, "
+            f"at most {memory:.1f} GB so far",
             flush=True,
         )
 

@@ -51,16 +51,16 @@ def measure(case: dict, poses: np.ndarray) -> tuple[dict[str, np.ndarray], list[
         linear = solve_assembly(posture)
         between = time.perf_counter()
         try:
-            answer = solve_exact(posture, start=linear)
+            exact = solve_exact(posture, start=linear)
         except SolverFailed as error:
             pose = posture.pose()
             failed.append(f"x = {pose['tx']:.3f}, z = {pose['tz']:.3f}: {error}")
             continue
         done = time.perf_counter()
-        error = answer.linearisation_error
+        error = exact.linearisation_error
         rows.append([
-            answer.iterations, answer.closure_residual(), answer.stationarity,
-            answer.clearance_excess(), answer.least_curvature,
+            exact.iterations, exact.closure_residual(), exact.stationarity,
+            exact.clearance_excess(), exact.least_curvature,
             np.linalg.norm(error.rotation), np.linalg.norm(error.translation),
             abs(error.relative_energy), between - started, done - between,
         ])  # fmt: skip

@@ -53,20 +53,20 @@ _OURS = re.compile(
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
     """By command: names of its options, and whether they take a value."""
-    found = {}
+    faults = {}
 
     def walk(command, path):
         for name, inner in getattr(command, "commands", {}).items():
             walk(inner, (*path, name))
         if not hasattr(command, "commands"):
-            found[" ".join(path)] = [
+            faults[" ".join(path)] = [
                 (p.opts[0], not getattr(p, "is_flag", False))
                 for p in command.params
                 if p.param_type_name == "option"
             ]
 
     walk(typer.main.get_command(forcefit_command.app), ())
-    return found
+    return faults
 
 
 def prepare(folder: Path, warm: bool) -> None:
@@ -136,12 +136,12 @@ def run(words: list[str]) -> tuple[object, str, str]:
         for number, copy in enumerate(saved, 1):
             os.dup2(copy, number)
             os.close(copy)
-    said = []
+    messages = []
     for file in files:
         file.seek(0)
-        said.append(file.read().decode("utf-8", errors="replace"))
+        messages.append(file.read().decode("utf-8", errors="replace"))
         file.close()
-    return status, *said
+    return status, *messages
 
 
 def changed(number: int, seed: int, options: dict) -> tuple[list[str], list[str]]:
@@ -183,9 +183,9 @@ def snapshot() -> dict[str, bytes]:
 
 def faults(words, status, out, err, before, after, left) -> list[str]:
     """What is wrong with a result; nothing if it is as it should be."""
-    found = []
+    faults = []
     if status not in {0, 1, 2, 130}:
-        found.append(f"status {status}")
+        faults.append(f"status {status}")
     if "Traceback" in err:
         last = [line for line in err.splitlines() if line.strip()][-1]
         places = re.findall(r'File "([^"]+)", line (\d+)', err)
@@ -193,33 +193,33 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
         return [f"traceback at {ours[-1] if ours else '?'}: {last[:100]}"]
     strange = [line for line in err.splitlines() if not _OURS.match(line)]
     if strange:
-        found.append(f"on stderr: {strange[0][:100]}")
-    said = [line for line in err.splitlines() if line.startswith("forcefit: ")]
-    if status == 2 and len(said) != 1:
-        found.append(f"{len(said)} messages")
-    if any(len(line) > 1000 for line in said):
-        found.append("a message of more than 1000 characters")
+        faults.append(f"on stderr: {strange[0][:100]}")
+    messages = [line for line in err.splitlines() if line.startswith("forcefit: ")]
+    if status == 2 and len(messages) != 1:
+        faults.append(f"{len(messages)} messages")
+    if any(len(line) > 1000 for line in messages):
+        faults.append("a message of more than 1000 characters")
     if status in {0, 1} and "-" in words[-1:] and "--json" in words[-2:]:
         try:
             json.loads(out)
         except ValueError:
-            found.append("stdout is not JSON")
+            faults.append("stdout is not JSON")
     new = {name: content for name, content in after.items() if name not in before}
     other = [
         n for n in before if after.get(n) != before[n] and not may_change(n, after)
     ]
     if other:
-        found.append(f"changed: {other[0]}")
+        faults.append(f"changed: {other[0]}")
     if left:
-        found.append(f"left in the temporary folder: {left[0]}")
+        faults.append(f"left in the temporary folder: {left[0]}")
     for name, content in new.items():
         journal = name.endswith(".journal") and status in {1, 2, 130}
         library = name.startswith(("built", "links", "newfolder"))
         if status == 2 and not journal and not library:
-            found.append(f"written although refused: {name}")
+            faults.append(f"written although refused: {name}")
         elif not journal and not is_whole(name, content):
-            found.append(f"not whole: {name}")
-    return found
+            faults.append(f"not whole: {name}")
+    return faults
 
 
 def may_change(name: str, after: dict[str, bytes]) -> bool:
@@ -249,11 +249,11 @@ def is_whole(name: str, content: bytes) -> bool:
 def one(number: int, seed: int, options: dict, seeds: Path) -> dict:
     """One input, from its files to what is wrong with it."""
     place = Path(tempfile.mkdtemp(dir=f"{seeds}.inputs"))
-    here, temporary = place / "here", place / "tmp"
-    shutil.copytree(seeds, here)
-    (here / "empty").mkdir()
+    folder_of_run, temporary = place / "here", place / "tmp"
+    shutil.copytree(seeds, folder_of_run)
+    (folder_of_run / "empty").mkdir()
     temporary.mkdir()
-    os.chdir(here)
+    os.chdir(folder_of_run)
     words, done = changed(number, seed, options)
     before = snapshot()
     stopped: list[bool] = []
@@ -320,17 +320,17 @@ def batch(numbers: list[int], seed: int, options: dict, seeds: Path) -> list:
                 signal.alarm(0)
                 if len(head) < _HEAD.size:
                     break
-                found = pickle.loads(file.read(_HEAD.unpack(head)[0]))
-                results.append((numbers.pop(0), found))
+                faults = pickle.loads(file.read(_HEAD.unpack(head)[0]))
+                results.append((numbers.pop(0), faults))
         if numbers:
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
         if numbers:
             died = os.WTERMSIG(status) if os.WIFSIGNALED(status) else status
             what = "hangs" if died == signal.SIGKILL else f"dies of signal {died}"
-            found = {"words": [], "done": [], "status": what, "err": "", "out": "",
+            faults = {"words": [], "done": [], "status": what, "err": "", "out": "",
                      "stopped": False, "took": PATIENCE, "wrong": [what]}  # fmt: skip
-            results.append((numbers.pop(0), found))
+            results.append((numbers.pop(0), faults))
     return results
 
 
@@ -355,20 +355,20 @@ def main() -> int:
         prepare(seeds, asked.only is None)
         options = options_of()
         if asked.only is not None:
-            for number, found in batch(asked.only, asked.seed, options, seeds):
-                print(number, shlex.join(found["words"]), found["done"], sep="\n")
-                print(found["out"][-2000:], found["err"], sep="\n")
-                print(found["status"], found["wrong"])
+            for number, faults in batch(asked.only, asked.seed, options, seeds):
+                print(number, shlex.join(faults["words"]), faults["done"], sep="\n")
+                print(faults["out"][-2000:], faults["err"], sep="\n")
+                print(faults["status"], faults["wrong"])
             return 0
         began = time.monotonic()
         for first in range(0, asked.count, BATCH):
             numbers = list(range(first, min(first + BATCH, asked.count)))
-            for number, found in batch(numbers, asked.seed, options, seeds):
+            for number, faults in batch(numbers, asked.seed, options, seeds):
                 counts["inputs"] += 1
-                counts[f"exit status {found['status']}"] += 1
-                counts["stopped by Ctrl-C"] += found["stopped"]
-                slow.append((found["took"], number, shlex.join(found["words"])[:100]))
-                for fault in found["wrong"]:
+                counts[f"exit status {faults['status']}"] += 1
+                counts["stopped by Ctrl-C"] += faults["stopped"]
+                slow.append((faults["took"], number, shlex.join(faults["words"])[:100]))
+                for fault in faults["wrong"]:
                     kind = re.sub(r"[\d.]{4,}|0x\w+", "#", fault)
                     wrong.setdefault(kind, []).append(number)
         os.chdir("/")
@@ -381,8 +381,8 @@ def main() -> int:
     print(
         f"{'processor time':24s} {used:.0f} s, {time.monotonic() - began:.0f} s passed"
     )
-    for took, number, said in sorted(slow, reverse=True)[:8]:
-        print(f"  {took:5.1f} s  {number}: {said}")
+    for took, number, messages in sorted(slow, reverse=True)[:8]:
+        print(f"  {took:5.1f} s  {number}: {messages}")
     print(f"{'faults':24s} {sum(map(len, wrong.values()))} of {len(wrong)} kinds")
     for kind, numbers in sorted(wrong.items(), key=lambda item: -len(item[1])):
         print(f"  {len(numbers):4d}  {kind}   [--only {numbers[0]}]")

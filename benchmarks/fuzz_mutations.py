@@ -98,16 +98,16 @@ def _coded(text: str) -> bytes:
 def _token(content: bytes, random: Random, _: str) -> bytes:
     """A number, string or name replaced by another of the file or an odd one."""
     text = _text(content)
-    found = list(_TOKEN.finditer(text))
-    if not found:
+    tokens = list(_TOKEN.finditer(text))
+    if not tokens:
         return content
-    one = random.choice(found)
+    one = random.choice(tokens)
     if one[0][0] in "-0123456789":
         new = random.choice(NUMBERS)
     elif one[0][0] == '"':
         new = json.dumps(random.choice(TEXTS), ensure_ascii=False)
     else:
-        new = random.choice(found)[0]
+        new = random.choice(tokens)[0]
     return _coded(text[: one.start()] + new + text[one.end() :])
 
 

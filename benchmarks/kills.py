@@ -116,9 +116,9 @@ def watch() -> None:
     )
 
     def solve_and_count(question, points):
-        found = solve(question, points)
+        solution = solve(question, points)
         count(SOLVED, len(points.rows))
-        return found
+        return solution
 
     def draw_and_count(self, first, number):
         rows = draw(self, first, number)
@@ -140,20 +140,20 @@ def start(words: list[str], limit: int | None = None) -> int:
     child = os.fork()
     if child:
         return child
-    status, said = 99, io.StringIO()
-    said.close = lambda: None  # type: ignore[method-assign]
+    status, printed = 99, io.StringIO()
+    printed.close = lambda: None  # type: ignore[method-assign]
     try:
         with Path("/dev/null").open("w") as nothing:
             os.dup2(nothing.fileno(), 1)
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-        sys.stdout, sys.stderr = io.StringIO(), said
+        sys.stdout, sys.stderr = io.StringIO(), printed
         sys.argv = ["forcefit", *words]
         forcefit_command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
         if status not in {0, 130} and limit is None:  # or it may not write that
-            os.write(2, said.getvalue()[-300:].encode())
+            os.write(2, printed.getvalue()[-300:].encode())
     except BaseException:
         with suppress(OSError):
             os.write(2, traceback.format_exc().encode())
@@ -293,10 +293,10 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
     status = finish(start(case.words))
     counts["wrong exit status"] += wrong(status, {0}, case, "nothing")
     counts["lost"] += solved_again(case, standing)
-    found = {p.name: p.read_bytes() for p in Path().glob("out.*")}
-    counts["different at the end"] += found != case.files
+    files = {p.name: p.read_bytes() for p in Path().glob("out.*")}
+    counts["different at the end"] += files != case.files
     counts["ended"] += 1
-    for name in found:
+    for name in files:
         Path(name).unlink()
 
 
@@ -315,14 +315,14 @@ def solved_again(case: Case, standing: int) -> int:
 
 def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
     """Files that are not whole; politely stopped, nothing may be beside one."""
-    found = 0
+    different = 0
     for path in Path().glob("out.*"):
         if path.suffix == ".part":
             left = status in {2, 130} and path not in before
             counts["left beside a file"] += left
         elif path.suffix != ".journal":
-            found += path.read_bytes() != case.files[path.name]
-    return found
+            different += path.read_bytes() != case.files[path.name]
+    return different
 
 
 def mounted(folder: Path, kilobytes: int) -> bool:
@@ -365,21 +365,21 @@ def main() -> int:
         disturbed = 0
         while disturbed < asked.kills:
             (name,) = random.choices(list(SHARES), list(SHARES.values()))
-            here = folder / "trial"
-            here.mkdir()
+            folder_of_trial = folder / "trial"
+            folder_of_trial.mkdir()
             small = random.random() < 0.1 and mounted(
-                here, random.choice([64, 128, 256])
+                folder_of_trial, random.choice([64, 128, 256])
             )
             for path in ("errors.toml", "plan.toml"):
-                shutil.copy(folder / path, here)
-            shutil.copytree(folder / "campaign", here / "campaign")
-            os.chdir(here)
+                shutil.copy(folder / path, folder_of_trial)
+            shutil.copytree(folder / "campaign", folder_of_trial / "campaign")
+            os.chdir(folder_of_trial)
             counts["of them on a small tmpfs"] += small
             trial(cases[name], random, counts, small)
             os.chdir(folder)
             if small:
-                subprocess.run(["umount", str(here)], check=True)
-            shutil.rmtree(here)
+                subprocess.run(["umount", str(folder_of_trial)], check=True)
+            shutil.rmtree(folder_of_trial)
             disturbed = counts["disks full"] + sum(
                 counts[f"stopped by {way.name}"] for way in WAYS if way != "full"
             )

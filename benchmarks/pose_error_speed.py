@@ -163,10 +163,10 @@ def by_branching(reach: ReachableSet, part: slice, near: float) -> Answer:
         for side in (0, 1):
             below, above = low.copy(), high.copy()
             (above if side == 0 else below)[axis] = x[axis]
-            found = _secant_node(c, X, H, k, reach.group, below, above)
-            if found is None:
+            farthest = _secant_node(c, X, H, k, reach.group, below, above)
+            if farthest is None:
                 continue
-            value, where = found
+            value, where = farthest
             lower = max(lower, float(np.linalg.norm(where)))
             count += 1
             if value > lower**2:
@@ -299,7 +299,7 @@ def main() -> None:
     print_case("clearances only", perfect, postures, "frozen")
     T = np.array([p.transforms for p in postures])
     inside = zone_margins(robot, T, "free").margin <= 1.0
-    zone = [p for p, here in zip(postures, inside, strict=True) if here]
+    zone = [p for p, assembles in zip(postures, inside, strict=True) if assembles]
     print_case(f"first draw, free, {len(zone)} points of the zone", robot, zone, "free")
     print_case("first draw, free, all points", robot, postures, "free")
     x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))

@@ -80,10 +80,10 @@ def _of_first_order(
         design = CampaignDesign(configurations=30, rows=60, reach=reach, load=load)
         rows = plan_campaign(robot, design, np.random.default_rng(0)).rows
         try:
-            found = simulate_readings(robot, point, rows, program="springs")
+            readings = simulate_readings(robot, point, rows, program="springs")
         except SimulationFailed:
-            found = np.full((1, 6), np.inf)
-        if np.abs(found).max() < _MOST:
+            readings = np.full((1, 6), np.inf)
+        if np.abs(readings).max() < _MOST:
             break
         reach, load = 0.75 * reach, 0.75 * load
     return round(reach, 3), float(f"{load:.2g}")

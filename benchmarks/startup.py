@@ -45,7 +45,7 @@ def main(runs=7):
     for _ in range(runs):
         for name, arguments in commands.items():
             times[name].append(processor_time(arguments))
-    medians = {name: statistics.median(found) for name, found in times.items()}
+    medians = {name: statistics.median(seconds) for name, seconds in times.items()}
     base, *_ = medians.values()
     print(f"{'':28} processor s   ratio   wanted")
     for (name, median), wanted in zip(

@@ -46,31 +46,31 @@ def levels(name, kind, most):
     faces = [parse_interface(text) for text in LINKS[name]]
     centers = np.array([interface_center(surface, f, "face") for f in faces])
     solid = first_mesh(surface, *faces, Budget())
-    found = []
+    meshes = []
     while True:
         start = time.perf_counter()
         level = solve_level(solid, [Material(60e9, 0.3)], centers, kind)
         unknowns, seconds = level.solution.unknowns, time.perf_counter() - start
-        found.append((*level.totals(), unknowns, seconds))
+        meshes.append((*level.totals(), unknowns, seconds))
         solid = refine_level(level, 1.15)
-        if len(found) == 6 or unknowns * len(solid.cells) > most * len(
+        if len(meshes) == 6 or unknowns * len(solid.cells) > most * len(
             level.solid.cells
         ):
-            return found
+            return meshes
 
 
 def report(name, kind, most):
     """One row a mesh: unknowns, true error, estimate, their ratio, seconds."""
-    found = levels(name, kind, most)
-    history = [totals for *totals, _, _ in found]
+    meshes = levels(name, kind, most)
+    history = [totals for *totals, _, _ in meshes]
     if kind == "rigid":
         stored = json.loads(REFERENCES.read_text())[name]
         truth, unsure = np.array(stored["stiffness"]), stored["last_step"]
     else:
         error, _ = estimated_error(history)
         truth, unsure = history[-1][0] + 0.65 * error, 0.0
-        found = found[:-1]
-    for count, (K, _, _, unknowns, seconds) in enumerate(found, start=1):
+        meshes = meshes[:-1]
+    for count, (K, _, _, unknowns, seconds) in enumerate(meshes, start=1):
         gap = np.abs(scaled(K - truth, truth))
         told = np.abs(scaled(estimated_error(history[:count])[0], K))
         if gap.max() < 3 * unsure:

@@ -287,15 +287,15 @@ def judge(name: str, number: int, references: Path, answers: Path) -> float:
     """One row; told over true."""
     part = draw_part(SEEDS[name], number)
     known = kept(references, f"{name}-{number}", lambda: reference(part))
-    found = kept(answers, f"{name}-{number}",
+    kept_rows = kept(answers, f"{name}-{number}",
                  lambda: answer(part))  # fmt: skip
     truth = np.array(known["stiffness"])
-    true = np.abs(scaled(np.array(found["stiffness"]) - truth, truth)).max()
-    ratio = found["told"] / true
+    true = np.abs(scaled(np.array(kept_rows["stiffness"]) - truth, truth)).max()
+    ratio = kept_rows["told"] / true
     print(
-        f"{number:3d} {part.kind:8} {part.nu:5.2f} {found['unknowns']:8d} "
-        f"{found['meshes']:2d} {100 * true:9.4f} +- {100 * known['unsure']:.4f} % "
-        f"{100 * found['told']:9.4f} % {ratio:6.2f} {found['seconds']:6.1f} s",
+        f"{number:3d} {part.kind:8} {part.nu:5.2f} {kept_rows['unknowns']:8d} "
+        f"{kept_rows['meshes']:2d} {100 * true:9.4f} +- {100 * known['unsure']:.4f} % "
+        f"{100 * kept_rows['told']:9.4f} % {ratio:6.2f} {kept_rows['seconds']:6.1f} s",
         flush=True,
     )
     return float(ratio)

@@ -91,8 +91,8 @@ def bricks(part, lame):
     tip = (x[-1], 0, (z[-2] + z[-1]) / 2) if across else center_of_tip(part)
     cells = int(full.sum())
     order = next((p for p in (5, 4) if 3 * cells * p**3 < MOST), 4)
-    found = [by_symmetry(mesh, p, mirrors, tip, lame) for p in (order - 1, order)]
-    return *found, 0.3
+    matrices = [by_symmetry(mesh, p, mirrors, tip, lame) for p in (order - 1, order)]
+    return *matrices, 0.3
 
 
 def graded(places, thin, wide, cut, least):
@@ -210,8 +210,8 @@ def eye(part, lame):
     shape = OCCGeometry(solid).GenerateMesh(maxh=min(0.8 * T, W / 4), grading=0.5)
     mesh = ng.Mesh(shape)
     mesh.RefineHP(2, factor=0.2)
-    found = []
+    matrices = []
     for order in (3, 4):
         mesh.Curve(order)
-        found.append(by_symmetry(mesh, order, "xy", (0, 0, L), lame))
-    return *found, 0.3
+        matrices.append(by_symmetry(mesh, order, "xy", (0, 0, L), lame))
+    return *matrices, 0.3

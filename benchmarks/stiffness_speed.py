@@ -80,14 +80,14 @@ def ours(name, accuracy):
 
     surface, faces, _ = given(name)
     with tempfile.TemporaryDirectory() as folder:
-        answer = solve_link(surface, *faces, [Material(60e9, 0.3)],
+        solved = solve_link(surface, *faces, [Material(60e9, 0.3)],
             accuracy=float(accuracy), cache=Path(folder),
             budget=Budget(seconds=7200))  # fmt: skip
-    whole, wall, level = used(), time.monotonic() - START, answer.level
-    condense(level.mesh, *level.material.T[:2], answer.centers)
-    link = answer.link
-    found = {"estimate": link.relative_error_estimate, "seconds": whole, "wall": wall}
-    return link, link.mesh["unknowns"], found | {"last_mesh": used() - whole}
+    whole, wall, level = used(), time.monotonic() - START, solved.level
+    condense(level.mesh, *level.material.T[:2], solved.centers)
+    link = solved.link
+    row = {"estimate": link.relative_error_estimate, "seconds": whole, "wall": wall}
+    return link, link.mesh["unknowns"], row | {"last_mesh": used() - whole}
 
 
 def used():
@@ -122,16 +122,16 @@ def quadratic(name, accuracy):
         level = solve_level(solid, [Material(60e9, 0.3)], centers, "rigid")
         mesh = isoparametric(level.solid, 2, layered(level.solid, ENDS))
         lam, mu = level.material.T[:2]
-        answer = condense(mesh, lam, mu, centers)
-        if true_error(name, answer.stiffness) <= accuracy:
-            return mesh, answer
+        solved = condense(mesh, lam, mu, centers)
+        if true_error(name, solved.stiffness) <= accuracy:
+            return mesh, solved
         solid = refine_level(level, 1.3)
 
 
 def ccx(name, accuracy):
     """One load case on our mesh; only CalculiX itself is counted."""
     with tempfile.TemporaryDirectory() as folder:
-        mesh, answer = quadratic(name, float(accuracy))
+        mesh, solved = quadratic(name, float(accuracy))
         points = mesh.nodes[mesh.cells[:, :4]]
         turned = np.linalg.det(points[:, 1:] - points[:, :1]) < 0
         cells = mesh.cells[:, [0, 1, 2, 3, 4, 7, 5, 6, 8, 9]]
@@ -160,9 +160,9 @@ def ccx(name, accuracy):
         seconds, wall = used() - before, time.monotonic() - begun
         numbers = Path(folder, "job.dat").read_text().split()
     force = float(numbers[-3])
-    ratio = force / answer.stiffness[3, 3] - 1
+    ratio = force / solved.stiffness[3, 3] - 1
     print(f"ccx / ours - 1 of K_TX on the same mesh: {ratio:.1e}", file=sys.stderr)
-    return answer.stiffness, answer.unknowns, {"seconds": seconds, "wall": wall}
+    return solved.stiffness, solved.unknowns, {"seconds": seconds, "wall": wall}
 
 
 def run_case(words):
@@ -172,10 +172,10 @@ def run_case(words):
         name, *options
     )
     memory = resource.getrusage(WHO[kind == "ccx"]).ru_maxrss / 1e6
-    found = {"seconds": used(), "wall": time.monotonic() - START}
-    found |= {"estimate": None, "last_mesh": None}
-    found |= {"unknowns": unknowns, "true_error": true_error(name, K), "memory": memory}
-    print(json.dumps(found | more))
+    row = {"seconds": used(), "wall": time.monotonic() - START}
+    row |= {"estimate": None, "last_mesh": None}
+    row |= {"unknowns": unknowns, "true_error": true_error(name, K), "memory": memory}
+    print(json.dumps(row | more))
 
 
 def main(cases):

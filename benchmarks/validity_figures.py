@@ -68,13 +68,13 @@ def pose_figure(maps: dict[str, dict]) -> Figure:
 
     figure = Figure(figsize=(15, 3.2 * len(maps)), layout="constrained")
     axes = figure.subplots(len(maps), 4)
-    for i, (name, found) in enumerate(maps.items()):
+    for i, (name, costs) in enumerate(maps.items()):
         kinds = [(a, k) for a in ("closures", "discs") for k in range(2)]
         for panel, (what, k) in zip(axes[i], kinds, strict=True):
             kind = list(LIMITS)[k]
-            values = np.maximum(found[what][..., k] / LIMITS[kind], 1e-2)
+            values = np.maximum(costs[what][..., k] / LIMITS[kind], 1e-2)
             image = panel.pcolormesh(
-                found["x"], found["z"], values, cmap="coolwarm",
+                costs["x"], costs["z"], values, cmap="coolwarm",
                 norm=LogNorm(1e-2, 1e2), shading="nearest",
             )  # fmt: skip
             panel.set(title=f"{name} {PANELS[what][0]}: {kind}", xlabel="x [m]",

@@ -22,25 +22,25 @@ ELEMENTS = 8  # of each beam under its weight
 
 def closures(at: Posture) -> tuple[float, ...]:
     """[um] [%] simulation against the linear and the exact model."""
-    found, exact = simulate_assembly(at), solve_exact(at)
+    assembly, exact = simulate_assembly(at), solve_exact(at)
     costs = []
     for model in (exact.linear, exact):
-        shift = (found.platform_screw - model.platform_screw)[3:]
-        energy = found.energy / model.energy - 1
+        shift = (assembly.platform_screw - model.platform_screw)[3:]
+        energy = assembly.energy / model.energy - 1
         costs += [1e6 * float(np.linalg.norm(shift)), 100 * abs(energy)]
     return tuple(costs)
 
 
 def weights(at: Posture) -> tuple[float, ...]:
     """[um] [%] against the ends' equivalents, [%] with what is between them."""
-    found = simulate_assembly(at, gravity=GRAVITY, elements=ELEMENTS)
+    assembly = simulate_assembly(at, gravity=GRAVITY, elements=ELEMENTS)
     ends = solve_assembly(at, gravity=GRAVITY)
-    shift = (found.platform_screw - ends.platform_screw)[3:]
+    shift = (assembly.platform_screw - ends.platform_screw)[3:]
     whole = ends.energy + energy_between_ends(at, GRAVITY, ELEMENTS)
     return (
         1e6 * float(np.linalg.norm(shift)),
-        100 * abs(1 - ends.energy / found.energy),
-        100 * abs(1 - whole / found.energy),
+        100 * abs(1 - ends.energy / assembly.energy),
+        100 * abs(1 - whole / assembly.energy),
     )
 
 
@@ -57,9 +57,9 @@ def discs(at: Posture) -> tuple[float, ...]:
 def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
     """What is compared, and the numbers of four cases or so."""
     for ratio in (None, 40.0):
-        said = "as built" if ratio is None else "L / r = 40"
+        label = "as built" if ratio is None else "L / r = 40"
         for at in postures(name, ratio)[::5]:
-            yield f"closures, {said}", closures(at)
+            yield f"closures, {label}", closures(at)
     for ratio in (10.0, 40.0):
         for at in free_of_errors(postures(name, ratio))[:3]:
             yield f"weight, L / r = {ratio:g}", weights(at)
@@ -73,8 +73,8 @@ def main() -> None:
         rows: dict[str, list[tuple[float, ...]]] = {}
         for what, numbers in cases(name):
             rows.setdefault(what, []).append(numbers)
-        for what, found in rows.items():
-            columns = np.transpose(found)
+        for what, values in rows.items():
+            columns = np.transpose(values)
             cells = [f"{np.median(c):.3g} ({c.max():.3g})" for c in columns]
             print(f"| {name} | {what} |", " | ".join(cells), "|", flush=True)
 

@@ -126,3 +126,17 @@ def _random_frame(rng, name, parent, step, link_share):
         part["clearance"] = Clearance(*rng.choice([0.0, 1e-5, 1e-4, 1e-3], 3))
     return Frame(name, parent, step[:3, 3], rotation_vector(step[:3, :3]),
                  geometric_error=_error(rng), **part)  # fmt: skip
+
+
+PAPERS_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
+
+
+def with_papers_errors(robot, seed, frames=PAPERS_FRAMES, signed=False):
+    """Errors of the paper's size: up to 2e-2 rad and 2e-4 m at its frames."""
+    rng = np.random.default_rng(seed)
+    size = np.array([2e-2] * 3 + [2e-4] * 3)
+    errors = np.zeros((len(robot.frames), 6))
+    for i, frame in enumerate(robot.frames):
+        if frame.name.split(".")[-1] in frames:
+            errors[i] = rng.uniform(-1.0 if signed else 0.0, 1.0, 6) * size
+    return robot.with_errors(errors)

@@ -5,6 +5,7 @@ from scipy.spatial import Delaunay
 
 from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane
+from stiffness.surface.surface import check_surface
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -111,3 +112,16 @@ def _solid(points, cells, length, side):
     patch = np.where(on[0], 0, np.where(on[1], 1, 2))
     planes = Plane(np.zeros(3), Z), Plane(length * Z, Z)
     return Solid(points, cells, faces, patch, (*planes, side))
+
+
+CUBE = np.array([[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)])
+CUBE_TRIANGLES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
+
+def bar(facets=32, **kwargs):
+    return check_surface(*cylinder(facets=facets, **kwargs), "bar")

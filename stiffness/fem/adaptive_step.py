@@ -31,8 +31,8 @@ from stiffness.mesh.refine import refine
 
 # effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
 # benchmarks/stiffness_random_parts.py
-_DEFAULT_EFFECTIVITY = 2.0
-_SAFETY_FACTOR = 1.3
+DEFAULT_EFFECTIVITY = 2.0
+SAFETY_FACTOR = 1.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +125,13 @@ def estimated_error(
         refinement over that of the indicated error, times a safety factor.
     """
     K, indicated, geometry = history[-1]
-    factors = np.full(6, _DEFAULT_EFFECTIVITY)
+    factors = np.full(6, DEFAULT_EFFECTIVITY)
     if len(history) > 1:
         coarse, indicated_before, _ = history[-2]
         drop = np.diag(indicated_before - indicated)
-        effectivity = np.full(6, _DEFAULT_EFFECTIVITY)
+        effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
-        factors = _SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * _DEFAULT_EFFECTIVITY)
+        factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
     # one index for each motion: torsion and bending err in different places
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated

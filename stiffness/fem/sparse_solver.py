@@ -23,7 +23,7 @@ from scipy.sparse.linalg import splu
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
-class SolverFailed(RuntimeError):
+class FactorisationFailed(RuntimeError):
     """A sparse factorisation gave up."""
 
 
@@ -68,7 +68,7 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
         (n, k).
 
     Raises:
-        SolverFailed: the matrix is singular, or memory ran out.
+        FactorisationFailed: the matrix is singular, or memory ran out.
     """
     if (solver or solver_name()) == "PARDISO":
         return _solve_with_pardiso(upper, loads)
@@ -81,7 +81,7 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
             options={"SymmetricMode": True},
         )
     except (RuntimeError, MemoryError) as error:
-        raise SolverFailed(f"SuperLU gave up: {error}") from error
+        raise FactorisationFailed(f"SuperLU gave up: {error}") from error
     return factor.solve(np.asfortranarray(loads))
 
 
@@ -101,7 +101,7 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
             solver.factorize(matrix)
             return np.asarray(solver.solve(matrix, np.asfortranarray(loads)))
     except Exception as error:
-        raise SolverFailed(f"PARDISO gave up: {error}") from error
+        raise FactorisationFailed(f"PARDISO gave up: {error}") from error
     finally:
         solver.free_memory(everything=True)
 

@@ -76,8 +76,8 @@ def test_rotations_are_those_of_scipy(rng, angle):
     vectors = angle * axes / np.linalg.norm(axes, axis=-1)[:, None]
     matrices, theirs = rotation_matrix(vectors), Rotation.from_rotvec(vectors)
     np.testing.assert_allclose(matrices, theirs.as_matrix(), rtol=0, atol=5e-15)
-    found = rotation_vector(theirs.as_matrix())
-    np.testing.assert_allclose(found, vectors, rtol=0, atol=2e-14 * angle)
+    ours = rotation_vector(theirs.as_matrix())
+    np.testing.assert_allclose(ours, vectors, rtol=0, atol=2e-14 * angle)
 
 
 def test_half_turns_and_no_turn_have_a_rotation_vector():

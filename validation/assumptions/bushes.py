@@ -21,8 +21,6 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.energy import Assembly, solve_with
 from assembly.linear.load import loads_on_frames
-from assembly.linear.zone import Zone, margin_with
-from assembly.model.clearance import Compliant
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
@@ -72,21 +70,3 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     return solve_with(
         linearise(posture), joints, wrench, loads_on_frames(posture, wrench)
     )
-
-
-def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
-    """Factor on all clearances at which a rigid manipulator on bushes just assembles.
-
-    Args:
-        posture: where the robot stands.
-        compliant: ``"rigid"`` or ``"free"``, as for
-            ``assembly.linear.zone.zone_margin``.
-
-    Returns:
-        The margin with a certified lower bound.
-
-    Raises:
-        SolverFailed: the cone solver gave up.
-    """
-    joints = bush_joints(virtual_joints(posture.robot, compliant))
-    return margin_with(linearise(posture), joints)[0]

@@ -6,13 +6,10 @@ slenderness L / r and Poisson's ratio alone once it is read in units of L and E,
 computation serves every link of one shape.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
+from assembly.model.robot import BeamLink, Frame, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.fem.fea import solve_link
 from stiffness.fem.material import Material
@@ -73,25 +70,3 @@ def bar_stiffness(frame: Frame, compliance: NDArray) -> NDArray:
     unit = np.repeat([length**-1.5, length**-0.5], 3)  # turns and shifts
     C = compliance * np.outer(unit, unit) / frame.link.young
     return np.linalg.inv(R @ C @ R.T)
-
-
-def with_bars(robot: Robot, slenderness: float, density: float | None = None) -> Robot:
-    """A robot whose beams are solid round bars of one slenderness.
-
-    Args:
-        robot: any.
-        slenderness: [-] length over radius.
-        density: [kg/m^3] of the bars; their own if absent.
-
-    Returns:
-        The robot.
-    """
-    links: dict[str, BeamLink] = {}
-    for frame in robot.frames:
-        link = frame.link
-        if isinstance(link, BeamLink):
-            section: Mapping[str, float]
-            section = {"radius": beam_axis(frame)[0] / slenderness}
-            heavy = link.density if density is None else density
-            links[frame.name] = replace(link, section=section, density=heavy)
-    return robot.with_links({**links})

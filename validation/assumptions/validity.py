@@ -28,13 +28,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import Assembly, solve_assembly, solve_with
-from assembly.linear.load import loads_on_frames
+from assembly.linear.energy import Assembly, solve_assembly
 from assembly.model.robot import MatrixLink
 from validation.assumptions.bushes import solve_bushes
 from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
-from validation.crosscheck.spread_weight import energy_between_ends, half_weights
+from validation.crosscheck.spread_weight import energy_between_ends
 
 POSITION_LIMIT = 20e-6  # [m]
 ENERGY_LIMIT = 0.01  # [-]
@@ -161,35 +159,6 @@ def spread_cost(
     """
     ends = solve_assembly(posture, load, gravity=gravity)
     return cost_between(ends, ends, missing=energy_between_ends(posture, gravity))
-
-
-def halves_cost(
-    posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
-) -> Cost:
-    """What it would cost to put half of each weight at either end, without couples.
-
-    Args:
-        posture: where the robot stands.
-        gravity: (3,) [m/s^2] base axes.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-
-    Returns:
-        The cost, against the weight spread over the links.
-
-    Raises:
-        CannotAssemble: it cannot be assembled.
-        SolverFailed: no solution was found.
-    """
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    own, carried = half_weights(posture, gravity)
-    halves = solve_with(
-        linearise(posture),
-        virtual_joints(posture.robot),
-        wrench,
-        loads_on_frames(posture, wrench, own, carried),
-    )
-    ends = solve_assembly(posture, load, gravity=gravity)
-    return cost_between(halves, ends, energy_between_ends(posture, gravity))
 
 
 def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.load import weights
 from assembly.model.robot import BeamLink, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.beam.sections import Section, declared_section
@@ -101,24 +100,3 @@ def energy_between_ends(
             slip += (y / section.shear_y + z / section.shear_z) / (G * section.area)
         total += bending * (1 - pieces**-4.0) + slip * L**3 / 24 * (1 - pieces**-2.0)
     return total
-
-
-def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Half of each beam's weight at either end, without the moments.
-
-    Args:
-        posture: where the robot stands, of n frames.
-        gravity: (3,) [m/s^2] base axes.
-
-    Returns:
-        ``bodies`` and ``carried`` (n, 6) [N m, N] of
-        :func:`assembly.linear.load.loads_on_frames`.
-    """
-    own, carried = weights(posture, gravity)
-    for beam in heavy_beams(posture, gravity):
-        clamp = np.cross(beam.line, beam.total) / 12
-        own[beam.index, :3] += clamp
-        parent = posture.robot.parents[beam.index]
-        if parent >= 0:
-            carried[parent, :3] -= clamp
-    return own, carried

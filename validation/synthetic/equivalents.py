@@ -100,11 +100,8 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     """(rows, 6, parameters) by effect."""
-    robot, rows, differences = (
-        campaign.robot,
-        campaign.plan.rows,
-        _FiniteDifferences(campaign),
-    )
+    robot, rows = campaign.robot, campaign.plan.rows
+    differences = _FiniteDifferences(campaign)
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]

@@ -234,20 +234,6 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
     return (ends[0] - ends[1]) / (2 * _SMALL)
 
 
-def finite_part(campaign: Synthetic) -> NDArray:
-    """What finite motions add to the readings of the declared machine.
-
-    Args:
-        campaign: any; the machine is that of springs.
-
-    Returns:
-        (rows, 6) [rad, m].
-    """
-    at = campaign.robot, campaign.reference_point, campaign.plan.rows
-    machine = _SimulatedMachine(*at, "springs", None)
-    return machine.read((), "declared") - _linear(machine)
-
-
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:

@@ -204,9 +204,9 @@ def test_turning_the_wrench_about_a_round_beam_changes_nothing(section, rng):
     turn = np.eye(3)
     turn[1:, 1:] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     one, there = peak_beam_stress(section, 0.2, wrench)
-    other, here = peak_beam_stress(section, 0.2, wrench @ np.kron(np.eye(2), turn).T)
+    other, place = peak_beam_stress(section, 0.2, wrench @ np.kron(np.eye(2), turn).T)
     np.testing.assert_allclose(other, one, rtol=1e-12)
-    np.testing.assert_allclose(here, there @ turn.T, atol=1e-12)
+    np.testing.assert_allclose(place, there @ turn.T, atol=1e-12)
 
 
 @pytest.mark.parametrize("section", [PLATE, BOX])
@@ -225,9 +225,9 @@ def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
     wrench = rng.normal(size=(50, 6))
     mirrored = wrench * [-1, -1, 1, 1, 1, -1]
     one, there = peak_beam_stress(section, 0.2, wrench)
-    other, here = peak_beam_stress(section, 0.2, mirrored)
+    other, place = peak_beam_stress(section, 0.2, mirrored)
     np.testing.assert_allclose(other, one, rtol=1e-12)
-    np.testing.assert_allclose(here, there * [1, 1, -1], atol=1e-12)
+    np.testing.assert_allclose(place, there * [1, 1, -1], atol=1e-12)
 
 
 @pytest.mark.parametrize("section", SECTIONS)

@@ -168,13 +168,13 @@ def measured_section(solid, center, lengths=(0.15, 0.25)):
 
 def test_a_rectangles_constants_are_those_of_finite_elements():
     """Saint-Venant's torsion series against elements of a quarter of the width."""
-    found = measured_section(
+    measured = measured_section(
         lambda L: box_solid((4, 4, round(40 * L)), (0.04, 0.04, L)), (0.02, 0.02)
     )
     section = rectangular_section(0.04, 0.04, NU)
-    assert found["area"] == pytest.approx(section.area, rel=1e-9)
-    assert found["I_x"] == pytest.approx(section.I_y, rel=1e-9)
-    assert found["J"] == pytest.approx(section.J, rel=2e-4)
+    assert measured["area"] == pytest.approx(section.area, rel=1e-9)
+    assert measured["I_x"] == pytest.approx(section.I_y, rel=1e-9)
+    assert measured["J"] == pytest.approx(section.J, rel=2e-4)
 
 
 def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
@@ -183,18 +183,18 @@ def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
     Cowper's 0.8864, which the public format asks of beams, is 4 % lower: a known
     difference of theories, and 0.2 % of the paper's link.
     """
-    found = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L), (0, 0))
+    measured = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L), (0, 0))
     factor = 6 * (1 + NU) ** 2 / (7 + 12 * NU + 4 * NU**2)
     section = round_section(0.04, NU)
-    assert found["shear_area_y"] / section.area == pytest.approx(factor, rel=1e-4)
-    assert found["J"] == pytest.approx(section.J, rel=1e-5)
+    assert measured["shear_area_y"] / section.area == pytest.approx(factor, rel=1e-4)
+    assert measured["J"] == pytest.approx(section.J, rel=1e-5)
     assert section.shear_y == pytest.approx(0.8864, abs=1e-4)
 
 
 def test_a_thin_boxs_constants_are_those_of_finite_elements():
     """Bredt's wall leaves the corners out: 3.5 % of J at wall / width = 1 / 12."""
     wall = 0.06 / 12
-    found = measured_section(
+    measured = measured_section(
         lambda L: masked_solid(
             (12, 12, round(20 * L)),
             (0.06, 0.06, L),
@@ -203,9 +203,9 @@ def test_a_thin_boxs_constants_are_those_of_finite_elements():
         (0.03, 0.03),
     )
     section = box_section(0.06, 0.06, wall, NU)
-    assert found["area"] == pytest.approx(section.area, rel=1e-9)
-    assert found["I_x"] == pytest.approx(section.I_y, rel=1e-9)
-    assert found["J"] / section.J == pytest.approx(1.035, abs=0.002)
+    assert measured["area"] == pytest.approx(section.area, rel=1e-9)
+    assert measured["I_x"] == pytest.approx(section.I_y, rel=1e-9)
+    assert measured["J"] / section.J == pytest.approx(1.035, abs=0.002)
 
 
 def test_thin_sections_by_hand():

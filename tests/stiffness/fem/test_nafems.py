@@ -98,14 +98,14 @@ def stress_at(mesh, held, loads, node, direction=1):
     u = np.zeros(free.size)
     u[free] = solve(upper[free][:, free], loads.ravel()[free][:, None])[:, 0]
     u = u.reshape(-1, 3)
-    found = []
+    stresses = []
     for part, G in node_gradients(mesh):
         nodes = mesh.cells[part]
         slope = np.einsum("cqax,cai->cqix", G, u[nodes])
         along = slope[:, :, direction, direction]
         stress = LAM * np.trace(slope, axis1=2, axis2=3) + 2 * MU * along
-        found.append(stress[nodes == node])
-    return float(np.concatenate(found).mean())
+        stresses.append(stress[nodes == node])
+    return float(np.concatenate(stresses).mean())
 
 
 def on(mesh, values, value):

@@ -57,12 +57,12 @@ def side_errors(mesh):
 
 def test_nodes_and_layers_follow_the_cylinder():
     """Cubic elements leave it by the fourth power of their size, cut or not."""
-    found = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
+    errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
-        coarse, fine = (side_errors(found[rings][k]).max() for rings in (2, 4))
+        coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
         assert coarse < 1e-3
         assert coarse / fine > 0.9 * 2**4
-    for mesh in found[4]:
+    for mesh in errors[4]:
         on = np.unique(mesh.faces[mesh.patch <= 1])
         height = mesh.nodes[on, 2]
         np.testing.assert_allclose(height, np.where(height > 0.1, 0.2, 0), atol=1e-15)
@@ -128,16 +128,16 @@ def test_a_wall_off_its_shape_is_energy_density_times_volume(number, sign):
     density = lam * np.trace(A) ** 2 + 2 * mu * (A**2).sum()
     ones = np.ones(len(mesh.cells))
     field = (mesh.nodes @ A)[:, :, None]
-    found, radius = [], solid.shapes[number].radius
+    errors, radius = [], solid.shapes[number].radius
     for excess in (0, 1e-4):
         shapes = list(solid.shapes)
         shapes[number] = Sphere(np.zeros(3), radius * (1 + excess))
         each = geometry_errors(mesh, shapes, field, lam * ones, mu * ones)
-        found.append(each[mesh.patch == number].sum() / density)
+        errors.append(each[mesh.patch == number].sum() / density)
     taken = sign * SOLID_ANGLE * radius**3 * 1e-4
-    assert found[1] - found[0] == pytest.approx(taken, rel=1e-5)
+    assert errors[1] - errors[0] == pytest.approx(taken, rel=1e-5)
     # what the mesh itself leaves is a hundredth of that
-    assert abs(found[0]) < 0.02 * abs(taken)
+    assert abs(errors[0]) < 0.02 * abs(taken)
 
 
 THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.99)]

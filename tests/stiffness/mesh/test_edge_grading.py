@@ -49,14 +49,14 @@ def on_outline(x):
 def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(held):
     """Eight edges around each end that is clamped, three along the inner edge."""
     solid = corner_post()
-    found = {tuple(edge) for edge in singular_edges(solid, held)}
+    edges = {tuple(edge) for edge in singular_edges(solid, held)}
     ends, _ = edges_of(solid.cells, len(solid.points))
     middle = solid.points[ends].mean(axis=1)
     heights = [(0.0, 0.3)[k] for k in held]
     clamped = on_outline(middle) & np.isin(np.round(middle[:, 2], 9), heights)
     inner = (np.abs(middle[:, :2] - 0.1) < 1e-9).all(axis=1)
     assert (clamped.sum(), inner.sum()) == (8 * len(heights), 3)
-    assert found == {tuple(edge) for edge in ends[clamped | inner]}
+    assert edges == {tuple(edge) for edge in ends[clamped | inner]}
 
 
 def test_fewer_clamped_patches_have_fewer_singular_edges():
@@ -167,8 +167,8 @@ def test_a_layer_of_another_share_is_as_thin():
     held = (0,)
     solid = split_joining_edges(box_solid((2, 2, 2), (0.2, 0.2, 0.2)), held)
     new = layered(solid, held, share=0.1).places
-    found = np.unique(np.round(new, 12))
-    np.testing.assert_allclose(found, [0, 0.1, 0.9, 1])
+    edges = np.unique(np.round(new, 12))
+    np.testing.assert_allclose(edges, [0, 0.1, 0.9, 1])
 
 
 # --- nested spaces -------------------------------------------------------------------

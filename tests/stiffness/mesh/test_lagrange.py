@@ -94,8 +94,8 @@ def test_rules_integrate_monomials_exactly(degree, corners):
     np.testing.assert_allclose(L.sum(axis=1), 1, rtol=1e-14)
     for power in lattice(degree, corners):
         exact = prod(factorial(p) for p in power) / factorial(corners - 1 + degree)
-        found = weights @ (L**power).prod(axis=1)
-        assert found == pytest.approx(exact, rel=1e-10)
+        integral = weights @ (L**power).prod(axis=1)
+        assert integral == pytest.approx(exact, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -378,10 +378,10 @@ def test_the_commands_build_list_look_up_and_export(tmp_path):
     assert len(keys) == 16
     assert run("list", folder).count("\n") == 16
     at = "length=0.37,radius=0.02,young=6e10,poisson=0.3"
-    found = json.loads(run("look-up", folder, "--at", at, "--json", "-"))
+    table = json.loads(run("look-up", folder, "--at", at, "--json", "-"))
     truth = exact(0.37, 0.02)
-    gap = np.abs(scaled(np.array(found["stiffness"]) - truth, truth)).max()
-    assert gap < found["relative_error_estimate"] < 0.02
+    gap = np.abs(scaled(np.array(table["stiffness"]) - truth, truth)).max()
+    assert gap < table["relative_error_estimate"] < 0.02
     rows = list(csv.DictReader(io.StringIO(run("export", folder))))
     assert len(rows) == 16
     row = next(r for r in rows if r["length"] == "0.45" and r["radius"] == "0.04")
@@ -462,13 +462,13 @@ def test_between_finite_elements_the_error_is_covered_too(length):
     """Meshed where the library has no entry; both answers may be wrong by their own
     estimates.  Between three lengths interpolation itself leaves less than 1 %."""
     entries = [meshed_bar(v) for v in (0.195, 0.3, 0.45)]
-    found, error = look_up(entries, {"length": length})
+    table, error = look_up(entries, {"length": length})
     direct = meshed_bar(length)
-    gap = np.abs(found - direct.stiffness)
+    gap = np.abs(table - direct.stiffness)
     assert (gap <= error + np.abs(direct.stiffness_error) + 1e-9 * gap.max()).all()
-    assert scaled(gap, found).max() < 0.01
+    assert scaled(gap, table).max() < 0.01
     own = max(np.abs(scaled(e.stiffness_error, e.stiffness)).max() for e in entries)
-    assert scaled(error, found).max() < own + 0.01
+    assert scaled(error, table).max() < own + 0.01
 
 
 SHIPPED = EXAMPLE.parent / "stiffness_library"

@@ -52,13 +52,13 @@ def test_the_fit_finds_what_was_put_in():
 
 def test_what_does_not_fade_is_left_over():
     """A modulus 1 % too high is no end effect: most of it stays in the residual."""
-    found = []
+    comparisons = []
     for ratio in (5, 10, 20, 40):
         one = made_up(ratio, 0.2, 0.0)
         C = one.fea.compliance / 1.01
         fea = LinkStiffness("fea", C, tip=one.fea.tip, base=one.fea.base)
-        found.append(compare_link(one.beam, fea, size=0.02))
-    sweep = fit_end_effect(found)
+        comparisons.append(compare_link(one.beam, fea, size=0.02))
+    sweep = fit_end_effect(comparisons)
     assert 0.004 < diagonal_residual(sweep) < 0.01
     clean = fit_end_effect([made_up(r, 0.2, 0.0) for r in (5, 10, 20, 40)])
     assert diagonal_residual(clean) < 1e-12
@@ -97,11 +97,11 @@ def test_a_round_bars_ends():
     the same fit of the exact values has c = 0.212, 0.254, 0.102 and none in torsion."""
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
-        found = np.diag(comparison.difference)
-        gap = found[[0, 3, 5]] - exact
+        comparisons = np.diag(comparison.difference)
+        gap = comparisons[[0, 3, 5]] - exact
         assert (gap > -1e-5).all()
         assert (gap <= np.diag(comparison.fea.relative_errors)[[0, 3, 5]]).all()
-        assert 0 < found[2] + 1e-5 < 0.004
+        assert 0 < comparisons[2] + 1e-5 < 0.004
     c, error = np.diag(sweep.end_effect), np.diag(sweep.end_effect_error)
     assert (np.abs(c - [0.212, 0.212, 0, 0.254, 0.254, 0.102]) <= error).all()
     assert np.abs(sweep.residual).max() < 0.004

@@ -124,11 +124,11 @@ def test_step_is_read_in_its_own_unit_and_its_cylinders_are_known(tmp_path, gmsh
         surface = read_surface(path, unit)
         exact = np.pi * (0.02**2 - 0.015**2) * 0.1
         assert surface.volume == pytest.approx(exact, rel=4e-3)
-    found = find_patches(surface, *map(parse_interface, ("z=0", "z=0.1")))
-    kinds = [type(shape) for shape in found.shapes]
+    patches = find_patches(surface, *map(parse_interface, ("z=0", "z=0.1")))
+    kinds = [type(shape) for shape in patches.shapes]
     assert kinds[:2] == [Plane, Plane]
     assert set(kinds[2:]) == {Cone}
-    for shape in found.shapes[2:]:
+    for shape in patches.shapes[2:]:
         assert min(abs(shape.radius - r) for r in (0.02, 0.015)) < 1e-9
 
 

@@ -16,16 +16,16 @@ from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
+from benchmarks.validity_models import bush_margin, halves_cost, with_bars
 from forcefit.commands.validation import app
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.assumptions.assumptions import assumption_costs
-from validation.assumptions.bushes import bush_joints, bush_margin, solve_bushes
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness, with_bars
+from validation.assumptions.bushes import bush_joints, solve_bushes
+from validation.assumptions.round_bars import bar_compliance, bar_stiffness
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
     closure_cost,
-    halves_cost,
     link_cost,
     spread_cost,
 )
@@ -162,12 +162,12 @@ def test_the_simulations_elements_store_it_too(elements):
     from validation.multibody.simulation import simulate_assembly
 
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
-    found = simulate_assembly(at, gravity=g, elements=elements).energy
+    energy = simulate_assembly(at, gravity=g, elements=elements).energy
     expected = solve_assembly(at, gravity=g).energy
     expected += energy_between_ends(at, g, pieces=elements)
-    assert found == pytest.approx(expected, rel=1e-7)
+    assert energy == pytest.approx(expected, rel=1e-7)
     whole = expected - energy_between_ends(at, g, pieces=elements)
-    assert whole + energy_between_ends(at, g) >= found
+    assert whole + energy_between_ends(at, g) >= energy
 
 
 def test_a_link_with_its_own_stiffness_costs_nothing(posture):
@@ -232,10 +232,10 @@ def test_without_errors_and_load_an_assumption_costs_nothing_known(tmp_path):
     """Both models store rounding: their ratio is not a cost."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", str(target)]
-    said = CliRunner().invoke(app, words)
-    assert said.exit_code == 1
-    assert "beyond" not in said.output
-    assert "nothing to compare" in said.output
+    outcome = CliRunner().invoke(app, words)
+    assert outcome.exit_code == 1
+    assert "beyond" not in outcome.output
+    assert "nothing to compare" in outcome.output
     costs = json.loads(target.read_text())["costs"]
     assert "nothing to compare" in costs["linear closures"]["reason"]
     assert "nothing to compare" in costs["disc and cone, not two bushes"]["reason"]
@@ -259,8 +259,8 @@ def test_the_command_says_which_assumptions_matter(tmp_path):
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]
-    said = CliRunner().invoke(app, [*words, "--json", str(target)])
-    assert said.exit_code == 0, said.output
+    outcome = CliRunner().invoke(app, [*words, "--json", str(target)])
+    assert outcome.exit_code == 0, outcome.output
     costs = json.loads(target.read_text())["costs"]
     assert set(costs["linear closures"]) == {
         "rotation", "position", "energy", "matters"
@@ -268,7 +268,7 @@ def test_the_command_says_which_assumptions_matter(tmp_path):
     assert costs["disc and cone, not two bushes"]["matters"]
     assert "--solids" in costs["beams, not solids"]["reason"]
     assert "no beam with a density" in costs["weight at the links' ends"]["reason"]
-    assert "beyond 20 um or 1 %" in said.output
+    assert "beyond 20 um or 1 %" in outcome.output
 
 
 def test_all_assumptions_are_known_where_they_mean_something(posture, monkeypatch):

@@ -68,8 +68,8 @@ def test_the_push_is_the_gradient_of_the_energy(arm):
                 less = cone_energy(disc, screw - step, width)
                 slope = (more - less) / (1e-9 / unit[k])
                 scale = disc.stiffness * disc.size * unit[k]
-                found = push(disc, screw, width)[k]
-                assert found == pytest.approx(slope, abs=2e-5 * scale)
+                force = push(disc, screw, width)[k]
+                assert force == pytest.approx(slope, abs=2e-5 * scale)
 
 
 def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
@@ -124,12 +124,12 @@ def test_axial_play_is_taken_off_the_misfit(misfit):
     correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
     """
     stiffness = E * AREA / 0.8
-    answer = simulate_assembly(
+    check = simulate_assembly(
         coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)), clearances=True
     )
     expected = (misfit - 3e-5) ** 2 * stiffness / 2
     allowed = 2 * 9e-9 / (misfit - 3e-5)
-    assert answer.rigid_energy == pytest.approx(expected, rel=allowed)
+    assert check.rigid_energy == pytest.approx(expected, rel=allowed)
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
@@ -200,15 +200,15 @@ def irsbot2():
 @pytest.mark.slow
 def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
     """Within 2 per cent at no error; the optimality gap falls with the square."""
-    answer = crosscheck(
+    check = crosscheck(
         place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}),
         (1.0, 0.5, 0.25),
         clearances=True,
     )
-    assert answer.passed, answer.checks
+    assert check.passed, check.checks
     # contacts of 1e9 N m/rad yield 4e-4 of what links of 1e6 N m/rad do
-    assert answer.metric.limits["spring deformation"].value < 5e-3
-    assert answer.metric.gaps[0] > answer.metric.gaps[1] > answer.metric.gaps[2] > 0
+    assert check.metric.limits["spring deformation"].value < 5e-3
+    assert check.metric.gaps[0] > check.metric.gaps[1] > check.metric.gaps[2] > 0
 
 
 def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
@@ -217,10 +217,10 @@ def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
     Contacts leave 0.3 per cent at most; the linear energy is off by several.
     """
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
-    answer = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
-    assert answer.passed, answer.checks
-    assert abs(answer.metric.energies["exact"][0]) < 3e-3
-    assert abs(answer.metric.energies["linear"][0]) > 1e-2
+    check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
+    assert check.passed, check.checks
+    assert abs(check.metric.energies["exact"][0]) < 3e-3
+    assert abs(check.metric.energies["linear"][0]) > 1e-2
 
 
 @pytest.mark.slow
@@ -261,14 +261,14 @@ def test_weight_acts_beside_play(links):
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
-    answer = crosscheck(
+    check = crosscheck(
         heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
     )
-    assert answer.passed, answer.text()
-    assert abs(answer.metric.energies["exact"][0]) < 0.02
-    assert (answer.pairs[0].between > 0) == (links == "beam")
+    assert check.passed, check.text()
+    assert abs(check.metric.energies["exact"][0]) < 0.02
+    assert (check.pairs[0].between > 0) == (links == "beam")
     light = crosscheck(heavy(), (1.0, 0.5), links=links, clearances=True)
-    ratio = answer.pairs[0].linear.energy / light.pairs[0].linear.energy
+    ratio = check.pairs[0].linear.energy / light.pairs[0].linear.energy
     assert abs(ratio - 1) > 0.1
 
 
@@ -280,10 +280,8 @@ def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
     monkeypatch.setattr(
         assembly.linear.energy, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
     )
-    answer = crosscheck(
-        heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True
-    )
-    assert not answer.passed
+    check = crosscheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True)
+    assert not check.passed
 
 
 def drawn(name, size, pose=None):
@@ -306,10 +304,10 @@ def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
     That says something of the overconstrained robot only: the others close without
     energy whatever their play.
     """
-    answer = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
-    assert answer.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
-    assert answer.pairs[0].simulated.energy < 1e-8
-    assert verdict(answer) == said
+    check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
+    assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
+    assert check.pairs[0].simulated.energy < 1e-8
+    assert verdict(check) == said
 
 
 @pytest.mark.parametrize(
@@ -322,8 +320,8 @@ def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):
 
     Parts of the five-bar stay loose under its load.
     """
-    answer = crosscheck(
+    check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )
-    assert answer.passed
-    assert 0 <= answer.metric.gaps[0] < 0.02
+    assert check.passed
+    assert 0 <= check.metric.gaps[0] < 0.02

@@ -53,13 +53,15 @@ def test_a_loaded_solid_deforms_by_our_stiffness(block):
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
     posture = home_posture(Robot("block", "tip", (frame,)))
     wrench = np.array([0.03, -0.02, 0.01, 0.3, 0.2, -0.4])
-    answer = simulate_assembly(posture, load=wrench, meshes={"tip": body})
+    assembly = simulate_assembly(posture, load=wrench, meshes={"tip": body})
     screw = np.linalg.solve(K, wrench)
     scale = np.abs(screw[:3]).max() * np.array([1, 1, 1, 0.2, 0.2, 0.2])
     assert 1e-7 < scale[0] < 1e-5
-    np.testing.assert_allclose(answer.link_screws[0] / scale, screw / scale, atol=1e-5)
-    assert answer.energy == pytest.approx(wrench @ screw / 2, rel=1e-5)
-    np.testing.assert_allclose(answer.link_wrenches[0], wrench, atol=1e-5 * 0.4)
+    np.testing.assert_allclose(
+        assembly.link_screws[0] / scale, screw / scale, atol=1e-5
+    )
+    assert assembly.energy == pytest.approx(wrench @ screw / 2, rel=1e-5)
+    np.testing.assert_allclose(assembly.link_wrenches[0], wrench, atol=1e-5 * 0.4)
 
 
 def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
@@ -102,9 +104,9 @@ def test_a_robot_of_meshed_links_passes_with_solids():
               link=BeamLink({"radius": 0.02}, 60e9, 0.3)),
     )  # fmt: skip
     posture = home_posture(Robot("meshed", "a", frames, (("a", "b"),)))
-    answer = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
-    assert answer.passed, answer.checks
-    assert max(check.value for check in answer.metric.limits.values()) < 1e-3
+    assembly = crosscheck(posture, links="fem", load=[1, 2, -1, 30, 20, -50])
+    assert assembly.passed, assembly.checks
+    assert max(check.value for check in assembly.metric.limits.values()) < 1e-3
 
 
 def test_an_unknown_kind_of_link_is_refused():

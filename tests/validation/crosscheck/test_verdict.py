@@ -50,11 +50,13 @@ def test_two_scales_of_a_right_model_are_not_held_against_it():
     """Slope 2.17 and limit 0.015 on the two scales alone; two halves more tell."""
     s = np.array([1.0, 0.5])
     assert abs(fit_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
-    answer = compared((1.0, 0.5), wrong=0.0)
-    assert verdict(answer) == "passed"
-    assert answer.asked == 2
-    assert [p.scale for p in answer.pairs] == [1, 0.5, 0.25, 0.125][: len(answer.pairs)]
-    assert len(answer.pairs) > 2
+    comparison = compared((1.0, 0.5), wrong=0.0)
+    assert verdict(comparison) == "passed"
+    assert comparison.asked == 2
+    assert [p.scale for p in comparison.pairs] == [1, 0.5, 0.25, 0.125][
+        : len(comparison.pairs)
+    ]
+    assert len(comparison.pairs) > 2
 
 
 @pytest.mark.parametrize("wrong", [0.003, -0.003, 0.02, -0.05])
@@ -70,9 +72,9 @@ def test_a_wrong_term_does_not_hide_behind_the_second_order():
 
 
 def test_enough_scales_are_left_as_they_are():
-    answer = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
-    assert len(answer.pairs) == 4
-    assert verdict(answer) == "passed"
+    comparison = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
+    assert len(comparison.pairs) == 4
+    assert verdict(comparison) == "passed"
 
 
 def test_what_six_scales_do_not_tell_is_said():
@@ -82,9 +84,9 @@ def test_what_six_scales_do_not_tell_is_said():
         def __post_init__(self):
             self.checks = {"vague": Check(0.5, 1.0, 2.0)}
 
-    answer = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Vague)
-    assert len(answer.pairs) == 6
-    assert verdict(answer) == "not decided"
+    comparison = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Vague)
+    assert len(comparison.pairs) == 6
+    assert verdict(comparison) == "not decided"
 
 
 def test_nothing_but_noise_neither_fails_nor_passes():
@@ -93,10 +95,10 @@ def test_nothing_but_noise_neither_fails_nor_passes():
     def solve(s):
         return Scale(s, 0.0, 1e-14)
 
-    answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
-    assert [check.verdict for check in answer.checks.values()] == ["no signal"] * 2
-    assert verdict(answer) == "no signal"
-    assert len(answer.pairs) == 4
+    comparison = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
+    assert [check.verdict for check in comparison.checks.values()] == ["no signal"] * 2
+    assert verdict(comparison) == "no signal"
+    assert len(comparison.pairs) == 4
 
 
 def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
@@ -105,9 +107,9 @@ def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
     def solve(s):
         return Scale(s, 0.0, 1e-6 * s)
 
-    answer = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
-    assert answer.checks["limit"].verdict == "fails"
-    assert verdict(answer) == "failed"
+    comparison = compare_scales((1.0, 0.5, 0.25, 0.125), solve, Found)
+    assert comparison.checks["limit"].verdict == "fails"
+    assert verdict(comparison) == "failed"
 
 
 def test_no_checks_at_all_do_not_pass():
@@ -115,8 +117,8 @@ def test_no_checks_at_all_do_not_pass():
         def __post_init__(self):
             self.checks = {}
 
-    answer = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
-    assert verdict(answer) == "no signal"
+    comparison = compare_scales((1.0, 0.5), lambda s: Scale(s, s, s), Empty)
+    assert verdict(comparison) == "no signal"
 
 
 def test_a_value_that_is_not_a_number_is_not_known():

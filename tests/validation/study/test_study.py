@@ -48,36 +48,36 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     study = read_study(study_file(folder, SMALL), folder / "out")
     steps = []
-    found = run_study(study, lambda *step: steps.append(step))
-    write_study(found)
-    return found, folder / "out", steps
+    results = run_study(study, lambda *step: steps.append(step))
+    write_study(results)
+    return results, folder / "out", steps
 
 
 @pytest.mark.exudyn
 def test_a_study_answers_as_the_reference_does(results):
-    found, _, steps = results
+    outcome, _, steps = results
     point = NUMBERS["cases"][0]["points"][0]
-    assert found.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
-    zone = found.solution["zone"]
+    assert outcome.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
+    zone = outcome.solution["zone"]
     assert zone["margin_free"] == pytest.approx(point["t_compliant_free"], rel=1e-9)
-    assert found.reference["relative_difference"]["energy"] < 1e-8
-    assert found.crosscheck.slope == pytest.approx(2.0, abs=0.1)
-    assert found.passed
+    assert outcome.reference["relative_difference"]["energy"] < 1e-8
+    assert outcome.crosscheck.slope == pytest.approx(2.0, abs=0.1)
+    assert outcome.passed
     assert ("maps", 6, 6) in steps
-    assert verdict(found).startswith(
+    assert verdict(outcome).startswith(
         "It goes together only by force: 1.926 J, its play"
     )
 
 
 @pytest.mark.exudyn
 def test_results_show_themselves_on_a_few_lines(results):
-    found, _, _ = results
-    assert all(len(repr(thing)) < 1500 for thing in (found, found.crosscheck))
+    outcome, _, _ = results
+    assert all(len(repr(thing)) < 1500 for thing in (outcome, outcome.crosscheck))
 
 
 @pytest.mark.exudyn
 def test_the_folder_holds_a_self_contained_report_and_results(results):
-    found, folder, _ = results
+    outcome, folder, _ = results
     names = {p.name for p in folder.iterdir()}
     assert names == {"report.html", "results.json", "results.nc"}
     page = (folder / "report.html").read_text()
@@ -87,7 +87,7 @@ def test_the_folder_holds_a_self_contained_report_and_results(results):
     assert "displacement" in page or "exaggeration" in page
     table = json.loads((folder / "results.json").read_text())
     assert table["passed"] is True
-    assert table["solution"]["energy"] == found.solution["energy"]
+    assert table["solution"]["energy"] == outcome.solution["energy"]
     assert np.array(table["solution"]["platform_screw"]).shape == (6,)
     assert table["maps"]["status"] == {"ok": 6}
     with xarray.open_dataset(folder / "results.nc") as data:
@@ -100,12 +100,14 @@ def test_a_study_of_a_robot_file_with_explicit_errors(tmp_path):
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
         "[checks]\ncrosscheck = false\npicture = false\n"
     )
-    found = run_study(read_study(study_file(tmp_path, text)))
-    assert found.solution["energy"] == pytest.approx(0.5e6 * 4e-8 / 2)
-    assert found.crosscheck is None
-    assert found.maps is None
-    assert found.passed
-    assert results_table(found)["errors"] == "geometric errors given in the study file"
+    results = run_study(read_study(study_file(tmp_path, text)))
+    assert results.solution["energy"] == pytest.approx(0.5e6 * 4e-8 / 2)
+    assert results.crosscheck is None
+    assert results.maps is None
+    assert results.passed
+    assert (
+        results_table(results)["errors"] == "geometric errors given in the study file"
+    )
 
 
 ODD = "$l_1 <b>&amp; \\$"
@@ -118,8 +120,8 @@ def test_a_report_shows_a_links_name_as_it_is_written(tmp_path):
     (tmp_path / "beams.toml").write_text(text)
     study = f"robot = \"beams.toml\"\n[errors.explicit]\n'{ODD}' = [0,0,0,2e-4,0,0]\n"
     study += "[checks]\ncrosscheck = false\npicture = false\n"
-    found = run_study(read_study(study_file(tmp_path, study), tmp_path / "out"))
-    write_study(found)
+    results = run_study(read_study(study_file(tmp_path, study), tmp_path / "out"))
+    write_study(results)
     page = (tmp_path / "out" / "report.html").read_text()
     assert f"<td>{html.escape(ODD)}</td>" in page
     assert "<b>" not in page
@@ -144,11 +146,11 @@ def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
     text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
     if name == "irsbot2":
         text += "[pose]\ntx = 0.0\ntz = -0.5\n"
-    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
-    write_study(found)
-    assert found.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
-    assert not found.passed
-    assert "No independent check of these numbers could be made" in verdict(found)
+    results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(results)
+    assert results.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
+    assert not results.passed
+    assert "No independent check of these numbers could be made" in verdict(results)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "What could not be checked" in page
     assert "the robot has no geometric errors" in page
@@ -171,25 +173,27 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
     """Its errors cost neither energy nor play: the simulation alone has a say."""
     text = JUST_CONSTRAINED + QUIET
-    found = run_study(read_study(study_file(tmp_path, text)))
-    assert found.verdicts == {"reference": "no signal", "crosscheck": "passed"}
-    assert set(found.unchecked) == {"reference"}
-    assert found.passed  # nobody asked for the reference by name
-    said = verdict(found)
-    assert "checks of these numbers: 1; they passed. Not checked: reference." in said
+    results = run_study(read_study(study_file(tmp_path, text)))
+    assert results.verdicts == {"reference": "no signal", "crosscheck": "passed"}
+    assert set(results.unchecked) == {"reference"}
+    assert results.passed  # nobody asked for the reference by name
+    sentences = verdict(results)
+    assert (
+        "checks of these numbers: 1; they passed. Not checked: reference." in sentences
+    )
     text += "reference = true\ncrosscheck = false\n"
-    found = run_study(read_study(study_file(tmp_path, text)))
-    assert not found.passed
+    results = run_study(read_study(study_file(tmp_path, text)))
+    assert not results.passed
 
 
 def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
     text = SMALL.replace("tz=-0.5:-0.4:0.1", "tz=-5:-4:0.5") + QUIET
     text += "crosscheck = false\n"
-    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
-    write_study(found)
-    assert found.verdicts == {"reference": "passed"}
-    assert found.unchecked == {"maps": "none of the grid's points has an answer"}
-    assert not found.passed
+    results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(results)
+    assert results.verdicts == {"reference": "passed"}
+    assert results.unchecked == {"maps": "none of the grid's points has an answer"}
+    assert not results.passed
     assert "No point has an answer" in (tmp_path / "out" / "report.html").read_text()
 
 
@@ -201,11 +205,11 @@ def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
 
     monkeypatch.setattr(assembly.linear.reference, "reference_energy", lost)
     text = SMALL + QUIET + "crosscheck = false\nmaps = false\n"
-    found = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
-    write_study(found)
-    assert found.verdicts == {"reference": "no answer"}
-    assert not found.passed
-    assert "Not compared: cvxpy: the problem" in report_page(found)
+    results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
+    write_study(results)
+    assert results.verdicts == {"reference": "no answer"}
+    assert not results.passed
+    assert "Not compared: cvxpy: the problem" in report_page(results)
 
 
 def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
@@ -217,23 +221,23 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"
-    found = run_study(read_study(study_file(tmp_path, text)))
-    worst = worst_clearance(found)
-    bounds = pose_error_of(place_robot(found.robot, found.study.pose), ["frozen"])
-    here = bounds["error"]["frozen"]["translation"]["upper"]
-    assert worst["pose"]["translation"] == pytest.approx(here, abs=1e-6)
-    upper = found.maps["translation_error"].sel(bound="upper").values
+    results = run_study(read_study(study_file(tmp_path, text)))
+    worst = worst_clearance(results)
+    bounds = pose_error_of(place_robot(results.robot, results.study.pose), ["frozen"])
+    bound = bounds["error"]["frozen"]["translation"]["upper"]
+    assert worst["pose"]["translation"] == pytest.approx(bound, abs=1e-6)
+    upper = results.maps["translation_error"].sel(bound="upper").values
     assert worst["map"]["translation"] == np.nanmax(upper)
-    least = np.linalg.norm(found.solution["platform_screw"][3:])
+    least = np.linalg.norm(results.solution["platform_screw"][3:])
     assert worst["pose"]["translation"] > 2e-5 > 10 * least
-    said = verdict(found)
-    assert f"at most {1e3 * here:.3g} mm" in said
-    assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in said
-    assert "certified bounds of (27), reading frozen" in said
-    assert "with play resting at least energy it is 0 mm" in said
-    lost = verdict(replace(found, error={}, maps=None))
+    sentences = verdict(results)
+    assert f"at most {1e3 * bound:.3g} mm" in sentences
+    assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in sentences
+    assert "certified bounds of (27), reading frozen" in sentences
+    assert "with play resting at least energy it is 0 mm" in sentences
+    lost = verdict(replace(results, error={}, maps=None))
     assert "could not be bounded; with play resting at least energy" in lost
-    page = report_page(found)
+    page = report_page(results)
     assert page.count("play at least energy") >= 6  # a row for each component
     assert "anywhere while no deformation changes" in page
     assert "[mm], play anywhere" in page
@@ -244,11 +248,13 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
 
     frames = (Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0]))
     write_robot(Robot("stuck", "a", frames, (("a", "b"),)), tmp_path / "stuck.toml")
-    found = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
-    assert found.solution["status"] == "cannot assemble"
-    assert not found.passed
-    found.study.folder.joinpath("x")
-    assert verdict(found).startswith("No answer at this pose: cannot assemble, a rigid")
+    results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
+    assert results.solution["status"] == "cannot assemble"
+    assert not results.passed
+    results.study.folder.joinpath("x")
+    assert verdict(results).startswith(
+        "No answer at this pose: cannot assemble, a rigid"
+    )
 
 
 @pytest.mark.parametrize(
@@ -287,10 +293,10 @@ def test_every_mistake_in_a_study_file_is_one_message(tmp_path, old, new, messag
         return
     with pytest.raises(BadInput) as error:
         read_study(path)
-    said = str(error.value)
-    assert message in said
-    assert "\n" not in said
-    assert str(tmp_path) in said
+    text = str(error.value)
+    assert message in text
+    assert "\n" not in text
+    assert str(tmp_path) in text
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
 
 
@@ -316,16 +322,16 @@ def test_the_example_runs_with_finite_elements(tmp_path):
     its beam, without shear, 1 067 585.
     """
     study = read_study(EXAMPLE, tmp_path / "out")
-    found = run_study(study)
-    write_study(found)
-    assert found.passed
-    (first, *_) = found.stiffness.values()
+    results = run_study(study)
+    write_study(results)
+    assert results.passed
+    (first, *_) = results.stiffness.values()
     error = first["fea"][1, 1] / 1_032_277 - 1
     assert abs(error) < 0.005
     assert abs(error) < 5 * first["relative_error_estimate"]
     assert first["euler"][1, 1] == pytest.approx(1_067_585.468, rel=1e-9)
     assert first["timoshenko"][1, 1] == pytest.approx(1_015_962.169, rel=1e-9)
-    assert len(found.stiffness) == 4
+    assert len(results.stiffness) == 4
     assert irsbot2_with(NUMBERS["cases"][0]).errors == pytest.approx(
-        found.robot.errors, abs=0
+        results.robot.errors, abs=0
     )

@@ -99,13 +99,13 @@ def test_an_effect_adds_what_the_machine_that_has_it_shows(
     What is left is how screws of 1e-4 compound (1e-8), and the beams' own bending.
     A beam built longer is also softer, which the effect does not say: no load there.
     """
-    here, rows = machine
-    here = replace(here, exact=True)
+    conditions, rows = machine
+    conditions = replace(conditions, exact=True)
     if name in {"link_length", "thermal_expansion"}:
-        here = replace(here, load=0 * here.load)
+        conditions = replace(conditions, load=0 * conditions.load)
         rows = [replace(row, load=np.zeros(6)) for row in rows]
-    there = apply_effects(here, {name: EFFECTS[name]})
-    added = predict(there).deviation - predict(here).deviation
+    there = apply_effects(conditions, {name: EFFECTS[name]})
+    added = predict(there).deviation - predict(conditions).deviation
     with_it, without = (
         simulate_readings(robot, POINT, rows, hidden, program)
         for hidden in ([Hidden(name, EFFECTS[name])], [])

@@ -61,8 +61,8 @@ def added(request):
     return difference
 
 
-def close(found, expected, relative, floor=1e-11):
-    np.testing.assert_allclose(found, expected, rtol=relative, atol=floor)
+def close(contribution, expected, relative, floor=1e-11):
+    np.testing.assert_allclose(contribution, expected, rtol=relative, atol=floor)
 
 
 @pytest.mark.parametrize("point", [(0, 0, 0), (0.1, -0.2, 0.05)])
@@ -74,11 +74,11 @@ def test_a_perfect_robot_without_load_deviates_by_nothing(point):
 def test_a_declared_error_is_in_the_reading_exactly():
     """A turn by e about the drive's axis: the tip goes to L (cos, sin)(q + e)."""
     q, e = 0.3, 0.02
-    found = simulate_readings(
+    contribution = simulate_readings(
         one_link(error=np.array([0, 0, e, 0, 0, 0])), np.zeros(3), [row(q)]
     )[0]
     dx, dy = math.cos(q + e) - math.cos(q), math.sin(q + e) - math.sin(q)
-    close(found, [0, 0, e, L * dx, L * dy, 0], 1e-12)
+    close(contribution, [0, 0, e, L * dx, L * dy, 0], 1e-12)
 
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
@@ -91,35 +91,35 @@ def test_weight_bends_a_beam_with_a_body_at_its_end(added, g):
     sag = w * L**4 / (8 * E * SECOND) + w * L**2 / (2 * SHEAR)
     sag += m * g * (L**3 / (3 * E * SECOND) + L / SHEAR)
     slope = w * L**3 / (6 * E * SECOND) + m * g * L**2 / (2 * E * SECOND)
-    found = added("self_weight", {"g.z": -g}, row(), one_link(mass=m))
-    close(found, [0, slope, 0, 0, 0, -sag], 1e-5, 2.4e-8)
+    contribution = added("self_weight", {"g.z": -g}, row(), one_link(mass=m))
+    close(contribution, [0, slope, 0, 0, 0, -sag], 1e-5, 2.4e-8)
 
 
 def test_a_warm_beam_is_longer_along_itself(added):
     """Alpha T L = 2e-5 x 5 x 0.5 m, exact."""
     q = 0.7
-    found = added("thermal_expansion", {"tip": 2e-5}, row(q))
-    close(found, [0, 0, 0, 5e-5 * math.cos(q), 5e-5 * math.sin(q), 0], 1e-9)
+    contribution = added("thermal_expansion", {"tip": 2e-5}, row(q))
+    close(contribution, [0, 0, 0, 5e-5 * math.cos(q), 5e-5 * math.sin(q), 0], 1e-9)
 
 
 def test_a_longer_beam_is_longer_along_itself(added):
-    found = added("link_length", {"tip": 3e-4}, row(-0.4))
-    close(found, [0, 0, 0, 3e-4 * math.cos(0.4), -3e-4 * math.sin(0.4), 0], 1e-9)
+    contribution = added("link_length", {"tip": 3e-4}, row(-0.4))
+    close(contribution, [0, 0, 0, 3e-4 * math.cos(0.4), -3e-4 * math.sin(0.4), 0], 1e-9)
 
 
 def test_a_longer_beam_also_bends_more(added):
     """P (L + d)^3 / 3EI + P (L + d) / kGA beside the same with d = 0, across."""
     P, d = 1.0, 1e-2
-    found = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
+    contribution = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
     more = ((L + d) ** 3 - L**3) / (3 * E * SECOND) + d / SHEAR
-    assert found[5] == pytest.approx(-P * more, rel=1e-4)
+    assert contribution[5] == pytest.approx(-P * more, rel=1e-4)
 
 
 def test_an_elastic_drive_turns_under_the_moment_it_holds(added):
     """F L / k, beside the declared spring and not instead of it."""
     F, k = 10.0, 5e4
-    found = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
-    close(found[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
+    contribution = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
+    close(contribution[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
 
 
 def test_a_foundation_shifts_and_tilts(added):
@@ -127,8 +127,8 @@ def test_a_foundation_shifts_and_tilts(added):
     F = 10.0
     springs = {"rx": 1e6, "ry": 1e6, "rz": 2e5, "tx": 1e8, "ty": 4e6, "tz": 1e8}
     given = {f"stiffness.{k}": v for k, v in springs.items()}
-    found = added("base_compliance", given, row(load=(0, 0, 0, 0, F, 0)))
-    close(found[[2, 4]], [F * L / 2e5, F / 4e6 + F * L**2 / 2e5], 1e-4)
+    contribution = added("base_compliance", given, row(load=(0, 0, 0, 0, F, 0)))
+    close(contribution[[2, 4]], [F * L / 2e5, F / 4e6 + F * L**2 / 2e5], 1e-4)
 
 
 @pytest.mark.parametrize("name", ["offset", "eccentricity", "wobble"])
@@ -142,9 +142,9 @@ def test_an_encoder_that_reads_wrong_turns_the_beam(added, name):
         "wobble": ("_second_harmonic", given, size * math.sin(2 * q + phase)),
     }
     effect, parameters, d = cases[name]
-    found = added(effect, parameters, row(q))
+    contribution = added(effect, parameters, row(q))
     dx, dy = math.cos(q + d) - math.cos(q), math.sin(q + d) - math.sin(q)
-    close(found, [0, 0, d, L * dx, L * dy, 0], 1e-9)
+    close(contribution, [0, 0, d, L * dx, L * dy, 0], 1e-9)
 
 
 def test_the_measuring_frame_stands_off_and_the_target_too(added):
@@ -152,27 +152,27 @@ def test_the_measuring_frame_stands_off_and_the_target_too(added):
     q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
     given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
     given |= {"base.tz": shift[2], "tool.tx": tool[0], "tool.tz": tool[2]}
-    found = added("registration", given, row(q))
+    contribution = added("registration", given, row(q))
     out = L + tool[0]
     x = out * math.cos(q + b) + shift[0] - L * math.cos(q)
     y = out * math.sin(q + b) + shift[1] - L * math.sin(q)
-    close(found, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
+    close(contribution, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
 
 
 def test_a_softer_beam_bends_more(added):
     """(1/f - 1) (P L^3/3EI + P L/kGA): G falls with E."""
     P, f = 1.0, 0.8
-    found = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
+    contribution = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
     bend = P * L**3 / (3 * E * SECOND) + P * L / SHEAR
-    assert found[5] == pytest.approx((1 / f - 1) * bend, rel=1e-7)
+    assert contribution[5] == pytest.approx((1 / f - 1) * bend, rel=1e-7)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_load_takes_up_play(added, side):
     """A force along x shifts the beam by the radial play, towards the force."""
     play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
-    found = added("joint_clearance", play, row(load=(0, 0, 0, 20 * side, 0, 0)))
-    close(found, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
+    contribution = added("joint_clearance", play, row(load=(0, 0, 0, 20 * side, 0, 0)))
+    close(contribution, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
 def test_play_that_no_load_takes_up_moves_nothing(added):
@@ -184,8 +184,8 @@ def test_play_that_no_load_takes_up_moves_nothing(added):
 def test_friction_holds_an_elastic_joint_back(added, approach):
     """- tau x approach / k about the joint's axis."""
     tau = 0.5
-    found = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
-    close(found[[2, 4]], np.array([1, L]) * -tau * approach / DRIVE, 1e-4)
+    contribution = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
+    close(contribution[[2, 4]], np.array([1, L]) * -tau * approach / DRIVE, 1e-4)
 
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
@@ -194,18 +194,18 @@ def test_a_contact_yields_as_its_law_says(added, exponent, force):
     """F L = c d^n beside all else that yields."""
     c = 2e7
     given = {"drive.coefficient": c, "drive.exponent": exponent}
-    found = added("contact_stiffening", given, row(load=(0, 0, 0, 0, force, 0)))
+    contribution = added("contact_stiffening", given, row(load=(0, 0, 0, 0, force, 0)))
     d = math.copysign((abs(force) * L / c) ** (1 / exponent), force)
-    close(found[[2, 4]], [d, d * L], 1e-4)
+    close(contribution[[2, 4]], [d, d * L], 1e-4)
 
 
 def test_a_load_that_is_not_the_one_recorded(added):
     """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
     P, f, more = 2.0, 1.1, 0.3
     given = {"factor": f, "offset.fz": more}
-    found = added("load_gain", given, row(load=(0, 0, 0, 0, 0, P)))
+    contribution = added("load_gain", given, row(load=(0, 0, 0, 0, 0, P)))
     bend = L**3 / (3 * E * SECOND) + L / SHEAR
-    assert found[5] == pytest.approx(((f - 1) * P + more) * bend, rel=1e-7)
+    assert contribution[5] == pytest.approx(((f - 1) * P + more) * bend, rel=1e-7)
 
 
 def test_the_reading_drifts(added):
@@ -235,8 +235,8 @@ def test_effects_outside_the_library(added):
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
     turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2
-    found = added("_pose_stiffness", {"drive": 1e5}, pushed)
-    assert found[2] == pytest.approx(turn, rel=1e-4)
+    contribution = added("_pose_stiffness", {"drive": 1e5}, pushed)
+    assert contribution[2] == pytest.approx(turn, rel=1e-4)
     assert added("_humidity", {"tip": 1e-5}, row())[3] == pytest.approx(10e-5 * L)
     warm = added("_quadratic_temperature", {"tip": 1e-6}, row())
     assert warm[3] == pytest.approx(25e-6 * L)
@@ -274,8 +274,8 @@ def test_a_closed_loop_shares_what_does_not_fit(added):
         ("encoder_offset", {"left": 1e-4}, 0.5e-4),
         ("thermal_expansion", {"a": 2e-5, "b": 2e-5}, 0.0),
     ):
-        found = added(name, given, where, robot)
-        close(found, [0, 0, 0, expected, 0, 0], 1e-3, 1e-10)
+        contribution = added(name, given, where, robot)
+        close(contribution, [0, 0, 0, expected, 0, 0], 1e-3, 1e-10)
     F, k = 100.0, E * math.pi * 0.01**2 / L
     pulled = replace(where, load=np.array([0, 0, 0, F, 0, 0]))
     soft = added("modulus_scale", {"a": 0.5, "b": 0.5}, pulled, robot)

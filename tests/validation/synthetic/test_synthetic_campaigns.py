@@ -132,9 +132,9 @@ def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
         robot, np.array([p.coordinates for p in placed]),
         np.array([p.transforms for p in placed]), 0.0,
     )  # fmt: skip
-    here = as_declared(postures, np.array([row.load for row in rows]), point=point)
-    exact = predict(replace(here, exact=True)).deviation
-    assert np.abs(exact - predict(here).deviation).max() > 1e-5
+    linear = as_declared(postures, np.array([row.load for row in rows]), point=point)
+    exact = predict(replace(linear, exact=True)).deviation
+    assert np.abs(exact - predict(linear).deviation).max() > 1e-5
     np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
@@ -174,8 +174,8 @@ def test_a_pose_can_be_commanded(tmp_path):
     names = [frame.name for frame in robot.frames]
     own = [names.index(f"leg{k}.strut") for k in range(1, 7)]
     expected = [list(row.coordinates.values()) for row in campaign.plan.rows]
-    found = read.coordinates[:, own]
-    np.testing.assert_allclose(found, np.array(expected)[:, own], rtol=0, atol=1e-9)
+    readings = read.coordinates[:, own]
+    np.testing.assert_allclose(readings, np.array(expected)[:, own], rtol=0, atol=1e-9)
 
 
 def test_the_truth_has_what_the_practice_campaigns_have():
@@ -217,10 +217,10 @@ def test_committed_campaigns_are_what_their_truth_says(name):
         for e in truth["effects"]
     ]
     for effects, key in ((hidden, "normalised_perfect"), ((), "normalised_before")):
-        found = simulate_readings(
+        readings = simulate_readings(
             campaign.robot, campaign.reference_point, rows, effects, "springs"
         )
-        rms = np.sqrt(np.mean(((campaign.measured - found) / campaign.sigma) ** 2))
+        rms = np.sqrt(np.mean(((campaign.measured - readings) / campaign.sigma) ** 2))
         assert rms == pytest.approx(truth[key], rel=1e-3)
 
 
@@ -250,11 +250,11 @@ def test_softer_links_are_a_larger_load_if_nothing_else_yields():
     "name", [n for n in LIBRARY if n not in ("joint_clearance", "geometric_stiffening")]
 )
 def test_an_effect_is_its_own_best_explanation(name):
-    found = alternatives(quick({name: 5.0}, seed=6))
-    own = min(one.residual for one in found if one.names[0].startswith(name))
+    readings = alternatives(quick({name: 5.0}, seed=6))
+    own = min(one.residual for one in readings if one.names[0].startswith(name))
     bound = 60.0 if name in ("drift", "contact_stiffening") else 1.0
     assert own < bound  # a time constant and contacts beside springs are not linear
-    assert own <= min(one.residual for one in found) + 1.0
+    assert own <= min(one.residual for one in readings) + 1.0
 
 
 def test_what_cannot_be_hidden_is_refused():
@@ -298,7 +298,7 @@ def test_the_command_writes_a_campaign_or_says_why_not(tmp_path):
     assert made.returncode == 0, made.stderr
     truth = json.loads((tmp_path / "t.json").read_text())["c"]
     assert truth["contribution_rms"]["drift"] == pytest.approx(2.0, rel=0.05)
-    for words, said in (
+    for words, message in (
         (["arm6", "c", "--truth", "t.json", *small], "expected a new folder"),
         (["arm6", "d", "--truth", "t.json", "--effect", "foo"], 'found "foo"'),
         (["arm6", "d", "--truth", "d/t.json"], "no folder d"),
@@ -307,5 +307,5 @@ def test_the_command_writes_a_campaign_or_says_why_not(tmp_path):
     ):
         refused = run(*words)
         assert refused.returncode == 2, refused.stdout
-        assert said in refused.stderr
+        assert message in refused.stderr
     assert not (tmp_path / "d").exists()

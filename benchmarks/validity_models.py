@@ -1,0 +1,107 @@
+"""Models with one assumption less or more, for the tables of ``docs/validity.md``."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import linearise, virtual_joints
+from assembly.linear.energy import solve_assembly, solve_with
+from assembly.linear.load import loads_on_frames, weights
+from assembly.linear.zone import Zone, margin_with
+from assembly.model.robot import BeamLink, Robot, beam_axis
+from validation.assumptions.bushes import bush_joints
+from validation.assumptions.validity import Cost, cost_between
+from validation.crosscheck.spread_weight import energy_between_ends, heavy_beams
+
+
+def with_bars(robot: Robot, slenderness: float, density: float | None = None) -> Robot:
+    """A robot whose beams are solid round bars of one slenderness.
+
+    Args:
+        robot: any.
+        slenderness: [-] length over radius.
+        density: [kg/m^3] of the bars; their own if absent.
+
+    Returns:
+        The robot.
+    """
+    links: dict[str, BeamLink] = {}
+    for frame in robot.frames:
+        link = frame.link
+        if isinstance(link, BeamLink):
+            section: Mapping[str, float]
+            section = {"radius": beam_axis(frame)[0] / slenderness}
+            heavy = link.density if density is None else density
+            links[frame.name] = replace(link, section=section, density=heavy)
+    return robot.with_links({**links})
+
+
+def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
+    """Factor on all clearances at which a rigid manipulator on bushes just assembles.
+
+    Args:
+        posture: where the robot stands.
+        compliant: ``"rigid"`` or ``"free"``, as for
+            ``assembly.linear.zone.zone_margin``.
+
+    Returns:
+        The margin with a certified lower bound.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
+    joints = bush_joints(virtual_joints(posture.robot, compliant))
+    return margin_with(linearise(posture), joints)[0]
+
+
+def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Half of each beam's weight at either end, without the moments.
+
+    Args:
+        posture: where the robot stands, of n frames.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        ``bodies`` and ``carried`` (n, 6) [N m, N] of
+        :func:`assembly.linear.load.loads_on_frames`.
+    """
+    own, carried = weights(posture, gravity)
+    for beam in heavy_beams(posture, gravity):
+        clamp = np.cross(beam.line, beam.total) / 12
+        own[beam.index, :3] += clamp
+        parent = posture.robot.parents[beam.index]
+        if parent >= 0:
+            carried[parent, :3] -= clamp
+    return own, carried
+
+
+def halves_cost(
+    posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
+) -> Cost:
+    """What it would cost to put half of each weight at either end, without couples.
+
+    Args:
+        posture: where the robot stands.
+        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+
+    Returns:
+        The cost, against the weight spread over the links.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no solution was found.
+    """
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    own, carried = half_weights(posture, gravity)
+    halves = solve_with(
+        linearise(posture),
+        virtual_joints(posture.robot),
+        wrench,
+        loads_on_frames(posture, wrench, own, carried),
+    )
+    ends = solve_assembly(posture, load, gravity=gravity)
+    return cost_between(halves, ends, energy_between_ends(posture, gravity))

@@ -1,0 +1,42 @@
+"""Small robots of stiff and soft beams for tests of the simulation."""
+
+import numpy as np
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Frame, Robot
+from validation.multibody.simulation import (
+    simulate_assembly,
+)
+
+E, NU = 60e9, 0.3
+ROUND = BeamLink({"radius": 0.04}, E, NU)
+FLAT = BeamLink({"width": 0.02, "height": 0.05}, E, NU)
+UNIT = np.array([1, 1, 1, 0.4, 0.4, 0.4])  # m for rad, of beams about 0.4 m long
+
+
+def coaxial(error, length=0.4):
+    """Two equal beams, clamped `2 length` apart, that miss each other by an error."""
+    frames = (
+        Frame("a", translation=[length, 0, 0], link=ROUND, geometric_error=error),
+        Frame("wall", translation=[2 * length, 0, 0]),
+        Frame("b", "wall", translation=[-length, 0, 0], link=ROUND),
+    )
+    return home_posture(Robot("coaxial", "a", frames, (("a", "b"),)))
+
+
+def random_stiffness(rng, soft=1e3):
+    """Symmetric, well conditioned once radians are counted as 0.4 m."""
+    A = rng.normal(size=(6, 6))
+    return soft * (A @ A.T + np.eye(6)) * np.outer(UNIT, UNIT) / UNIT[3] ** 2
+
+
+def tip_stiffness(frame):
+    """K_E of a frame's beam by unit loads; base axes are the frame's own here."""
+    alone = Frame("f", translation=frame.translation, link=frame.link)
+    posture = home_posture(Robot("one", "f", (alone,)))
+    rows = [
+        simulate_assembly(posture, load=1e-3 * unit).link_screws[0] / 1e-3
+        for unit in np.eye(6)
+    ]
+    C = np.array(rows)
+    return np.linalg.inv((C + C.T) / 2)

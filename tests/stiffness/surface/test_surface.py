@@ -1,0 +1,136 @@
+"""Surfaces read and checked: repairs named, what bounds no solid refused."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.surface import check_surface, read_surface
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, cylinder
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(3)
+
+
+def write_stl(path, points, triangles):
+    corners = np.asarray(points, dtype="<f4")[triangles]
+    body = b"".join(
+        struct.pack("<3f", 0, 0, 0) + corner.tobytes() + b"\0\0" for corner in corners
+    )
+    path.write_bytes(b"test".ljust(80) + struct.pack("<I", len(corners)) + body)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
+def test_every_format_gives_the_same_surface(tmp_path, kind):
+    """Single precision of STL and PLY: 1e-7 of the coordinates."""
+    pyvista = pytest.importorskip("pyvista")
+    points, triangles = cylinder()
+    path = tmp_path / f"bar.{kind}"
+    pyvista.PolyData.from_regular_faces(points, triangles).save(path)
+    surface = read_surface(path)
+    assert surface.volume == pytest.approx(bar().volume, rel=1e-6)
+    assert surface.repairs == ()
+    assert len(surface.triangles) == len(triangles)
+
+
+def test_the_unit_scales_the_part(tmp_path):
+    points, triangles = cylinder()
+    path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
+    assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
+    with pytest.raises(BadInput, match='is the file in "mm"'):
+        read_surface(path, "m")
+    with pytest.raises(BadInput, match="unit: found 'mmm'; did you mean \"mm\""):
+        read_surface(path, "mmm")
+
+
+def test_a_prism_has_its_own_volume_and_area():
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    assert surface.volume == pytest.approx(1e-3, rel=1e-14)
+    assert surface.area == pytest.approx(6e-2, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.stl", b"", "the file is empty"),
+        ("a.stl", b"no stl at all", "STL"),
+        ("a.obj", b"no obj at all", "OBJ"),
+        ("a.ply", b"ply\nrubbish", "PLY"),
+        ("a.vtk", b"rubbish", "VTK"),
+        ("a.xyz", b"1 2 3", "unknown kind of surface file"),
+        ("absent/a.stl", None, "cannot be read"),
+    ],
+)
+def test_what_is_no_surface_file_is_refused(tmp_path, name, content, message):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInput, match=message):
+        read_surface(path)
+
+
+def test_an_open_surface_is_refused_and_the_gap_named():
+    with pytest.raises(BadInput, match="open: 3 edges have a triangle on one side"):
+        check_surface(CUBE, CUBE_TRIANGLES[:-1], "cube")
+
+
+def test_a_surface_that_cuts_itself_is_refused():
+    inside = CUBE + [0.05, 0.031, 0.023]
+    points = np.concatenate([CUBE, inside])
+    triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+    with pytest.raises(BadInput, match="separate bodies|cuts itself"):
+        check_surface(points, triangles, "cubes")
+    twisted = CUBE.copy()
+    twisted[7] = [-0.05, 0.05, 0.02]  # a corner pulled through the opposite face
+    with pytest.raises(BadInput, match="cuts itself"):
+        check_surface(twisted, CUBE_TRIANGLES, "cube")
+
+
+def test_two_bodies_are_refused_and_a_cavity_is_not():
+    far = np.concatenate([CUBE, CUBE + 0.3])
+    both = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+    with pytest.raises(BadInput, match="2 separate bodies"):
+        check_surface(far, both, "cubes")
+    hollow = np.concatenate([CUBE, 0.5 * CUBE + 0.025])
+    surface = check_surface(hollow, both, "cube")
+    assert surface.volume == pytest.approx(1e-3 * (1 - 1 / 8))
+    assert "cavity was inside out" in surface.repairs[0]
+
+
+def test_what_is_inside_out_or_mixed_up_is_turned_and_named():
+    surface = check_surface(CUBE, CUBE_TRIANGLES[:, ::-1], "cube")
+    assert surface.volume == pytest.approx(1e-3)
+    assert surface.repairs == ("the surface was inside out and has been turned",)
+    mixed = CUBE_TRIANGLES.copy()
+    mixed[[3, 8]] = mixed[[3, 8]][:, ::-1]
+    surface = check_surface(CUBE, mixed, "cube")
+    assert surface.volume == pytest.approx(1e-3)
+    assert surface.repairs == ("2 triangles turned to agree with the rest",)
+
+
+def test_numbers_that_are_none_and_nothing_at_all_are_refused():
+    wrong = CUBE.copy()
+    wrong[3, 1] = np.nan
+    with pytest.raises(BadInput, match="1 vertices are not finite"):
+        check_surface(wrong, CUBE_TRIANGLES, "cube")
+    with pytest.raises(BadInput, match="holds no triangles"):
+        check_surface(CUBE, CUBE_TRIANGLES[:0], "cube")
+
+
+def test_nearly_equal_vertices_are_merged_and_named(rng):
+    """Every triangle with its own vertices, each off by 1e-10 m."""
+    loose = CUBE[CUBE_TRIANGLES].reshape(-1, 3) + 1e-10 * rng.normal(size=(36, 3))
+    surface = check_surface(loose, np.arange(36).reshape(-1, 3), "cube")
+    assert len(surface.points) == 8
+    assert "nearly equal vertices merged" in surface.repairs[0]
+
+
+def test_an_edge_of_four_triangles_is_refused():
+    points = np.concatenate([CUBE, CUBE + [0.1, 0.1, 0]])
+    triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+    with pytest.raises(BadInput, match="1 edges are shared by more than two"):
+        check_surface(points, triangles, "cubes")

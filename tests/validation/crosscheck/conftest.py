@@ -1,0 +1,30 @@
+"""The paper's robot with errors, and terms of the model broken for one test."""
+
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.robots import load_robot
+from tests.robots_for_tests import with_papers_errors
+
+
+@pytest.fixture(scope="module")
+def irsbot2():
+    return with_papers_errors(load_robot("irsbot2"), seed=1)
+
+
+@pytest.fixture(scope="module")
+def posture(irsbot2):
+    return place_robot(irsbot2, {"tx": 0.0, "tz": -0.5})
+
+
+@pytest.fixture
+def broken(monkeypatch):
+    """Breaks a term; columns made before it broke, or while it was, are forgotten."""
+    from assembly.linear.closure import _virtual_joints
+
+    def breaks(mutation):
+        mutation(monkeypatch)
+        _virtual_joints.cache_clear()
+
+    yield breaks
+    _virtual_joints.cache_clear()

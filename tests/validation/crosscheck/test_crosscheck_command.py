@@ -1,0 +1,110 @@
+"""The command ``validation crosscheck``: keys, exit statuses, refusals."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from assembly.files.robot_file import write_robot
+from forcefit.commands.validation import app
+from forcefit.inputs.table import BadInput
+from tests.mutations_for_tests import MUTATIONS
+
+pytestmark = pytest.mark.exudyn
+
+
+@pytest.mark.parametrize("more", [[], ["--clearances"]])
+def test_the_command_does_not_pass_a_robot_without_errors(more):
+    outcome = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
+    assert outcome.exit_code == 1
+    assert "NOT CHECKED" in outcome.output
+    assert "passed" not in outcome.output
+    assert not re.search(r"\bok\b", outcome.output)
+
+
+def test_the_readmes_example_compares_a_draw_of_errors(tmp_path):
+    """The errors of the file replace the robot's; the seed says which draw."""
+    target, root = tmp_path / "check.json", Path(__file__).parents[3]
+    example = root / "examples" / "irsbot2_errors.toml"
+    outcome = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
+    assert outcome in (root / "README.md").read_text(encoding="utf-8")
+    words = ["irsbot2", "--errors", str(example), "--pose", "tx=0,tz=-0.5"]
+    outcome = run(*words, "--scale", "1,0.5,0.25", "--json", str(target))
+    assert outcome.exit_code == 0, outcome.output
+    table = json.loads(target.read_text())
+    assert {check["verdict"] for check in table["checks"].values()} == {"ok"}
+    assert table["scales"][0]["vjm"]["energy"] > 0.1
+    again = run(*words, "--scale", "1,0.5,0.25", "--seed", "2", "--json", "-")
+    other = json.loads(again.output)["scales"][0]["vjm"]["energy"]
+    assert other != table["scales"][0]["vjm"]["energy"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["crosscheck", *arguments])
+
+
+def test_the_command_writes_the_public_keys(tmp_path):
+    target = tmp_path / "check.json"
+    picture = tmp_path / "slope.png"
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
+               "--scale", "1,0.5", "--json", str(target),
+               "--figure", str(picture))  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    assert "passed" in outcome.output
+    table = json.loads(target.read_text())
+    assert table["passed"] is True
+    assert table["slope"] == pytest.approx(2.0, abs=0.1)
+    assert [entry["scale"] for entry in table["scales"]] == [1.0, 0.5]
+    entry = table["scales"][0]
+    for side in ("vjm", "multibody", "difference"):
+        assert len(entry[side]["platform_screw"]) == 6
+        assert isinstance(entry[side]["energy"], float)
+        assert len(entry[side]["links"]["leg1.link_a"]) == 6
+    a, b, d = (entry[s]["energy"] for s in ("vjm", "multibody", "difference"))
+    assert d == pytest.approx(b - a)
+    assert picture.stat().st_size > 1000
+
+
+def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
+    target, file = tmp_path / "check.json", tmp_path / "robot.toml"
+    write_robot(irsbot2, file)
+    outcome = run(str(file), "--pose", "tx=0.0,tz=-0.5", "--clearances",
+               "--scale", "0.5,0.25", "--json", str(target))  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    table = json.loads(target.read_text())
+    assert table["passed"] is True
+    assert table["slope"] is None
+    assert [entry["scale"] for entry in table["scales"]] == [0.5, 0.25]
+    assert len(table["optimality_gaps"]) == 2 + len(table["added_scales"])
+    refused = run(str(file), "--clearances", "--figure", "slope.png")
+    assert isinstance(refused.exception, BadInput)
+
+
+def test_the_command_fails_with_status_1(monkeypatch):
+    MUTATIONS["lever arm missing"](monkeypatch)
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100")
+    assert outcome.exit_code == 1
+    assert "FAIL" in outcome.output or "cannot" in outcome.output
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("slope.txt", "expected a picture: .png or .svg or .pdf"),
+        ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
+    ],
+)
+def test_a_figure_that_cannot_be_written_is_bad_input(name, message, tmp_path):
+    outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
+               "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip
+    assert isinstance(outcome.exception, BadInput)
+    assert message in str(outcome.exception)
+
+
+@pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
+def test_the_command_refuses_bad_scales(text):
+    outcome = run("irsbot2", "--scale", text)
+    assert isinstance(outcome.exception, BadInput)
+    assert f'--scale: found "{text}", expected at least two' in str(outcome.exception)
