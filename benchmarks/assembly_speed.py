@@ -37,7 +37,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
-from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.batch.many_postures import minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import Posture, place_many
 from assembly.linear import reference
 from assembly.linear.closure import linearise, virtual_joints
@@ -249,7 +250,7 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
     for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
         answers = minimise_energies(robot, T, kappa * robot.errors, mismatch)
         share, slow = answers.certified.mean() * 100, answers.fallbacks()
-        newton = np.mean(answers.road == 0) * 100
+        newton = np.mean(answers.outcome == 0) * 100
         print(
             f"errors times {kappa:<5g} {share:6.2f} %   slower road: {slow or 'none'}; "
             f"Newton alone {newton:.0f} %"

@@ -50,7 +50,7 @@ def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
     h = errors.reshape(BLOCK, -1) @ one.misfit.T
     allowed = 1e-8 * draws.energy + 1e-12 * (h**2).sum(axis=1) / 2
     fine = draws.energy - draws.bound <= allowed
-    return np.array([np.sum(draws.energy <= 1e-20), fine.sum(), draws.slower.sum()])
+    return np.array([np.sum(draws.energy <= 1e-20), fine.sum(), draws.fallback.sum()])
 
 
 def run(one: OnePosture, sources: ErrorSources, blocks: int, threads: int) -> tuple:

@@ -36,11 +36,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
 from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.batch.many_postures import minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import Posture, place_many
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import Reach, reachable_screws
+from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.model.robot import Robot
 from assembly.solvers import conic
 from benchmarks.assembly_speed import paper_robot, workspace
@@ -61,7 +62,9 @@ class Answer:
     taken: float
 
 
-def scaled(reach: Reach, part: slice) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def scaled(
+    reach: ReachableSet, part: slice
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """As x = c + X v with H v = k, poses in units of 1e-3: (c, X, H, k)."""
     X = reach.map[part] / UNIT
     c = reach.centre[part] / UNIT - X @ reach.start
@@ -74,7 +77,7 @@ def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
     return c - reach, c + reach
 
 
-def by_scip(reach: Reach, part: slice, near: float) -> Answer:
+def by_scip(reach: ReachableSet, part: slice, near: float) -> Answer:
     """Maximise t <= x.x with SCIP, to the gap of t that is 1e-6 of x."""
     import pyscipopt
 
@@ -109,7 +112,7 @@ def by_scip(reach: Reach, part: slice, near: float) -> Answer:
     )  # fmt: skip
 
 
-def by_gurobi(reach: Reach, part: slice, near: float) -> Answer:
+def by_gurobi(reach: ReachableSet, part: slice, near: float) -> Answer:
     """Maximise t <= x.x with Gurobi, to the gap of t that is 1e-6 of x."""
     import gurobipy
 
@@ -143,7 +146,7 @@ def by_gurobi(reach: Reach, part: slice, near: float) -> Answer:
     )
 
 
-def by_branching(reach: Reach, part: slice, near: float) -> Answer:
+def by_branching(reach: ReachableSet, part: slice, near: float) -> Answer:
     """Branch and bound on x: above each square its secant, Clarabel at every node."""
     c, X, H, k = scaled(reach, part)
     begin = time.process_time()
@@ -196,8 +199,8 @@ def _secant_node(
 
 
 def sampled(
-    solve: Callable[[Reach, slice, float], Answer], reaches: list[Reach], part: slice,
-    near: NDArray,
+    solve: Callable[[ReachableSet, slice, float], Answer],
+    reaches: list[ReachableSet], part: slice, near: NDArray,
 ) -> tuple[float, list[Answer], str]:  # fmt: skip
     """Mean time [ms], the answers, and what there is to say."""
     try:
@@ -254,7 +257,7 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
         print(f"{'ours, one at a time':28}{single:10.2f}{single / batched:11.1f}")
         print(
             f"{'ours, batched':28}{batched:10.3f}{1:11d}  {batch.supports.mean():.1f} "
-            f"supports a point, {batch.slower.sum()} by the slower road"
+            f"supports a point, {batch.fallback.sum()} by the slower road"
         )
 
 
@@ -277,8 +280,8 @@ def print_study(robot: Robot, poses: NDArray) -> None:
         float(np.diff(getattr(one, f"{part}_error")).max())
         for one in errors for part in PARTS
     )  # fmt: skip
-    slow = sum(int(one.slower.sum()) for one in errors)
-    slow += sum(int(one.slower.sum()) for one in zones)
+    slow = sum(int(one.fallback.sum()) for one in errors)
+    slow += sum(int(one.fallback.sum()) for one in zones)
     print(
         f"\nthe study, {len(T)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import delta, five_bar, hexapod, three_rrr
-from assembly.robots.delta import Parameters as Delta
-from assembly.robots.five_bar import Parameters as FiveBar
-from assembly.robots.hexapod import Parameters as Hexapod
+from assembly.robots.delta import DeltaParameters
+from assembly.robots.five_bar import FiveBarParameters
+from assembly.robots.hexapod import HexapodParameters
 from assembly.robots.placing import drive_stiffness
-from assembly.robots.three_rrr import Parameters as ThreeRRR
+from assembly.robots.three_rrr import ThreeRRRParameters
 from validation.multibody.motion import turn_of
 from validation.multibody.simulation import SimulationFailed, without_clearance
 from validation.synthetic.design import CampaignDesign, plan_campaign
@@ -133,14 +133,14 @@ def _about(rng: np.random.Generator, value: float) -> float:
 
 
 def _three_rrr(rng: np.random.Generator) -> tuple[Robot, float]:
-    P = ThreeRRR()
+    P = ThreeRRRParameters()
     leg = replace(P.leg, near=_about(rng, P.leg.near), far=_about(rng, P.leg.far))
     robot = three_rrr(replace(P, leg=_driven(leg, rng)))
     return robot, 0.15
 
 
 def _five_bar(rng: np.random.Generator) -> tuple[Robot, float]:
-    P = FiveBar()
+    P = FiveBarParameters()
     arm = _about(rng, P.leg.near)
     leg = replace(P.leg, near=arm, far=_about(rng, arm))
     robot = five_bar(replace(P, leg=_driven(leg, rng), base=_about(rng, P.base)))
@@ -153,13 +153,13 @@ def _driven(leg, rng: np.random.Generator):
 
 
 def _hexapod(rng: np.random.Generator) -> tuple[Robot, float]:
-    P = Hexapod()
+    P = HexapodParameters()
     P = replace(P, height=_about(rng, P.height), radius=_about(rng, 0.011))
     return hexapod(P), 0.15
 
 
 def _delta(rng: np.random.Generator) -> tuple[Robot, float]:
-    P = Delta()
+    P = DeltaParameters()
     size = _about(rng, 1.0)
     P = replace(P, arm=size * P.arm, rod=size * P.rod, home=size * P.home)
     return delta(P), 0.25

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly, solve_with
-from assembly.linear.load import forces_on, weights
+from assembly.linear.load import loads_on_frames, weights
 from assembly.linear.zone import Zone, margin_with
+from assembly.model.clearance import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints
 from validation.assumptions.validity import Cost, cost_between
@@ -39,7 +40,7 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
     return robot.with_links({**links})
 
 
-def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
+def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
     """Factor on all clearances at which a rigid manipulator on bushes just assembles.
 
     Args:
@@ -66,7 +67,7 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
 
     Returns:
         ``bodies`` and ``carried`` (n, 6) [N m, N] of
-        :func:`assembly.linear.load.forces_on`.
+        :func:`assembly.linear.load.loads_on_frames`.
     """
     own, carried = weights(posture, gravity)
     for beam in heavy_beams(posture, gravity):
@@ -101,7 +102,7 @@ def halves_cost(
         linearise(posture),
         virtual_joints(posture.robot),
         wrench,
-        forces_on(posture, wrench, own, carried),
+        loads_on_frames(posture, wrench, own, carried),
     )
     ends = solve_assembly(posture, load, gravity=gravity)
     return cost_between(halves, ends, energy_between_ends(posture, gravity))

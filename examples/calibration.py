@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import Posture, home_posture
-from assembly.linear.load import forces_on, weights
+from assembly.linear.load import loads_on_frames, weights
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.model.robot import Robot
 from examples.campaign_folder import base_pose
@@ -74,7 +74,7 @@ class Rows:
         """(k, n, 6) [N m, N] through each joint under gravity, frame axes."""
         postures = self.here.postures
         bodies, carried = weights(postures, self.here.gravity)
-        forces = forces_on(postures, None, bodies, carried)
+        forces = loads_on_frames(postures, None, bodies, carried)
         return forces.joint.reshape(len(self), -1, 6)
 
     def turned_about(self, point: NDArray, axes: NDArray) -> NDArray:

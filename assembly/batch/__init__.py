@@ -1,4 +1,5 @@
 """The same problems compiled, for many postures or many draws of the errors.
 
-Begin at ``many_postures.py``; ``many_draws.py`` keeps the posture and draws the errors.
+Begin at ``many_postures.py`` and ``zone_margins.py``; ``many_draws.py`` and
+``many_margins.py`` keep the posture and take many draws of the errors.
 """

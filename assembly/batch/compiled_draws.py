@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.batch.compiled_energy import small_answer
 from assembly.batch.compiled_zone import farthest, turn_first
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
 from assembly.solvers.vectors import copy, fill, inner
 
@@ -23,14 +22,13 @@ _MARGIN_GAP = 1e-8  # as in assembly.batch.compiled_zone
 
 @kernel
 def least_energies(
-    solvers: ConeSolvers, Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
+    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
     cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
     energy: NDArray, bound: NDArray, road: NDArray,
 ) -> None:  # fmt: skip
     """Minimise |G u + h|^2 / 2 for every row of h.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         Gt: (nu, r) columns of G as rows [sqrt(2 J)].
         starts: (cones + 1,) first clearance of each cone, and nu.
         h: (k, r) [sqrt(2 J)].
@@ -71,7 +69,7 @@ def least_energies(
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
             absolute = _STOP * GAP_WITHOUT_PLAY * without / (size * size)
-            small_answer(solvers, G, right, starts, _STOP * GAP, absolute, own, answer)
+            small_answer(G, right, starts, _STOP * GAP, absolute, own, answer)
             for i in range(r):
                 answer[i] *= size
         total = 0.0
@@ -109,10 +107,8 @@ def least_energies(
         road[point] = SOLVED if fine else UNCERTIFIED
 
 
-@kernel
-def _within(
-    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray, u: NDArray
-) -> bool:
+@part
+def _within(Gt: Matrix, starts: Indices, h: Vector, inverse: Matrix, u: Vector) -> bool:
     """Look for clearances within their cones with G u = -h: no energy at all."""
     # y = h may prove that there are none; else project on the cones and that plane
     nu, r = Gt.shape
@@ -156,13 +152,12 @@ def _within(
 
 @kernel
 def least_margins(
-    solvers: ConeSolvers, B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
+    B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
     bound: NDArray, pulls: NDArray,
 ) -> None:  # fmt: skip
     """Least t with B u = right, |u_k| <= t, for every row of right.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         B: (p, nu) orthonormal rows.
         starts: (cones + 1,) first clearance of each cone, and nu.
         right: (k, p).
@@ -180,7 +175,7 @@ def least_margins(
             continue
         own = B.copy()
         turn_first(own, w, size)
-        u, pull = farthest(solvers, own, starts)
+        u, pull = farthest(own, starts)
         reach, most = inner(own[0], u), 0.0
         for c in range(len(starts) - 1):
             part = 0.0

@@ -25,10 +25,18 @@ from assembly.batch.compiled_reduction import (
     small_problem,
     spring_rows,
 )
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import (
+    Indices,
+    Matrices,
+    Matrix,
+    Vector,
+    kernel,
+    part,
+)
 from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import copy, divide, inner, into_cones
 
 NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
@@ -57,26 +65,25 @@ class Answers(NamedTuple):
         open: (k,) [rad, lengths] largest component left open in a closure.
     """
 
-    road: NDArray
-    energy: NDArray
-    bound: NDArray
-    without_play: NDArray
-    platform_screw: NDArray
-    clearances: NDArray
-    motions: NDArray
-    multipliers: NDArray
-    open: NDArray
+    road: Indices
+    energy: Vector
+    bound: Vector
+    without_play: Vector
+    platform_screw: Matrix
+    clearances: Matrix
+    motions: Matrix
+    multipliers: Matrix
+    open: Vector
 
 
 @kernel
 def assemble_all(
-    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: Answers,
 ) -> None:  # fmt: skip
     """Solve every point; see :class:`Answers`.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot.
         T: (k, n, 4, 4) frames.
         errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
@@ -116,7 +123,7 @@ def assemble_all(
         # the small problem in the clearances
         Gt, h = small_problem(s, P, Z, rank, known)
         u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
-        road = _minimise(solvers, s, Gt, h, u, v, y)
+        road = _minimise(s, Gt, h, u, v, y)
         # the way back
         multipliers = out.multipliers[point]
         for a in range(m):
@@ -136,9 +143,9 @@ def assemble_all(
         out.road[point] = _certify(point, s, P, own, moved, road, out)
 
 
-@kernel
+@part
 def _certify(
-    point: int, s: Structure, P: NDArray, errors: NDArray, moved: NDArray, road: int,
+    point: int, s: Structure, P: Matrices, errors: Matrix, moved: Vector, road: int,
     out: Answers,
 ) -> int:  # fmt: skip
     """The certificate on the problem before elimination, and what the platform does."""
@@ -181,9 +188,9 @@ def _certify(
     return UNCERTIFIED
 
 
-@kernel
+@part
 def _complementary(
-    s: Structure, P: NDArray, errors: NDArray, multipliers: NDArray, motions: NDArray
+    s: Structure, P: Matrices, errors: Matrix, multipliers: Vector, motions: Vector
 ) -> tuple[float, float]:
     """Wrenches times f prove f gain - f^2 cost / 2: (gain, cost)."""
     # the complementary energy of assembly.linear.energy.Assembly.bound
@@ -219,10 +226,10 @@ def _complementary(
     return total, cost
 
 
-@kernel
+@part
 def _minimise(
-    solvers: ConeSolvers, s: Structure, Gt: NDArray, h: NDArray, u: NDArray, v: NDArray,
-    y: NDArray,
+    s: Structure, Gt: Matrix, h: Vector, u: Vector, v: Vector,
+    y: Vector,
 ) -> int:  # fmt: skip
     """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
     nu, r = Gt.shape
@@ -239,7 +246,7 @@ def _minimise(
         for i in range(r):
             G[c, i] = Gt[c, i] / size
     absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * inner(right, right)
-    road = small_answer(solvers, G, right, s.starts, _STOP * GAP, absolute, u, y)
+    road = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
     for i in range(r):
         v[i] = h[i]
         y[i] *= size
@@ -248,14 +255,14 @@ def _minimise(
     return road
 
 
-@kernel
+@part
 def small_answer(
-    solvers: ConeSolvers, Gt: NDArray, h: NDArray, starts: NDArray, relative: float,
-    absolute: float, u: NDArray, y: NDArray,
+    Gt: Matrix, h: Vector, starts: Indices, relative: float,
+    absolute: float, u: Vector, y: Vector,
 ) -> int:  # fmt: skip
     """Newton alone where all play is used up, else after an interior point."""
     r, d = len(h), np.zeros(len(u))
-    if solvers.dual_newton(
+    if dual_newton(
         Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
     ) >= 0:  # fmt: skip
         return NEWTON
@@ -266,10 +273,10 @@ def small_answer(
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
-        inside, _, _ = solvers.interior_point(G, h, d, H, none, starts, most, stop)
+        inside, _, _ = interior_point(G, h, d, H, none, starts, most, stop)
         copy(inside, u)
         into_cones(starts, u)
-        if solvers.dual_newton(
+        if dual_newton(
             Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
         ) >= 0:  # fmt: skip
             break

@@ -20,8 +20,15 @@ from assembly.batch.compiled_reduction import (
     small_problem,
 )
 from assembly.batch.compiled_zone import largest_clearance, orthonormal_rows
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import (
+    Indices,
+    Mask,
+    Matrices,
+    Matrix,
+    Vector,
+    kernel,
+    part,
+)
 from assembly.solvers.farthest import DONE, advance, begin
 from assembly.solvers.householder import triangulate, turn_all
 from assembly.solvers.interior import LANES
@@ -49,11 +56,11 @@ class Loads(NamedTuple):
     """
 
     structure: Structure
-    multipliers: NDArray
-    clearances: NDArray
-    energy: NDArray
-    without_play: NDArray
-    cone_of: NDArray
+    multipliers: Matrix
+    clearances: Matrix
+    energy: Vector
+    without_play: Vector
+    cone_of: Indices
 
 
 class Bounds(NamedTuple):
@@ -78,14 +85,13 @@ class Bounds(NamedTuple):
 
 @kernel
 def bound_all(
-    solvers: ConeSolvers, s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
+    s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
     clearances: NDArray, motions: NDArray, loads: Loads, offset: NDArray,
     tolerance: NDArray, out: Bounds,
 ) -> None:  # fmt: skip
     """Bracket the largest pose errors of all points that are not handed back yet.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
@@ -110,7 +116,7 @@ def bound_all(
             continue
         for half in range(2):
             search = begin(body, 3 * half, tolerance[half], outer)
-            if advance(solvers, body, search) != DONE:
+            if advance(body, search) != DONE:
                 out.road[i] = HANDED_BACK
             out.supports[i] += search.counts[1]
             if half == 0:
@@ -121,8 +127,8 @@ def bound_all(
                 copy(search.best, out.translation_screw[i])
 
 
-@kernel
-def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
+@part
+def loaded_cones(loads: Loads, P: Matrices, point: int) -> tuple[bool, Mask]:
     """Which clearances press on their bound, as in :mod:`assembly.linear.pose_error`.
 
     Load times slack is about the solver's gap, so one of the two is nearly zero.
@@ -160,10 +166,10 @@ def loaded_cones(loads: Loads, P: NDArray, point: int) -> tuple[bool, NDArray]:
     return decided, loaded
 
 
-@kernel
+@part
 def body_of(
-    s: Structure, T: NDArray, mismatch: float, centre: NDArray, clearances: NDArray,
-    motions: NDArray, loaded: NDArray, offset: NDArray,
+    s: Structure, T: Matrices, mismatch: float, centre: Vector, clearances: Vector,
+    motions: Vector, loaded: Mask, offset: Vector,
 ) -> tuple[bool, Body]:  # fmt: skip
     """The set of platform screws of one point, and whether it was found.
 
@@ -213,7 +219,7 @@ def body_of(
             for l in range(len(Z)):
                 rows[l, at] = columns[i, l]
             start[at] = clearances[i]
-            _move_platform(s, P, follow, i, X[:, at])
+            _move_platform(s, P, follow, i, X, at)
             at += 1
         cones += 1
         starts[cones] = at
@@ -224,11 +230,11 @@ def body_of(
     return decided, Body(centre, X, B, start, starts)
 
 
-@kernel
+@part
 def _follow(
-    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
-    order: NDArray, rank: int, m: int,
-) -> tuple[bool, NDArray]:  # fmt: skip
+    s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
+    order: Indices, rank: int, m: int,
+) -> tuple[bool, Matrix]:  # fmt: skip
     """What the platform does, scaled (6, m), as free motions follow the closures.
 
     Returns:
@@ -251,10 +257,10 @@ def _follow(
     return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
 
 
-@kernel
+@part
 def _within_bounds(
-    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
-    order: NDArray, rank: int, clearances: NDArray, motions: NDArray, loaded: NDArray,
+    s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
+    order: Indices, rank: int, clearances: Vector, motions: Vector, loaded: Mask,
 ) -> bool:  # fmt: skip
     """Whether no play takes a passive joint past its bound; see ``linear/reach.py``."""
     nq, m = F.shape
@@ -289,24 +295,24 @@ def _within_bounds(
     return True
 
 
-@kernel
+@part
 def _move_platform(
-    s: Structure, P: NDArray, follow: NDArray, i: int, screw: NDArray
+    s: Structure, P: Matrices, follow: Matrix, i: int, X: Matrix, at: int
 ) -> None:
-    """(6,) [rad, m] what clearance i does to the platform, free motions following."""
+    """Column of X [rad, m]: what clearance i does to the platform, free motions too."""
     j = s.cone_frame[i]
     column, pattern = P[j, s.cone_axis[i]], s.patterns[s.pattern_of[j]]
     for a in range(6):
-        screw[a] = s.on_path[j] * column[a]
+        X[a, at] = s.on_path[j] * column[a]
         for k in range(len(pattern)):
             if pattern[k] != 0.0:
                 for b in range(6):
-                    screw[a] -= follow[a, 6 * k + b] * pattern[k] * column[b]
-        screw[a] *= s.cone_size[i] if a < 3 else s.cone_size[i] * s.size
+                    X[a, at] -= follow[a, 6 * k + b] * pattern[k] * column[b]
+        X[a, at] *= s.cone_size[i] if a < 3 else s.cone_size[i] * s.size
 
 
-@kernel
-def _shift(screws: NDArray, offset: NDArray) -> None:
+@part
+def _shift(screws: Matrix, offset: Vector) -> None:
     """Read screws, the columns, at another point of the platform."""
     for j in range(screws.shape[1]):
         for a in range(3):

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
 from assembly.solvers.interior import LANES
 from assembly.solvers.vectors import copy, divide, fill
@@ -58,26 +58,26 @@ class Structure(NamedTuple):
 
     size: float
     platform: int
-    on_path: NDArray
-    patterns: NDArray
-    pattern_of: NDArray
-    springs: NDArray
-    spring_frame: NDArray
-    spring_order: NDArray
-    groups: NDArray
-    group_pattern: NDArray
-    group_on_path: NDArray
-    cone_frame: NDArray
-    cone_axis: NDArray
-    cone_size: NDArray
-    starts: NDArray
-    free_frame: NDArray
-    free_axis: NDArray
-    free_bound: NDArray
+    on_path: Vector
+    patterns: Matrix
+    pattern_of: Indices
+    springs: Matrix
+    spring_frame: Indices
+    spring_order: Indices
+    groups: Indices
+    group_pattern: Indices
+    group_on_path: Vector
+    cone_frame: Indices
+    cone_axis: Indices
+    cone_size: Vector
+    starts: Indices
+    free_frame: Indices
+    free_axis: Indices
+    free_bound: Vector
 
 
-@kernel
-def paths_of(T: NDArray, s: Structure) -> NDArray:
+@part
+def paths_of(T: Matrices, s: Structure) -> Matrices:
     """Unit screws of every frame at the platform, see ``P``."""
     n = len(T)
     P = np.zeros((n, 6, 6))
@@ -95,8 +95,8 @@ def paths_of(T: NDArray, s: Structure) -> NDArray:
     return P
 
 
-@kernel
-def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
+@part
+def free_columns(s: Structure, P: Matrices, m: int) -> Matrix:
     """Closure columns of the free motions, as rows."""
     F = np.zeros((len(s.free_frame), m))
     for c in range(len(F)):
@@ -109,8 +109,8 @@ def free_columns(s: Structure, P: NDArray, m: int) -> NDArray:
     return F
 
 
-@kernel(fastmath={"contract", "reassoc"})
-def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
+@part(fastmath={"contract", "reassoc"})
+def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
     """Orthonormal rows orthogonal to all triangulated ones."""
     count = m - rank
     Zt = np.zeros((m, count + -count % LANES))
@@ -120,8 +120,8 @@ def orthogonal_rows(F: NDArray, turns: NDArray, rank: int, m: int) -> NDArray:
     return np.ascontiguousarray(Zt[:, :count].T)
 
 
-@kernel
-def grouped_springs(s: Structure, P: NDArray) -> NDArray:
+@part
+def grouped_springs(s: Structure, P: Matrices) -> Matrices:
     """Springs that act together, turned into six: the same sum of squares, no sum."""
     count = len(s.groups) - 1
     L = np.zeros((count, 6, 6))
@@ -146,8 +146,8 @@ def grouped_springs(s: Structure, P: NDArray) -> NDArray:
     return L
 
 
-@kernel
-def largest_spring(s: Structure, P: NDArray) -> float:
+@part
+def largest_spring(s: Structure, P: Matrices) -> float:
     """Largest entry of the springs' closure columns, for the noise floor."""
     largest = 0.0
     column = np.empty(6)
@@ -174,8 +174,8 @@ def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
                 part[a] += pattern[k] * Z[i, 6 * k + a]
 
 
-@kernel
-def spring_rows(s: Structure, Z: NDArray, L: NDArray) -> NDArray:
+@part
+def spring_rows(s: Structure, Z: Matrix, L: Matrices) -> Matrix:
     """Rows of Z times the closure columns of the grouped springs."""
     Y = np.zeros((len(Z), 6 * len(L)))
     part = np.empty(6)
@@ -188,9 +188,9 @@ def spring_rows(s: Structure, Z: NDArray, L: NDArray) -> NDArray:
     return Y
 
 
-@kernel
+@part
 def eliminate_springs(
-    Z: NDArray, Y: NDArray, diagonal: NDArray, order: NDArray, rank: int
+    Z: Matrix, Y: Matrix, diagonal: Vector, order: Indices, rank: int
 ) -> None:
     """Order Z like Y's triangle, and divide by it: the springs' answer first."""
     rows = Z.copy()
@@ -204,8 +204,8 @@ def eliminate_springs(
                 Z[i, a] /= diagonal[i]
 
 
-@kernel
-def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
+@part
+def misfit_of(s: Structure, P: Matrices, errors: Matrix) -> Vector:
     """(m,) what the errors leave open in the closures."""
     closures = s.patterns.shape[1]
     known = np.zeros(6 * closures)
@@ -223,9 +223,9 @@ def misfit_of(s: Structure, P: NDArray, errors: NDArray) -> NDArray:
     return known
 
 
-@kernel
+@part
 def rigid_rows(
-    s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray, errors: NDArray,
+    s: Structure, P: Matrices, Z: Matrix, rank: int, known: Vector, errors: Matrix,
     tolerance: float,
 ) -> bool:  # fmt: skip
     """Whether clearances or errors enter where no spring answers."""
@@ -272,10 +272,10 @@ def rigid_rows(
     return False
 
 
-@kernel(fastmath={"contract", "reassoc"})
+@part(fastmath={"contract", "reassoc"})
 def small_problem(
-    s: Structure, P: NDArray, Z: NDArray, rank: int, known: NDArray
-) -> tuple[NDArray, NDArray]:
+    s: Structure, P: Matrices, Z: Matrix, rank: int, known: Vector
+) -> tuple[Matrix, Vector]:
     """G, its columns as rows, and h: springs' answer to clearances and to errors."""
     nu = len(s.cone_frame)
     Gt, h = np.zeros((nu, rank)), np.zeros(rank)
@@ -299,11 +299,11 @@ def small_problem(
     return Gt, h
 
 
-@kernel
+@part
 def moved_by(
-    s: Structure, P: NDArray, L: NDArray, u: NDArray, spring: NDArray, known: NDArray,
-    screw: NDArray,
-) -> NDArray:  # fmt: skip
+    s: Structure, P: Matrices, L: Matrices, u: Vector, spring: Vector, known: Vector,
+    screw: Vector,
+) -> Vector:  # fmt: skip
     """(m,) what errors, clearances and springs leave open; their platform screw."""
     closures = s.patterns.shape[1]
     moved = known.copy()
@@ -327,10 +327,10 @@ def moved_by(
     return moved
 
 
-@kernel
+@part
 def least_motions(
-    F: NDArray, turns: NDArray, diagonal: NDArray, order: NDArray, rank: int,
-    moved: NDArray, motions: NDArray,
+    F: Matrix, turns: Vector, diagonal: Vector, order: Indices, rank: int,
+    moved: Vector, motions: Vector,
 ) -> None:  # fmt: skip
     """Free motions of least size that close what the rest leaves open."""
     nq = len(F)

@@ -21,9 +21,9 @@ from assembly.batch.compiled_reduction import (
     paths_of,
     small_problem,
 )
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import divide, inner
 
 SOLVED, HANDED_BACK = range(2)
@@ -34,13 +34,12 @@ _STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
 
 @kernel
 def all_margins(
-    solvers: ConeSolvers, s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     margin: NDArray, bound: NDArray, road: NDArray,
 ) -> None:  # fmt: skip
     """Margins of all points, with their lower bounds.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
         errors: (n, 6) [rad, m].
@@ -69,7 +68,7 @@ def all_margins(
         if not (decided and size > 0.0):
             continue
         turn_first(B, w, size)
-        u, pull = farthest(solvers, B, s.starts)
+        u, pull = farthest(B, s.starts)
         reach, most = inner(B[0], u), 0.0
         for c in range(len(s.starts) - 1):
             part = 0.0
@@ -95,8 +94,8 @@ def all_margins(
                 road[i] = SOLVED
 
 
-@kernel
-def largest_clearance(s: Structure, P: NDArray) -> float:
+@part
+def largest_clearance(s: Structure, P: Matrices) -> float:
     """Largest entry of the clearances' closure columns, for the noise floor."""
     largest = 0.0
     for c in range(len(s.cone_frame)):
@@ -111,10 +110,10 @@ def largest_clearance(s: Structure, P: NDArray) -> float:
     return largest
 
 
-@kernel
+@part
 def orthonormal_rows(
-    rows: NDArray, right: NDArray, largest: float
-) -> tuple[bool, NDArray, NDArray]:
+    rows: Matrix, right: Vector, largest: float
+) -> tuple[bool, Matrix, Vector]:
     """Write rows u = right as B u = w with orthonormal rows.
 
     Args:
@@ -146,8 +145,8 @@ def orthonormal_rows(
     return True, B, w
 
 
-@kernel
-def turn_first(B: NDArray, w: NDArray, size: float) -> None:
+@part
+def turn_first(B: Matrix, w: Vector, size: float) -> None:
     """Combine the rows of B so that the first is along w and the others across it."""
     v = divide(w, size)
     sign = 1.0 if v[0] <= 0.0 else -1.0
@@ -162,14 +161,12 @@ def turn_first(B: NDArray, w: NDArray, size: float) -> None:
         B[0, c] *= sign
 
 
-@kernel
-def farthest(
-    solvers: ConeSolvers, B: NDArray, starts: NDArray
-) -> tuple[NDArray, NDArray]:
+@part
+def farthest(B: Matrix, starts: Indices) -> tuple[Vector, Vector]:
     """Find u within the cones with the most B[0].u and no B[1:] u; the pull on each."""
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])
-    u, n, _ = solvers.interior_point(
+    u, n, _ = interior_point(
         np.zeros((0, nu)), np.zeros(0), B[0].copy(), rest, np.zeros(len(rest)), starts,
         _STOP, 0.0,
     )  # fmt: skip

@@ -10,13 +10,14 @@ class Draws:
     """Least energies of k draws at one posture, each with its certificate.
 
     Attributes:
-        energy: (k,) [J]; NaN where there is no answer.
+        energy: (k,) [J]; NaN where there is no solution.
         bound: (k,) [J] certified lower bound.
         clearances: (k, nu) in units of the cones.
         multipliers: (k, 6 closures) of the scaled closure rows.
         platform_screw: (k, 6) [rad, m] at the platform's origin, base axes.
-        slower: (k,) bool, solved by
-            :func:`assembly.batch.many_postures.minimise_energies`.
+        fallback: (k,) bool, solved by
+            :func:`assembly.batch.many_postures.minimise_energies`, or, under loads, by
+            :func:`assembly.linear.energy.solve_assembly`.
     """
 
     energy: NDArray
@@ -24,4 +25,4 @@ class Draws:
     clearances: NDArray
     multipliers: NDArray
     platform_screw: NDArray
-    slower: NDArray
+    fallback: NDArray

@@ -13,15 +13,16 @@ from scipy.linalg import svd
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.reduction import complement, reduce_problem
+from assembly.linear.thresholds import INFEASIBLE, RANK
 from assembly.linear.zone import zone_margin
-from assembly.model.clearance import clearance_bounds
+from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.solvers.conic import SolverFailed
 
-_RIGID, _CLEARLY_RIGID = 1e-13, 1e-10  # [rad, lengths] what of the errors nothing fits
+_CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
 
 
 @dataclass(frozen=True, eq=False)
-class Margins:
+class DrawMargins:
     """Zone margins of k draws at one posture.
 
     Attributes:
@@ -29,27 +30,27 @@ class Margins:
             none does, NaN where the solver failed.
         bound: (k,) certified lower bound.
         slopes: (k, n, 6) [1/rad, 1/m] how the margin grows with each error; NaN where
-            the slower road answered.
-        slower: (k,) bool, solved by :func:`assembly.linear.zone.zone_margin`.
+            the fallback solved.
+        fallback: (k,) bool, solved by :func:`assembly.linear.zone.zone_margin`.
     """
 
     margin: NDArray
     bound: NDArray
     slopes: NDArray
-    slower: NDArray
+    fallback: NDArray
 
 
 @dataclass(frozen=True, eq=False)
 class PostureMargins:
-    """A posture made ready for the margins of any errors, by :func:`prepare_margins`.
+    """A posture prepared for the margins of any errors, by :func:`prepare_margins`.
 
     Attributes:
         posture: where the robot stands; its own errors do not matter.
         joints: what may move.
         starts: (cones + 1,) first clearance of each cone, and nu.
         B: (p, nu) orthonormal rows that the clearances must satisfy.
-        K: (p, 6n) and what the errors ask of them: B u = K e.
-        unanswered: (.., 6n) what of the errors no clearance takes up.
+        K: (p, 6n) and their right side by the errors: B u = K e.
+        infeasible: (.., 6n) infeasible component of the errors.
         motions: (nq, nu + 6n) free motions of clearances and errors.
         ranges: (nq,) [rad or m] their bounds, which were left out.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
@@ -60,12 +61,12 @@ class PostureMargins:
     starts: NDArray
     B: NDArray
     K: NDArray
-    unanswered: NDArray
+    infeasible: NDArray
     motions: NDArray
     ranges: NDArray
-    compliant: str
+    compliant: Compliant
 
-    def solve(self, errors: ArrayLike) -> Margins:
+    def solve(self, errors: ArrayLike) -> DrawMargins:
         """Margins of k draws.
 
         Args:
@@ -78,7 +79,6 @@ class PostureMargins:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
         from assembly.batch.compiled_draws import least_margins
-        from assembly.solvers.cone_solvers import cone_solvers
 
         errors = np.asarray(errors, dtype=float)
         count, n = len(errors), len(self.posture.robot.frames)
@@ -88,23 +88,22 @@ class PostureMargins:
             )
         e = errors.reshape(count, 6 * n)
         margin, bound = np.zeros(count), np.zeros(count)
-        q, reach = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
+        q, unit = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
         if len(self.B):
-            least_margins(
-                cone_solvers(), self.B, self.starts, e @ self.K.T, margin, bound, q
-            )
-        missed = np.abs(e @ self.unanswered.T).max(axis=1, initial=0.0)
-        margin[missed > _CLEARLY_RIGID] = bound[missed > _CLEARLY_RIGID] = np.inf
+            least_margins(self.B, self.starts, e @ self.K.T, margin, bound, q)
+        infeasible = np.abs(e @ self.infeasible.T).max(axis=1, initial=0.0)
+        no_factor = infeasible > _CLEARLY_INFEASIBLE
+        margin[no_factor] = bound[no_factor] = np.inf
         most = np.concatenate(
-            [reach * np.nanmax(margin, initial=0.0, where=np.isfinite(margin)),
+            [unit * np.nanmax(margin, initial=0.0, where=np.isfinite(margin)),
              np.abs(e).max(axis=0, initial=0.0)]
         )  # fmt: skip
-        slower = np.isnan(margin)
-        slower |= (missed > _RIGID) & (missed <= _CLEARLY_RIGID)
+        fallback = np.isnan(margin)
+        fallback |= (infeasible > INFEASIBLE) & ~no_factor
         if (np.abs(self.motions) @ most > self.ranges).any():
-            slower[:] = True
+            fallback[:] = True
         slopes = (q @ self.K).reshape(count, n, 6)
-        for i in np.flatnonzero(slower).tolist():
+        for i in np.flatnonzero(fallback).tolist():
             robot = self.posture.robot.with_errors(errors[i])
             slopes[i] = margin[i] = bound[i] = np.nan
             try:
@@ -113,10 +112,10 @@ class PostureMargins:
                 continue
             margin[i] = np.inf if zone.margin is None else zone.margin
             bound[i] = np.inf if zone.bound is None else zone.bound
-        return Margins(margin, bound, slopes, slower)
+        return DrawMargins(margin, bound, slopes, fallback)
 
 
-def prepare_margins(posture: Posture, compliant: str = "free") -> PostureMargins:
+def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
     """Eliminate free motions at a posture, for the margins of any errors.
 
     Args:
@@ -133,18 +132,25 @@ def prepare_margins(posture: Posture, compliant: str = "free") -> PostureMargins
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot, compliant)
-    small = reduce_problem(lin, joints)
+    reduced = reduce_problem(lin, joints)
     # orthonormal rows, whatever the units of the closures
-    U, S, B = svd(small.H, full_matrices=False)
-    held = np.linalg.qr(small.rigid)[0] if small.rigid.shape[1] else small.rigid
-    over = small.basis @ complement(held, 1e-10)
+    U, S, B = svd(reduced.H, full_matrices=False)
+    rigid = reduced.rigid
+    held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
+    redundant = reduced.basis @ complement(held, RANK)
     A = lin.rows
-    back = np.linalg.pinv(A @ joints.free, rcond=1e-10)
+    inverse = np.linalg.pinv(A @ joints.free, rcond=RANK)
     screws = np.hstack([joints.cones, np.eye(A.shape[1])])
-    bounds = clearance_bounds(robot, compliant)[:, [0, 0, 1, 2, 2, 3]].ravel()
+    bounds = component_bounds(clearance_bounds(robot, compliant)).ravel()
     starts = np.searchsorted(joints.group, np.arange(joints.group.max(initial=-1) + 2))
     return PostureMargins(
-        posture, joints, starts.astype(np.int64), np.ascontiguousarray(B),
-        -(U.T / S[:, None]) @ small.rigid.T @ small.basis.T @ A, over.T @ A,
-        -back @ A @ screws, bounds[np.flatnonzero(joints.free.any(axis=1))], compliant,
-    )  # fmt: skip
+        posture=posture,
+        joints=joints,
+        starts=starts.astype(np.int64),
+        B=np.ascontiguousarray(B),
+        K=-(U.T / S[:, None]) @ rigid.T @ reduced.basis.T @ A,
+        infeasible=redundant.T @ A,
+        motions=-inverse @ A @ screws,
+        ranges=bounds[np.flatnonzero(joints.free.any(axis=1))],
+        compliant=compliant,
+    )

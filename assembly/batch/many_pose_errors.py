@@ -1,9 +1,9 @@
 """Bounds of the pose error, problem (27), at many postures or for many errors at once.
 
-Compiled from the answers of (22) to the brackets
+Compiled from the solutions of (22) to the brackets
 (:mod:`assembly.batch.compiled_reach`): some tenths of a millisecond a point.  A point
-that road does not cover is solved by :mod:`assembly.linear.pose_error`, and counted;
-reading ``budget`` always is.
+that this does not cover falls back to :mod:`assembly.linear.pose_error`, and is
+counted; reading ``budget`` always does.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.batch.many_postures import Energies, minimise_energies, structure_of
+from assembly.batch.many_postures import Energies, minimise_energies
+from assembly.batch.robot_structure import structure_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
@@ -35,16 +36,16 @@ class PoseErrors:
     """Certified bounds of the largest pose errors of k points.
 
     Attributes:
-        rotation_error: (k, 2) [rad] lower and upper; NaN without an answer of (22).
+        rotation_error: (k, 2) [rad] lower and upper; NaN without a solution of (22).
         translation_error: (k, 2) [m] likewise.
         rotation_screw: (k, 6) [rad, m] attains the lower bound of the rotation.
         translation_screw: (k, 6) [rad, m] attains that of the translation.
         supports: (k,) support functions computed.
-        slower: (k,) bool, solved by
+        fallback: (k,) bool, solved by
             :func:`assembly.linear.pose_error.bound_pose_error`.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
-            there is no answer or its certificate falls short.
-        reason: (k,) what was said where the status is not ok.
+            there is no solution or its certificate falls short.
+        reason: (k,) message where the status is not ok.
     """
 
     rotation_error: NDArray
@@ -52,7 +53,7 @@ class PoseErrors:
     rotation_screw: NDArray
     translation_screw: NDArray
     supports: NDArray
-    slower: NDArray
+    fallback: NDArray
     status: NDArray
     reason: NDArray
 
@@ -100,11 +101,11 @@ def bound_pose_errors(
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
         energies: of :func:`assembly.batch.many_postures.minimise_energies` for the same
-            arguments, if they are there already.
+            arguments, if known.
         energy_budget: eta of reading ``budget``.
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point asked about.
+        offset: (3,) [m] from the platform's origin to the point whose error is meant.
 
     Returns:
         The bounds, in the order given.
@@ -112,8 +113,7 @@ def bound_pose_errors(
     Raises:
         ValueError: the reading is unknown, or a shape does not fit the robot.
     """
-    from assembly.batch.compiled_reach import Bounds, bound_all
-    from assembly.solvers.cone_solvers import cone_solvers
+    from assembly.batch.compiled_reach import HANDED_BACK, SOLVED, Bounds, bound_all
 
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
@@ -129,93 +129,106 @@ def bound_pose_errors(
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
     tolerance = np.array([tolerance_rotation, tolerance_translation], dtype=float)
     bounds = Bounds(
-        np.full((count, 2), np.nan), np.full((count, 2), np.nan),
-        np.full((count, 6), np.nan), np.full((count, 6), np.nan),
-        np.zeros(count, np.int64), np.zeros(count, np.int64),
-    )  # fmt: skip
-    answered = energies.status == "ok"
-    known = answered & np.isfinite(energies.clearances).all(axis=1)
-    bounds.road[~known] = 1
+        rotation=np.full((count, 2), np.nan),
+        translation=np.full((count, 2), np.nan),
+        rotation_screw=np.full((count, 6), np.nan),
+        translation_screw=np.full((count, 6), np.nan),
+        supports=np.zeros(count, np.int64),
+        road=np.full(count, SOLVED, np.int64),
+    )
+    solved = energies.status == "ok"
+    bounds.road[~np.isfinite(energies.clearances).all(axis=1)] = HANDED_BACK
+    bounds.road[~solved] = HANDED_BACK
     if reading == "budget":
-        bounds.road[:] = 1
+        bounds.road[:] = HANDED_BACK
     else:
-        structure, column_of, loads = _loads(
+        structure, column_of, loads = _clearance_loads(
             robot, T, reading, errors, off, energies, bounds.road
         )
         bound_all(
-            cone_solvers(), structure, T, off, energies.platform_screw.copy(),
+            structure, T, off, energies.platform_screw.copy(),
             np.ascontiguousarray(energies.clearances[:, column_of]),
             _motions(robot, structure, energies), loads,
             np.asarray(offset, dtype=float).copy(), tolerance, bounds,
         )  # fmt: skip
-    found = PoseErrors(
-        *bounds[:5], (bounds.road == 1) & answered, energies.status.copy(),
-        energies.reason.copy(),
-    )  # fmt: skip
+    pose_errors = PoseErrors(
+        rotation_error=bounds.rotation,
+        translation_error=bounds.translation,
+        rotation_screw=bounds.rotation_screw,
+        translation_screw=bounds.translation_screw,
+        supports=bounds.supports,
+        fallback=(bounds.road == HANDED_BACK) & solved,
+        status=energies.status.copy(),
+        reason=energies.reason.copy(),
+    )
     options = {
         "energy_budget": energy_budget, "tolerance_rotation": tolerance_rotation,
         "tolerance_translation": tolerance_translation, "offset": offset,
     }  # fmt: skip
     own = robot.errors if errors is None else np.asarray(errors, dtype=float)
-    for i in np.flatnonzero(found.slower).tolist():
-        here = own if own.ndim == 2 else own[i]
-        same = np.array_equal(here, robot.errors)
-        placed = robot if same else robot.with_errors(here)
+    for i in np.flatnonzero(pose_errors.fallback).tolist():
+        of_point = own if own.ndim == 2 else own[i]
+        same = np.array_equal(of_point, robot.errors)
+        erring = robot if same else robot.with_errors(of_point)
         posture = Posture(
-            placed, np.full(len(robot.frames), np.nan), T[i], float(off[i])
+            erring, np.full(len(robot.frames), np.nan), T[i], float(off[i])
         )
-        _bound_slowly(posture, reading, options, found, i)
-    return found
+        _bound_fallback(posture, reading, options, pose_errors, i)
+    return pose_errors
 
 
-def _bound_slowly(
-    posture: Posture, reading: str, options: Mapping, found: PoseErrors, i: int
+def _bound_fallback(
+    posture: Posture, reading: str, options: Mapping, bounds: PoseErrors, i: int
 ) -> None:
-    """Row i of the bounds by the slower road."""
+    """Row i of the bounds by the fallback."""
     try:
         one = bound_pose_error(solve_assembly(posture), reading, **options)
     except CannotAssemble as error:
-        found.status[i], found.reason[i] = "cannot assemble", str(error)
+        bounds.status[i], bounds.reason[i] = "cannot assemble", str(error)
         return
     except SolverFailed as error:
-        found.status[i], found.reason[i] = "solver failed", str(error)
+        bounds.status[i], bounds.reason[i] = "solver failed", str(error)
         return
-    _store(one, found, i)
+    _store(one, bounds, i)
     if one.unproved:
-        found.status[i], found.reason[i] = "solver failed", one.unproved
+        bounds.status[i], bounds.reason[i] = "solver failed", one.unproved
 
 
-def _store(one: PoseError, found: PoseErrors, i: int) -> None:
-    """One answer as row i."""
-    found.rotation_error[i] = one.rotation_error
-    found.translation_error[i] = one.translation_error
-    found.rotation_screw[i] = one.rotation_screw
-    found.translation_screw[i] = one.translation_screw
-    found.supports[i] = one.cuts
+def _store(one: PoseError, bounds: PoseErrors, i: int) -> None:
+    """Bounds of one point as row i."""
+    bounds.rotation_error[i] = one.rotation_error
+    bounds.translation_error[i] = one.translation_error
+    bounds.rotation_screw[i] = one.rotation_screw
+    bounds.translation_screw[i] = one.translation_screw
+    bounds.supports[i] = one.cuts
 
 
-def _loads(
+def _clearance_loads(
     robot: Robot, T: NDArray, reading: str, errors: ArrayLike | None, off: NDArray,
-    energies: Energies, road: NDArray,
+    energies: Energies, outcome: NDArray,
 ) -> tuple["Structure", NDArray, "Loads"]:  # fmt: skip
-    """What may move, its clearances' places in (22), and what tells which are held."""
-    from assembly.batch.compiled_reach import Loads
+    """What may move, its clearances' columns in (22), and the loads on them."""
+    from assembly.batch.compiled_reach import HANDED_BACK, Loads
 
     _, moving = structure_of(robot, "free" if reading == "free" else "rigid")
-    held, holder = structure_of(robot)[1], energies
+    loaded, solution = structure_of(robot)[1], energies
     if reading == "free":
-        # turning about the own axis costs nothing here: only what stays loaded
-        # without those soft springs is held
-        held = structure_of(robot, "hinged")[1]
-        holder = minimise_energies(robot, T, errors, off, "hinged")
-        road[~np.isfinite(holder.clearances).all(axis=1)] = 1
+        # turning about the own axis costs nothing here: a clearance is held only if it
+        # stays loaded without those soft springs
+        loaded = structure_of(robot, "hinged")[1]
+        solution = minimise_energies(robot, T, errors, off, "hinged")
+        outcome[~np.isfinite(solution.clearances).all(axis=1)] = HANDED_BACK
     column_of = _places(_cones(moving), _cones(structure_of(robot)[1]))
-    places = _places(_cones(moving), _cones(held))
-    cone_of = np.searchsorted(held.starts, places, side="right") - 1
+    places = _places(_cones(moving), _cones(loaded))
+    cone_of = np.searchsorted(loaded.starts, places, side="right") - 1
     loads = Loads(
-        held, holder.multipliers, holder.clearances, holder.energy,
-        holder.energy_without_play, cone_of[moving.starts[:-1]].astype(np.int64),
-    )  # fmt: skip
+        structure=loaded,
+        multipliers=solution.multipliers,
+        clearances=solution.clearances,
+        energy=solution.energy,
+        without_play=solution.energy_without_clearance,
+        cone_of=cone_of[moving.starts[:-1]].astype(np.int64),
+    )
     return moving, column_of, loads
 
 
@@ -238,6 +251,6 @@ def _cones(structure: "Structure") -> Iterable[tuple[int, int]]:
 def _places(
     some: Iterable[tuple[int, int]], among: Iterable[tuple[int, int]]
 ) -> NDArray:
-    """Where each column of one reading is in another: the same frame and axis."""
+    """Columns in another reading of the same frames and axes."""
     place = {(int(j), int(axis)): i for i, (j, axis) in enumerate(among)}
     return np.array([place[int(j), int(axis)] for j, axis in some], dtype=np.int64)

@@ -1,7 +1,7 @@
 """Effects that a declared model may lack; each in a file of its own.
 
-Applied in the order of :data:`LIBRARY`: friction acts on a joint's spring, so drives
-become elastic first; the foundation adds a frame, so it comes last.
+They are applied in the order of :data:`LIBRARY`.  Friction acts on a joint's spring, so
+drive compliance comes before it; the foundation adds a frame, so it comes last.
 """
 
 from collections.abc import Mapping
@@ -46,11 +46,11 @@ LIBRARY: dict[str, Effect] = {
 }
 
 
-def apply_effects(here: Conditions, effects: Mapping[str, Values]) -> Conditions:
+def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Conditions:
     """Conditions with effects added.
 
     Args:
-        here: without them.
+        conditions: without them.
         effects: parameters by their public names, by effect.
 
     Returns:
@@ -64,5 +64,5 @@ def apply_effects(here: Conditions, effects: Mapping[str, Values]) -> Conditions
         raise KeyError(f"no effect {sorted(unknown)}; there are {sorted(LIBRARY)}")
     for name, effect in LIBRARY.items():
         if name in effects:
-            here = effect.apply(here, effects[name])
-    return here
+            conditions = effect.apply(conditions, effects[name])
+    return conditions

@@ -13,21 +13,25 @@ FOUNDATION = "foundation"
 _AXES = tuple(axis.lower() for axis in SCREW)
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
-    robot = with_foundation(here.robot, values)
-    still = np.broadcast_to(np.eye(4), (len(here), 1, 4, 4))
-    zero = np.zeros((len(here), 1, 6))
-    rest = None if here.rest is None else np.concatenate([zero, here.rest], axis=1)
+def _apply(conditions: Conditions, values: Values) -> Conditions:
+    robot = with_foundation(conditions.robot, values)
+    still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
+    zero = np.zeros((len(conditions), 1, 6))
+    rest = (
+        None
+        if conditions.rest is None
+        else np.concatenate([zero, conditions.rest], axis=1)
+    )
     return replace(
-        here, robot=robot, rest=rest,
-        coordinates=np.concatenate([zero[:, :, 0], here.coordinates], axis=1),
-        transforms=np.concatenate([still, here.transforms], axis=1),
-        errors=np.concatenate([zero, here.errors], axis=1),
+        conditions, robot=robot, rest=rest,
+        coordinates=np.concatenate([zero[:, :, 0], conditions.coordinates], axis=1),
+        transforms=np.concatenate([still, conditions.transforms], axis=1),
+        errors=np.concatenate([zero, conditions.errors], axis=1),
     )  # fmt: skip
 
 
 def with_foundation(robot: Robot, values: Values) -> Robot:
-    """A robot whose base stands on springs: one more frame, between it and the ground.
+    """A robot on an elastic foundation: one more frame between base and ground.
 
     Args:
         robot: any.
@@ -61,7 +65,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 BASE_COMPLIANCE = Effect(
     name="base_compliance",
-    summary="the foundation yields",
     apply=_apply,
     unit=_unit,
     frames=None,

@@ -1,4 +1,4 @@
-"""Contacts in a joint stiffen under load: load = coefficient |deflection|^exponent.
+"""Nonlinear contact in a joint: load = coefficient |deflection|^exponent.
 
 Sources:
     Johnson, Contact Mechanics, section 4.2 (Hertz: exponent 1.5 for spheres).
@@ -12,7 +12,7 @@ from assembly.measurement.conditions import Conditions, ContactLaw
 from assembly.model.robot import Robot
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     laws = tuple(
         ContactLaw(
             key.removesuffix(".coefficient"), coefficient,
@@ -21,19 +21,19 @@ def _apply(here: Conditions, values: Values) -> Conditions:
         for key, coefficient in values.items()
         if key.endswith(".coefficient")
     )  # fmt: skip
-    return replace(here, laws=here.laws + laws)
+    return replace(conditions, laws=conditions.laws + laws)
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
     """Coefficient from the deflection under a unit load, coefficient^(-1/exponent)."""
-    found: dict[str, float] = {}
-    for key, give in values.items():
+    parameters: dict[str, float] = {}
+    for key, deflection in values.items():
         name, _, kind = key.rpartition(".")
         exponent = values.get(f"{name}.exponent", 1.5)
-        if kind == "give" and give > RIGID:
-            found[f"{name}.coefficient"] = give**-exponent
-            found[f"{name}.exponent"] = exponent
-    return found
+        if kind == "give" and deflection > RIGID:
+            parameters[f"{name}.coefficient"] = deflection**-exponent
+            parameters[f"{name}.exponent"] = exponent
+    return parameters
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -45,7 +45,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 CONTACT_STIFFENING = Effect(
     name="contact_stiffening",
-    summary="joints yield less and less as the load grows",
     apply=_apply,
     unit=_unit,
     frames=drives,

@@ -14,10 +14,11 @@ _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)  # time constants, in durations of the campaign
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
-    part = 1.0 - np.exp(-here.time / values["time_constant"])
-    return replace(here, reading=here.reading + part[:, None] * amplitude)
+    settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
+    drift = settled[:, None] * amplitude
+    return replace(conditions, reading=conditions.reading + drift)
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -28,7 +29,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 DRIFT = Effect(
     name="drift",
-    summary="what is read drifts with time and settles",
     apply=_apply,
     unit=_unit,
     frames=None,

@@ -15,10 +15,10 @@ def _softer(frame: Frame, stiffness: float) -> Frame:
     return replace(frame, joint_stiffness=K)
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, stiffness in values.items():
-        here = with_frame(here, name, partial(_softer, stiffness=stiffness))
-    return here
+        conditions = with_frame(conditions, name, partial(_softer, stiffness=stiffness))
+    return conditions
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -33,7 +33,6 @@ def _public(robot: Robot, values: Values) -> dict[str, float]:
 
 DRIVE_COMPLIANCE = Effect(
     name="drive_compliance",
-    summary="actuated joints yield",
     apply=_apply,
     unit=_unit,
     frames=drives,

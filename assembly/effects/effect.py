@@ -1,4 +1,4 @@
-"""What an effect is: something a declared model lacks, as a change to conditions."""
+"""What an effect is: something a declared model lacks, a change to conditions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,21 +7,21 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-12  # [rad/(N m), m/N] a fitted compliance below it is none
+RIGID = 1e-12  # [rad/(N m), m/N] a fitted compliance below it counts as rigid
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number that a fit looks for, in a form in which the model is nearly linear.
+    """An unknown of the fit, in a form in which the model is nearly linear.
 
     Attributes:
         name: of a parameter, or of a part of one: below a frame's name where an effect
-            acts at frames (``""`` if the frame's name says it all).
+            acts at frames (``""`` if the frame's name suffices).
         scale: plausible size, in the unit of the parameter or of the part.
-        lower: bound below which it makes no sense.
-        upper: bound above which it makes no sense.
-        start: where the effect is none, and its first derivative is taken.
-        scan: values at which a search looks first, where the model is far from linear.
+        lower: physical lower bound.
+        upper: physical upper bound.
+        start: value without the effect, at which its first derivative is taken.
+        scan: start values of the search, where the model is far from linear.
         scan_by: a covariate whose range multiplies ``scan``, if any.
     """
 
@@ -45,23 +45,21 @@ class Effect:
 
     Attributes:
         name: as in the public format.
-        summary: one line for people.
-        apply: conditions with the effect, from those without and the parameters by
-            their public names (``<frame>``, ``<frame>.<component>`` or plain).
-        unit: of a parameter: of the robot and the parameter's public name.
+        apply: from conditions without the effect and parameters by their public names
+            (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
+        unit: of a parameter, from the robot and the parameter's public name.
         frames: frames of a robot at which it can act; None if it acts at none.
         components: public parameters below a frame's name (``""``: the name itself), or
             in all.
-        unknowns: what is to be fitted: at each frame, or in all.
-        public: parameters by their public names, from unknowns by theirs (a frame's
-            name, a dot, the unknown's name).
-        needs: covariates without which it cannot be told or applied.
+        unknowns: of the fit: at each frame, or in all.
+        public: from unknowns by name (a frame's name, a dot, the unknown's name) to
+            parameters by their public names.
+        needs: covariates without which it can be neither applied nor identified.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
     """
 
     name: str
-    summary: str
     apply: Callable[[Conditions, Values], Conditions]
     unit: Callable[[Robot, str], str]
     frames: Callable[[Robot], tuple[str, ...]] | None

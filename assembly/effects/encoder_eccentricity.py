@@ -1,4 +1,4 @@
-"""Actual coordinate = command + amplitude sin(command + phase), once a turn."""
+"""Encoder eccentricity: actual = command + amplitude sin(command + phase)."""
 
 import math
 
@@ -11,32 +11,33 @@ from assembly.model.links import own_screw
 from assembly.model.robot import Robot
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for key, amplitude in values.items():
         name, _, kind = key.rpartition(".")
         if kind != "amplitude":
             continue
-        row = here.robot.index(name)
-        q = here.coordinates[:, row] + values.get(f"{name}.phase", 0.0)
-        off = amplitude * np.sin(q)
-        here = with_screws(here, name, off[:, None] * own_screw(here.robot.frames[row]))
-    return here
+        row = conditions.robot.index(name)
+        q = conditions.coordinates[:, row] + values.get(f"{name}.phase", 0.0)
+        offset = amplitude * np.sin(q)
+        conditions = with_screws(
+            conditions, name, offset[:, None] * own_screw(conditions.robot.frames[row])
+        )
+    return conditions
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
     """Amplitude and phase from the parts in sin and cos of the command."""
-    found: dict[str, float] = {}
+    parameters: dict[str, float] = {}
     for name in {key.rpartition(".")[0]: None for key in values}:
         sine = values.get(f"{name}.sine", 0.0)
         cosine = values.get(f"{name}.cosine", 0.0)
-        found[f"{name}.amplitude"] = math.hypot(sine, cosine)
-        found[f"{name}.phase"] = math.atan2(cosine, sine)
-    return found
+        parameters[f"{name}.amplitude"] = math.hypot(sine, cosine)
+        parameters[f"{name}.phase"] = math.atan2(cosine, sine)
+    return parameters
 
 
 ENCODER_ECCENTRICITY = Effect(
     name="encoder_eccentricity",
-    summary="drives stand off their command once a turn",
     apply=_apply,
     unit=lambda robot, name: "rad",
     frames=turning_drives,

@@ -6,15 +6,16 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.links import own_screw
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, offset in values.items():
-        here = with_screws(here, name, offset * own_screw(here.robot.frame(name)))
-    return here
+        conditions = with_screws(
+            conditions, name, offset * own_screw(conditions.robot.frame(name))
+        )
+    return conditions
 
 
 ENCODER_OFFSET = Effect(
     name="encoder_offset",
-    summary="drives stand off their command by a constant",
     apply=_apply,
     unit=own_unit,
     frames=drives,

@@ -1,4 +1,4 @@
-"""Friction holds an elastic joint back: torque -tau x direction of approach."""
+"""Coulomb friction at an elastic joint: torque -tau x direction of approach."""
 
 from assembly.effects.effect import Effect, Unknown, Values
 from assembly.effects.places import own_unit, with_screws
@@ -8,28 +8,30 @@ from assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Joints that move with a spring along their own z: elastic drives, compliant."""
+    """Joints with a spring along their own z: elastic drives and compliant joints."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name
         for f in robot.frames
-        if f.joint != "fixed" and (_springy(f) or f.name in softened)
+        if f.joint != "fixed" and (_has_own_spring(f) or f.name in softened)
     )
 
 
-def _springy(frame: Frame) -> bool:
+def _has_own_spring(frame: Frame) -> bool:
     own = frame.own_stiffness
     return own is not None and 0.0 < own < float("inf")
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
-    C = joint_compliances(here.robot)
+def _apply(conditions: Conditions, values: Values) -> Conditions:
+    C = joint_compliances(conditions.robot)
     for name, tau in values.items():
-        row = here.robot.index(name)
-        # a torque inside the joint moves it by what its spring gives, free of stress
-        give = C[row] @ own_screw(here.robot.frames[row])
-        here = with_screws(here, name, -tau * here.approach[:, None] * give)
-    return here
+        row = conditions.robot.index(name)
+        # a torque inside the joint moves it by compliance x torque, stress-free
+        deflection = C[row] @ own_screw(conditions.robot.frames[row])
+        conditions = with_screws(
+            conditions, name, -tau * conditions.approach[:, None] * deflection
+        )
+    return conditions
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -38,7 +40,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 FRICTION_HYSTERESIS = Effect(
     name="friction_hysteresis",
-    summary="elastic joints stop short of where they were going",
     apply=_apply,
     unit=_unit,
     frames=elastic_joints,

@@ -1,4 +1,4 @@
-"""Preload and finite rotation change the stiffness: the exact model, not the linear."""
+"""Preload and finite rotations change the stiffness: the exact model is used."""
 
 from dataclasses import replace
 
@@ -6,8 +6,7 @@ from assembly.effects.effect import Effect
 
 GEOMETRIC_STIFFENING = Effect(
     name="geometric_stiffening",
-    summary="motions are finite: the exact model instead of the linear one",
-    apply=lambda here, values: replace(here, exact=True),
+    apply=lambda conditions, values: replace(conditions, exact=True),
     unit=lambda robot, name: "1",
     frames=None,
     components=(),

@@ -1,4 +1,4 @@
-"""Play at joints declared tight, taken up by the load."""
+"""Clearances at joints declared tight, taken up by the load."""
 
 from dataclasses import replace
 from functools import partial
@@ -9,37 +9,41 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
-_TIGHT = 1e-9  # [m, rad] play below it is none
+_NONE_BELOW = 1e-9  # [m, rad] a clearance below it is none
 
 
 def moving_joints(robot: Robot) -> tuple[str, ...]:
     """Joints that move and are declared tight."""
     return tuple(
-        f.name for f in robot.frames if f.joint != "fixed" and _tight(f.clearance)
+        f.name for f in robot.frames if f.joint != "fixed" and _is_tight(f.clearance)
     )
 
 
-def _tight(play: Clearance | None) -> bool:
-    return play is None or not any(getattr(play, kind) for kind in _KINDS)
+def _is_tight(clearance: Clearance | None) -> bool:
+    return clearance is None or not any(getattr(clearance, kind) for kind in _KINDS)
 
 
-def _with_play(frame: Frame, bound: dict[str, float]) -> Frame:
-    play = frame.clearance or Clearance()
-    more = {kind: (getattr(play, kind) or 0.0) + size for kind, size in bound.items()}
-    return replace(frame, clearance=replace(play, **more))
+def _with_clearance(frame: Frame, bound: dict[str, float]) -> Frame:
+    clearance = frame.clearance or Clearance()
+    more = {
+        kind: (getattr(clearance, kind) or 0.0) + size for kind, size in bound.items()
+    }
+    return replace(frame, clearance=replace(clearance, **more))
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for key, size in values.items():
         name, _, kind = key.rpartition(".")
         if size > 0:
-            here = with_frame(here, name, partial(_with_play, bound={kind: size}))
-    return here
+            conditions = with_frame(
+                conditions, name, partial(_with_clearance, bound={kind: size})
+            )
+    return conditions
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """The play; a joint found tight has none."""
-    return {key: size for key, size in values.items() if size > _TIGHT}
+    """The clearances; a joint fitted tight has none."""
+    return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -48,7 +52,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 JOINT_CLEARANCE = Effect(
     name="joint_clearance",
-    summary="joints declared tight have play",
     apply=_apply,
     unit=_unit,
     frames=moving_joints,

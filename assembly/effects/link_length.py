@@ -5,15 +5,16 @@ from assembly.effects.places import beams, lengthening, with_screws
 from assembly.measurement.conditions import Conditions
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, longer in values.items():
-        here = with_screws(here, name, longer * lengthening(here.robot.frame(name)))
-    return here
+        conditions = with_screws(
+            conditions, name, longer * lengthening(conditions.robot.frame(name))
+        )
+    return conditions
 
 
 LINK_LENGTH = Effect(
     name="link_length",
-    summary="bodies are longer than declared",
     apply=_apply,
     unit=lambda robot, name: "m",
     frames=beams,

@@ -12,9 +12,11 @@ from stiffness.screws import WRENCH
 _OFFSET = tuple(f"offset.{axis.lower()}" for axis in WRENCH)
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     offset = np.array([values.get(name, 0.0) for name in _OFFSET])
-    return replace(here, load=values.get("factor", 1.0) * here.load + offset)
+    return replace(
+        conditions, load=values.get("factor", 1.0) * conditions.load + offset
+    )
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -25,7 +27,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 LOAD_GAIN = Effect(
     name="load_gain",
-    summary="the load applied is not the load recorded",
     apply=_apply,
     unit=_unit,
     frames=None,

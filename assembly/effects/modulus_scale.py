@@ -10,7 +10,7 @@ from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Frames whose body is elastic and carries its own numbers."""
+    """Frames whose body is elastic with constants of its own, not of a library."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 
@@ -23,21 +23,20 @@ def _scaled(frame: Frame, factor: float) -> Frame:
     return replace(frame, link=MatrixLink(link.stiffness * factor))
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, factor in values.items():
-        here = with_frame(here, name, partial(_scaled, factor=factor))
-    return here
+        conditions = with_frame(conditions, name, partial(_scaled, factor=factor))
+    return conditions
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Factors on the modulus from relative softness, 1 / factor - 1."""
+    """Factors on the modulus from relative compliance changes, 1 / factor - 1."""
     ends = len(".softer")
     return {name[:-ends]: 1 / (1 + s) for name, s in values.items()}
 
 
 MODULUS_SCALE = Effect(
     name="modulus_scale",
-    summary="links are softer or stiffer than declared",
     apply=_apply,
     unit=lambda robot, name: "1",
     frames=links,

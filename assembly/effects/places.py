@@ -1,4 +1,4 @@
-"""Where effects act: drives, springs and beams of a robot, and changes made there."""
+"""Frames where effects act: drives and beams of a robot, and changes made to them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,30 +25,30 @@ def beams(robot: Robot) -> tuple[str, ...]:
     return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
 
 
-def with_screws(here: Conditions, frame: str, screws: NDArray) -> Conditions:
+def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
     """Conditions with more stress-free screws at a frame.
 
     Args:
-        here: conditions of R rows.
+        conditions: conditions of R rows.
         frame: where.
         screws: (R, 6) or (6,) [rad, m] in the frame's axes.
 
     Returns:
         The conditions changed.
     """
-    errors = here.errors.copy()
-    errors[:, here.robot.index(frame)] += screws
-    return replace(here, errors=errors)
+    errors = conditions.errors.copy()
+    errors[:, conditions.robot.index(frame)] += screws
+    return replace(conditions, errors=errors)
 
 
 def with_frame(
-    here: Conditions, frame: str, change: Callable[[Frame], Frame]
+    conditions: Conditions, frame: str, change: Callable[[Frame], Frame]
 ) -> Conditions:
     """Conditions of a robot with one frame changed."""
-    row = here.robot.index(frame)
-    frames = list(here.robot.frames)
+    row = conditions.robot.index(frame)
+    frames = list(conditions.robot.frames)
     frames[row] = change(frames[row])
-    return replace(here, robot=replace(here.robot, frames=tuple(frames)))
+    return replace(conditions, robot=replace(conditions.robot, frames=tuple(frames)))
 
 
 def lengthening(frame: Frame) -> NDArray:
@@ -57,6 +57,6 @@ def lengthening(frame: Frame) -> NDArray:
 
 
 def own_unit(robot: Robot, parameter: str) -> str:
-    """``rad`` or ``m``, as the joint moves whose name begins a parameter's."""
+    """``rad`` or ``m``: unit of the motion of the joint that a parameter names."""
     frame = next(f for f in robot.frames if f.name == parameter)
     return "m" if frame.joint == "prismatic" else "rad"

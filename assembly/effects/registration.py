@@ -13,13 +13,13 @@ BASE = tuple(f"base.{axis.lower()}" for axis in SCREW)
 TOOL = ("tool.tx", "tool.ty", "tool.tz")
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     b = np.array([values.get(name, 0.0) for name in BASE])
     R = rotation_matrix(b[:3])
-    turn = rotation_vector(R @ rotation_matrix(here.base[:3]))
-    shift = R @ here.base[3:] + b[3:]
-    tool = here.tool + [values.get(name, 0.0) for name in TOOL]
-    return replace(here, base=np.concatenate([turn, shift]), tool=tool)
+    turn = rotation_vector(R @ rotation_matrix(conditions.base[:3]))
+    shift = R @ conditions.base[3:] + b[3:]
+    tool = conditions.tool + [values.get(name, 0.0) for name in TOOL]
+    return replace(conditions, base=np.concatenate([turn, shift]), tool=tool)
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -28,7 +28,6 @@ def _unit(robot: Robot, name: str) -> str:
 
 REGISTRATION = Effect(
     name="registration",
-    summary="the measuring frame, or the measured point, is not where it was thought",
     apply=_apply,
     unit=_unit,
     frames=None,

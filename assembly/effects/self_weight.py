@@ -1,4 +1,4 @@
-"""Links and bodies have weight: gravity acts, which the model does not declare."""
+"""Weight of links and bodies: gravity that the model does not declare."""
 
 from dataclasses import replace
 
@@ -10,14 +10,13 @@ from assembly.measurement.conditions import Conditions
 _AXES = ("g.x", "g.y", "g.z")
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     g = np.array([values.get(axis, 0.0) for axis in _AXES])
-    return replace(here, gravity=here.gravity + g)
+    return replace(conditions, gravity=conditions.gravity + g)
 
 
 SELF_WEIGHT = Effect(
     name="self_weight",
-    summary="links (density) and bodies (mass) sag under their weight",
     apply=_apply,
     unit=lambda robot, name: "m/s^2",
     frames=None,

@@ -6,17 +6,16 @@ from assembly.measurement.conditions import Conditions
 from assembly.model.robot import beam_axis
 
 
-def _apply(here: Conditions, values: Values) -> Conditions:
+def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, coefficient in values.items():
-        frame = here.robot.frame(name)
-        longer = coefficient * beam_axis(frame)[0] * here.temperature
-        here = with_screws(here, name, longer[:, None] * lengthening(frame))
-    return here
+        frame = conditions.robot.frame(name)
+        longer = coefficient * beam_axis(frame)[0] * conditions.temperature
+        conditions = with_screws(conditions, name, longer[:, None] * lengthening(frame))
+    return conditions
 
 
 THERMAL_EXPANSION = Effect(
     name="thermal_expansion",
-    summary="bodies lengthen with temperature",
     apply=_apply,
     unit=lambda robot, name: "1/K",
     frames=beams,

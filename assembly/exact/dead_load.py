@@ -1,10 +1,10 @@
 r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
 
-A dead load's work is linear in where its body stands, <G, T - T_nominal>, T the first
-three rows of the body's transform.  Then a force f at the point a of the body, in its
-axes, is f [a, 1]^T; a couple m is two opposite forces, [m]x R_nominal / 2, whose work
-is m . (axis sin angle); a beam's weight W acts at the middle of the cubic that its two
-ends clamp, (p1 + p2) / 2 + (t1 - t2) / 12 with t the end tangents times the length.
+A dead load's work is linear in the pose of its body, <G, T - T_nominal>, with T the
+first three rows of the body's transform.  Then a force f at the point a of the body, in
+its axes, is f [a, 1]^T; a couple m is two opposite forces, [m]x R_nominal / 2, whose
+work is m . (axis sin angle); a beam's weight W acts at the middle of the cubic that its
+two ends clamp, (p1 + p2) / 2 + (t1 - t2) / 12 with t the end tangents times the length.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.placement import LINK, Placement, carried_nominally
+from assembly.exact.finite_robot import LINK, nominally_carried
+from assembly.exact.placement import Placement
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import BeamLink, beam_axis
 from stiffness.beam.sections import declared_section
@@ -72,25 +73,25 @@ def dead_loads(
     """
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    own, carried = np.zeros((2, count, 3, 4))
+    on_bodies, carried = np.zeros((2, count, 3, 4))
     if np.any(point):
         platform = posture.robot.index(posture.robot.platform)
-        own[platform] = np.outer(wrench[3:], [*np.asarray(point), 1.0])
+        on_bodies[platform] = np.outer(wrench[3:], [*np.asarray(point), 1.0])
         wrench[3:] = 0.0
     if bodies is not None:
         given = np.asarray(bodies, dtype=float)
-        own[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
-        own[:, :, 3] = given[:, 3:]
+        on_bodies[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
+        on_bodies[:, :, 3] = given[:, 3:]
     if gravity is not None:
         g = np.asarray(gravity, dtype=float)
-        _add_weights(posture, posture.robot.errors, g, own, carried)
-    return DeadLoads(wrench, own, carried)
+        _add_weights(posture, posture.robot.errors, g, on_bodies, carried)
+    return DeadLoads(wrench, on_bodies, carried)
 
 
-def row_loads(
+def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """The same in many situations at once.
+    """The same under many conditions at once.
 
     Args:
         postures: R of them, in one.
@@ -103,36 +104,36 @@ def row_loads(
         Loads whose arrays have R rows.
     """
     robot = postures.robot
-    own, carried = np.zeros((2, *errors.shape[:2], 3, 4))
+    on_bodies, carried = np.zeros((2, *errors.shape[:2], 3, 4))
     wrench = load.copy()
     if point.any():
-        here = np.array([*point, 1.0])
-        own[:, robot.index(robot.platform)] = wrench[:, 3:, None] * here
+        at_point = np.array([*point, 1.0])
+        on_bodies[:, robot.index(robot.platform)] = wrench[:, 3:, None] * at_point
         wrench[:, 3:] = 0.0
     if gravity.any():
-        _add_weights(postures, errors, gravity, own, carried)
-    return DeadLoads(wrench, own, carried)
+        _add_weights(postures, errors, gravity, on_bodies, carried)
+    return DeadLoads(wrench, on_bodies, carried)
 
 
 def _add_weights(
-    posture: Posture, errors: NDArray, g: NDArray, own: NDArray, carried: NDArray
+    posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
 ) -> None:
-    """Weight of links with a density and of bodies with a mass; rows in front."""
-    robot, nominal = posture.robot, carried_nominally(posture)
+    """Add the weights of links with a density and of bodies with a mass."""
+    robot, nominal = posture.robot, nominally_carried(posture)
     for i, frame in enumerate(robot.frames):
         place = np.array([*frame.centre_of_mass, 1.0])
-        own[..., i, :, :] += frame.mass * g[..., None] * place
+        on_bodies[..., i, :, :] += frame.mass * g[..., None] * place
         link = frame.link
         if not isinstance(link, BeamLink) or link.density is None:
             continue
         length, axis = beam_axis(frame)
         section = declared_section(link.section, link.poisson)
         W = link.density * section.area * length * g[..., None]
-        own[..., i, :, :] += W * np.array([*(-length * axis / 12), 0.5])
+        on_bodies[..., i, :, :] += W * np.array([*(-length * axis / 12), 0.5])
         parent = robot.parents[i]
         if parent >= 0:  # else the base carries it
-            # the beam's start and tangent, seen from what the parent carries: a
-            # straight beam up to the erring tip, whose stiffness is K_E there
+            # the beam's start and tangent, seen from the parent's frame after its
+            # joint: a straight beam up to the tip with its geometric error
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -152,20 +153,20 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
     if loads.beyond_platform:
         posture = place.model.posture
         for G, T, nominal in (
-            (loads.bodies, place.bodies, posture.transforms),
-            (loads.carried, place.carried, carried_nominally(posture)),
+            (loads.bodies, place.body_ends, posture.transforms),
+            (loads.carried, place.carried, nominally_carried(posture)),
         ):
             work += float(np.sum(G * (T - nominal)[:, :3]))
     return work
 
 
-def slopes_of(place: Placement, loads: DeadLoads) -> NDArray:
+def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
     """(N,) [J] derivative of the work by each unknown."""
-    slopes = place.platform_rows.T @ loads.load
+    gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
-        wrenches, _ = _on_what_follows(place, loads)
-        slopes = slopes + np.sum(place.moves.T * wrenches, axis=1)
-    return slopes
+        wrenches, _ = _on_unknowns(place, loads)
+        gradient = gradient + np.sum(place.moves.T * wrenches, axis=1)
+    return gradient
 
 
 def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> NDArray:
@@ -183,23 +184,23 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
     H = place.curvature(multipliers, loads.load)
     if not loads.beyond_platform:
         return H
-    wrenches, M = _on_what_follows(place, loads)
+    wrenches, M = _on_unknowns(place, loads)
     turn, shift = place.moves[:3].T, place.moves[3:].T
     # exp(A) exp(B) moves a point x, to second order in both, by a x (b x x + v_b)
     spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     later = np.einsum("nij,nj->ni", M - spread, turn)
     later -= np.cross(wrenches[:, 3:], shift)
     pairs = (turn @ later.T) * place.model.comes_before
-    return H + pairs + pairs.T + place.bent(wrenches)
+    return H + pairs + pairs.T + place.exponential_curvature(wrenches)
 
 
-def size_of_pull(place: Placement, loads: DeadLoads) -> NDArray:
-    """(N,) [J] how strongly the loads act on each unknown, cancellation left out."""
-    pull = np.abs(place.platform_rows).T @ np.abs(loads.load)
+def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
+    """(N,) [J] generalised loads on the unknowns, summed without cancellation."""
+    sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
-        wrenches, _ = _on_what_follows(place, loads)
-        pull = pull + np.sum(np.abs(place.moves.T * wrenches), axis=1)
-    return pull
+        wrenches, _ = _on_unknowns(place, loads)
+        sizes = sizes + np.sum(np.abs(place.moves.T * wrenches), axis=1)
+    return sizes
 
 
 def largest_wrench(place: Placement, loads: DeadLoads) -> float:
@@ -207,7 +208,7 @@ def largest_wrench(place: Placement, loads: DeadLoads) -> float:
     scale = place.model.scale
     largest = float(np.abs(loads.load / scale).max())
     if loads.beyond_platform:
-        wrenches, _ = _on_what_follows(place, loads)
+        wrenches, _ = _on_unknowns(place, loads)
         largest = max(largest, float(np.abs(wrenches / scale).max(initial=0.0)))
     return largest
 
@@ -228,13 +229,13 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
     if loads.load.any():
         # the platform's load acts on its body
         last = robot.index(robot.platform)
-        held = robot.on_path[last][:, None] * place.load_wrench(loads.load)
-        body, joint = body + held, joint + held
-        joint[last] -= held[last]
+        on_path = robot.on_path[last][:, None] * place.load_wrench(loads.load)
+        body, joint = body + on_path, joint + on_path
+        joint[last] -= on_path[last]
     return body, joint
 
 
-def _on_what_follows(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
+def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
     """(N, 6) wrench of the dead loads on all that each unknown moves, and its M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
@@ -249,19 +250,19 @@ def _on_frames(
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Wrenches of dead loads on all that bodies and joints hold, and their M's."""
     posture = place.model.posture
-    return resultants(posture, loads, place.bodies, place.carried)
+    return resultants(posture, loads, place.body_ends, place.carried)
 
 
 def resultants(
-    posture: Posture, loads: DeadLoads, bodies: NDArray, carried: NDArray
+    posture: Posture, loads: DeadLoads, body_ends: NDArray, carried: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Dead loads summed over what each frame holds, at the platform's nominal origin.
 
     Args:
         posture: nominal; all arrays may have rows in front, as its own.
         loads: on the robot.
-        bodies: (..., n, 4, 4) ends of the bodies, seen from the base.
-        carried: (..., n, 4, 4) what the joints carry.
+        body_ends: (..., n, 4, 4) seen from the base.
+        carried: (..., n, 4, 4) frames after their joint's coordinate.
 
     Returns:
         (..., n, 6) [N m, N] wrenches on what bodies hold and on what joints hold, base
@@ -271,7 +272,7 @@ def resultants(
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
     own, after = (
         np.concatenate(_read(G, T, origin), axis=-1)
-        for G, T in ((loads.bodies, bodies), (loads.carried, carried))
+        for G, T in ((loads.bodies, body_ends), (loads.carried, carried))
     )
     joint = below @ (own + after) + after
     body = joint + own

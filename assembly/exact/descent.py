@@ -1,25 +1,25 @@
-r"""One step towards the exact equilibrium: expand, solve, draw back, accept or damp.
+r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
 
 Near a placement x the closures are linearised and the Lagrangian
 
     L = |y|^2 / 2 - W(x) - lambda . r(x)
 
 is expanded to second order, with its true Hessian: the closures' curvature times the
-wrenches they carry outweighs soft springs, which is where Gauss-Newton stalls.  Springs
-and free motions are eliminated, the clearances' problem goes to
-:mod:`assembly.exact.contact_qp`, the step is drawn back onto the closures, and it is
-accepted if it lowers energy plus a penalty on what is still open.  Otherwise a proximal
-term damps it, as Levenberg and Marquardt do, measured in radians and reference lengths
-of every screw.
+wrenches they carry outweighs soft springs; without it Gauss-Newton stalls.  Springs and
+free motions are eliminated, :mod:`assembly.exact.contact_qp` solves the problem in the
+clearances, a restoration (retraction) brings the step back onto the closures, and it is
+accepted if it lowers energy plus a penalty on the residual.  Otherwise a proximal term
+damps it, as Levenberg and Marquardt do, measured in radians and reference lengths of
+every screw.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
 ======  =============  =============  ===============================================
-A r     ``rows`` ..    (6 K, N)       closures' derivative and misfit, scaled
+A r     ``rows`` ..    (6 K, N)       closures' derivative and residual, scaled
 lambda  multipliers    (6 K,)         wrenches of the closures, scaled
 H g     ``hessian`` .. (N, N), (N,)   second derivative of L, gradient of the energy
-B       ``basis``      (N, nu + nv)   clearances and what makes room for them, and
-                                      motions that leave every closure alone
+B       ``basis``      (N, nu + nv)   clearances and what closes after them, and
+                                      motions that change no closure
 ======  =============  =============  ===============================================
 
 Sources:
@@ -33,26 +33,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh, svd
 
-from assembly.exact.contact_qp import PlayProblem, across_rims, move_play, rim_forces
+from assembly.exact.contact_qp import (
+    ClearanceProblem,
+    boundary_normals,
+    clearance_step,
+    cone_multipliers,
+)
 from assembly.exact.dead_load import (
     DeadLoads,
     curvature_of,
     largest_wrench,
-    size_of_pull,
-    slopes_of,
+    load_magnitudes,
+    work_gradient,
     work_of,
 )
-from assembly.exact.placement import Placement
+from assembly.exact.placement import Placement, place
+from assembly.linear.thresholds import ROWS_RANK, rank_tolerance
 from assembly.solvers.conic import SolverFailed, cone_sizes, into_cones
 
-CLOSED = 1e-12  # [rad, reference lengths] what an answer may leave open
-LONGEST = 1.0  # [rad, reference lengths] of a step
-_MISFIT = 1e-9  # [rad, reference lengths] whose forces count as none
-_RANK = 1e-10  # relative size below which a singular value counts as zero
-_LEAST_DAMPING = 1e-9  # of the largest closure wrench: holds what nothing else holds
-_DAMPING = 1e-8  # the same, where damping starts once it is needed
+CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
+LONGEST_STEP = 1.0  # [rad, reference lengths]
+_SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] whose wrenches count as small
+_LEAST_DAMPING = 1e-9  # of the largest closure wrench: resists what nothing else does
+_FIRST_DAMPING = 1e-8  # of the same, where more is needed
 _ATTEMPTS = 40  # at a step, each damped eight times as much
-_DRAWN_BACK = 4  # corrections of a step onto the closures
+_RESTORATIONS = 4  # corrections of a step back onto the closures
 
 
 class NotConverged(SolverFailed):
@@ -60,7 +65,7 @@ class NotConverged(SolverFailed):
 
     Attributes:
         problem: which one.
-        status: how far it came.
+        status: how far it is from equilibrium.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -70,28 +75,28 @@ class NotConverged(SolverFailed):
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The problem near a placement.
+    """The problem expanded at a placement.
 
     Attributes:
-        here: the placement.
+        placement: where it is expanded.
         loads: on the robot.
         gradient: (N,) [J] of energy minus work.
         hessian: (N, N) [J] of the Lagrangian.
         multipliers: (6 K,) of the closures.
-        loose: (N,) bool, unknowns without cones.
-        inverse: (nw, 6 K) how these close what is open, at least size.
+        unbounded: (N,) bool, unknowns without cones.
+        inverse: (nw, 6 K) pseudoinverse of their closure columns.
         basis: (N, nu + nv), see the head of this module.
-        rigid_rows: (p, nu) closures that only clearances reach.
+        rigid_rows: (p, nu) closures that only clearances enter.
         rigid_right: (p,) their right side.
-        rigid_basis: (6 K, p) how they are combined of the closures' rows.
+        rigid_basis: (6 K, p) their combination of the closures' rows.
     """
 
-    here: Placement
+    placement: Placement
     loads: DeadLoads
     gradient: NDArray
     hessian: NDArray
     multipliers: NDArray
-    loose: NDArray
+    unbounded: NDArray
     inverse: NDArray
     basis: NDArray
     rigid_rows: NDArray
@@ -100,15 +105,15 @@ class Expansion:
 
     @property
     def small_wrench(self) -> float:
-        """[N m] scaled wrench of a misfit of 1e-9 in the stiffest spring."""
-        model = self.here.model
+        """[N m] scaled wrench of a residual of 1e-9 in the stiffest spring."""
+        model = self.placement.model
         softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
-        return _MISFIT / float(softness.min(initial=1.0))
+        return _SMALL_RESIDUAL / float(softness.min(initial=1.0))
 
     @property
     def small_energy(self) -> float:
-        """[J] energy of a misfit of 1e-9."""
-        return _MISFIT * self.small_wrench / 2
+        """[J] energy of a residual of 1e-9."""
+        return _SMALL_RESIDUAL * self.small_wrench / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +121,15 @@ class Step:
     """An accepted step.
 
     Attributes:
-        there: where it leads.
-        gain: [J] by which the expansion falls, what closing costs included.
-        decrement: [J] the same once closed: what the energy had left to gain.
+        placement: after the step.
+        gain: [J] by which the expansion falls, the cost of closing included.
+        decrement: [J] the same without that cost: what the energy could still gain.
         length: [rad, reference lengths] of the change.
-        rigid: (6 K,) multipliers of closures that only clearances reach.
+        rigid: (6 K,) multipliers of closures that only clearances enter.
         damping: [J/rad^2] for the next step; 0 if this one was not damped.
     """
 
-    there: Placement
+    placement: Placement
     gain: float
     decrement: float
     length: float
@@ -132,50 +137,58 @@ class Step:
     damping: float
 
 
-def expand(here: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
+def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     """Closures to first and the Lagrangian to second order.
 
     Args:
-        here: a placement.
+        at: a placement.
         loads: on the robot.
-        rigid: (6 K,) guess of the multipliers of closures that only clearances reach;
+        rigid: (6 K,) guess of the multipliers of closures that only clearances enter;
             the others are those that balance springs and free motions best.
 
     Returns:
         The expansion.
     """
-    model, A = here.model, here.rows
-    loose = np.ones(len(here.x), dtype=bool)
-    loose[model.bounded] = False
-    gradient = -slopes_of(here, loads)
-    gradient[model.springs] += here.x[model.springs]
-    unit = model.units[loose]
-    U, S, Vt = svd(A[:, loose] * unit, full_matrices=True)
-    rank = int(np.sum(S > _tolerance(here) * S.max(initial=0.0)))
-    grip, rest, still = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
-    inverse = still[:, :rank] @ grip.T
-    multipliers = inverse.T @ gradient[loose] + rest @ (rest.T @ rigid)
-    rows, left = _independent(rest.T @ A[:, ~loose])
-    hessian = -curvature_of(here, multipliers, loads)
+    model, A = at.model, at.rows
+    unbounded = np.ones(len(at.x), dtype=bool)
+    unbounded[model.bounded] = False
+    gradient = -work_gradient(at, loads)
+    gradient[model.springs] += at.x[model.springs]
+    unit = model.units[unbounded]
+    U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
+    tolerance = rank_tolerance(model.posture.mismatch)
+    rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
+    # left singular vectors of the range over their values, those of no unbounded
+    # unknown, and right singular vectors in the unknowns' units
+    range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
+    inverse = V[:, :rank] @ range_.T
+    multipliers = inverse.T @ gradient[unbounded]
+    multipliers = multipliers + rigid_space @ (rigid_space.T @ rigid)
+    rows, combination = _independent(rigid_space.T @ A[:, ~unbounded])
+    hessian = -curvature_of(at, multipliers, loads)
     hessian[model.springs, model.springs] += np.eye(model.springs.stop)
     return Expansion(
-        here, loads, gradient, hessian, multipliers, loose, inverse,
-        _basis(loose, inverse @ A[:, ~loose], still[:, rank:]),
-        rows, rows @ here.x[~loose] - left.T @ (rest.T @ here.residual), rest @ left,
-    )  # fmt: skip
+        placement=at,
+        loads=loads,
+        gradient=gradient,
+        hessian=hessian,
+        multipliers=multipliers,
+        unbounded=unbounded,
+        inverse=inverse,
+        basis=_basis(unbounded, inverse @ A[:, ~unbounded], V[:, rank:]),
+        rigid_rows=rows,
+        rigid_right=rows @ at.x[~unbounded]
+        - combination.T @ (rigid_space.T @ at.residual),
+        rigid_basis=rigid_space @ combination,
+    )
 
 
-def _tolerance(here: Placement) -> float:
-    """Relative size of a singular value that counts as zero."""
-    return _RANK + 30.0 * here.model.posture.mismatch
-
-
-def _basis(loose: NDArray, room: NDArray, still: NDArray) -> NDArray:
+def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray:
     """(N, nu + nv) of an expansion."""
-    nu = room.shape[1]
-    basis = np.zeros((len(loose), nu + still.shape[1]))
-    basis[~loose, :nu] = np.eye(nu)
-    basis[loose, :nu], basis[loose, nu:] = -room, still
+    nu = closing.shape[1]
+    basis = np.zeros((len(unbounded), nu + null_space.shape[1]))
+    basis[~unbounded, :nu] = np.eye(nu)
+    basis[unbounded, :nu], basis[unbounded, nu:] = -closing, null_space
     return basis
 
 
@@ -184,27 +197,27 @@ def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
-    rank = int(np.sum(S > 1e-9 * S[0])) if S[0] > 1e-15 else 0
+    rank = int(np.sum(S > ROWS_RANK * S[0])) if S[0] > 1e-15 else 0
     return U[:, :rank].T @ rows, U[:, :rank]
 
 
-def energy_of(place: Placement) -> float:
+def energy_of(at: Placement) -> float:
     """[J] elastic energy."""
-    y = place.x[place.model.springs]
+    y = at.x[at.model.springs]
     return float(y @ y) / 2
 
 
-def potential(place: Placement, loads: DeadLoads) -> float:
+def potential(at: Placement, loads: DeadLoads) -> float:
     """[J] elastic energy minus the loads' work."""
-    return energy_of(place) - work_of(place, loads)
+    return energy_of(at) - work_of(at, loads)
 
 
 def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Step:
     """A step that lowers energy plus penalty.
 
     Args:
-        local: the problem here.
-        penalty: [N m] on the norm of the scaled misfit, above that of the multipliers.
+        local: the expanded problem.
+        penalty: [N m] on the norm of the scaled residual; more than the multipliers'.
         damping: [J/rad^2] of the last step.
         near: whether Newton's method is tried for the clearances.
 
@@ -214,43 +227,44 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     Raises:
         NotConverged: there is none, however short.
     """
-    start = local.here
-    left_open = penalty * float(np.linalg.norm(start.residual))
+    start = local.placement
+    penalised = penalty * float(np.linalg.norm(start.residual))
     least = float(np.abs(local.multipliers).max(initial=local.small_wrench))
     least = max(least, largest_wrench(start, local.loads))
-    before = potential(start, local.loads) + left_open
+    before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
     noise += 1e-14 * penalty
     for attempt in range(_ATTEMPTS):
-        # refused, Newton's step is followed by the conic one before either is damped
+        # a refused Newton step is followed by the conic one before either is damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton)
-        if step is not None and step.length <= LONGEST:
-            after = potential(step.there, local.loads)
-            after += penalty * float(np.linalg.norm(step.there.residual))
-            expected = step.gain + left_open
+        if step is not None and step.length <= LONGEST_STEP:
+            after = potential(step.placement, local.loads)
+            after += penalty * float(np.linalg.norm(step.placement.residual))
+            expected = step.gain + penalised
             if before - after >= 1e-4 * expected - noise:
                 good = before - after >= 0.5 * expected - noise
                 damping = damping / 10 if good else damping
                 damping = damping if damping > _LEAST_DAMPING * least else 0.0
                 return Step(**vars(step) | {"damping": damping})
         if attempt or not near or step is None:
-            damping = max(8.0 * damping, _DAMPING * least)
+            damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
-        whose(start), f"no step lowers the energy; open by {start.largest_gap:.2g}"
+        problem_name(start),
+        f"no step lowers the energy; open by {start.largest_gap:.2g}",
     )
 
 
-def whose(here: Placement) -> str:
-    """Which problem it is, for messages."""
-    return f"exact equilibrium of {here.model.posture.robot.name}"
+def problem_name(at: Placement) -> str:
+    """Name of the problem, for messages."""
+    return f"exact equilibrium of {at.model.posture.robot.name}"
 
 
 def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
     """The expansion's minimum; None where it has none."""
-    here, model = local.here, local.here.model
-    normal = np.zeros(len(here.x))
-    normal[local.loose] = -local.inverse @ here.residual
+    at, model = local.placement, local.placement.model
+    normal = np.zeros(len(at.x))
+    normal[local.unbounded] = -local.inverse @ at.residual
     B, nu = local.basis, len(model.joints.group)
     H = local.hessian + damping * model.metric
     K, g = B.T @ H @ B, B.T @ (local.gradient + local.hessian @ normal)
@@ -261,19 +275,23 @@ def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
     relaxed = cho_solve(factor, np.column_stack([K[nu:, :nu], g[nu:]]))
     S = K[:nu, :nu] - K[:nu, nu:] @ relaxed[:, :nu]
     s = g[:nu] - K[:nu, nu:] @ relaxed[:, nu]
-    play = PlayProblem(
-        (S + S.T) / 2, s, here.x[model.bounded], model.joints.group,
-        local.rigid_rows, local.rigid_right,
-    )  # fmt: skip
-    found = move_play(play, near)
-    if found is None:
+    problem = ClearanceProblem(
+        S=(S + S.T) / 2,
+        s=s,
+        start=at.x[model.bounded],
+        group=model.joints.group,
+        rows=local.rigid_rows,
+        right=local.rigid_right,
+    )
+    step = clearance_step(problem, near)
+    if step is None:
         status = "no play within its bounds closes what no spring can"
-        raise NotConverged(whose(here), status)
-    u, rigid = found
+        raise NotConverged(problem_name(at), status)
+    u, rigid = step
     z = np.concatenate([u, -relaxed[:, nu] - relaxed[:, :nu] @ u])
     change = normal + B @ z
     return Step(
-        there=_draw_back(local, change),
+        placement=_restored(local, change),
         gain=-float(local.gradient @ change + change @ H @ change / 2),
         decrement=-float(g @ z + z @ K @ z / 2),
         length=float(np.sqrt(change @ model.metric @ change)),
@@ -282,22 +300,22 @@ def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
     )
 
 
-def _draw_back(local: Expansion, change: NDArray) -> Placement:
-    """The placement after a step, drawn onto the closures."""
-    model = local.here.model
-    x = local.here.x + change
+def _restored(local: Expansion, change: NDArray) -> Placement:
+    """The placement after a step and its restoration onto the closures."""
+    model = local.placement.model
+    x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)
-    there = model.place(x)
-    for _ in range(_DRAWN_BACK):
-        if there.largest_gap <= 0.1 * CLOSED:
+    after = place(model, x)
+    for _ in range(_RESTORATIONS):
+        if after.largest_gap <= 0.1 * CLOSED:
             break
-        x = there.x.copy()
-        x[local.loose] -= local.inverse @ there.residual
-        better = model.place(x)
-        if not better.largest_gap < there.largest_gap:
+        x = after.x.copy()
+        x[local.unbounded] -= local.inverse @ after.residual
+        better = place(model, x)
+        if not better.largest_gap < after.largest_gap:
             break
-        there = better
-    return there
+        after = better
+    return after
 
 
 def imbalance(local: Expansion) -> float:
@@ -308,21 +326,21 @@ def imbalance(local: Expansion) -> float:
 
     Returns:
         [-] largest generalised force on an unknown that nothing balances, relative to
-        the sizes of those that act on it, or to those of a misfit of 1e-9.
+        the sizes of those that act on it, or to those of a residual of 1e-9.
     """
-    here, A, model = local.here, local.here.rows, local.here.model
-    left = local.gradient - A.T @ local.multipliers
+    at, A, model = local.placement, local.placement.rows, local.placement.model
+    unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
-    pull = size_of_pull(here, local.loads)
-    acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + pull
-    # within a cone nothing pulls; at its rim the pull is straight outward
-    u, group = here.x[model.bounded], model.joints.group
-    force = rim_forces(u, left[model.bounded], group)
-    left[model.bounded] += force[group] * u
-    short = np.zeros(len(left))
-    short[model.bounded] = (force * (1.0 - cone_sizes(u, group)))[group]
-    left = np.maximum(np.abs(left), np.abs(short))
-    return float(np.max(left / np.maximum(acting, 1e-30), initial=0.0))
+    loads = load_magnitudes(at, local.loads)
+    acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
+    # inside a cone the force is zero; at its boundary it is normal to it
+    u, group = at.x[model.bounded], model.joints.group
+    force = cone_multipliers(u, unbalanced[model.bounded], group)
+    unbalanced[model.bounded] += force[group] * u
+    complementarity = np.zeros(len(unbalanced))
+    complementarity[model.bounded] = (force * (1.0 - cone_sizes(u, group)))[group]
+    worst = np.maximum(np.abs(unbalanced), np.abs(complementarity))
+    return float(np.max(worst / np.maximum(acting, 1e-30), initial=0.0))
 
 
 def least_curvature(local: Expansion) -> float:
@@ -333,21 +351,21 @@ def least_curvature(local: Expansion) -> float:
 
     Returns:
         [J/rad^2] least second derivative of the potential along the motions that keep
-        closures, and the rims pressed on, per squared rad and reference length of all
+        closures and active constraints, per squared rad and reference length of all
         screws together; positive at a strict minimum, inf if nothing can move.
     """
-    model, nu = local.here.model, len(local.here.model.joints.group)
-    u, group = local.here.x[model.bounded], model.joints.group
-    left = local.gradient - local.here.rows.T @ local.multipliers
-    force = rim_forces(u, left[model.bounded], group)
-    rim = force > 1e-9 * force.max(initial=0.0)
-    B = local.basis
-    C = np.hstack([across_rims(u, rim, group), local.rigid_rows.T])
+    at, model = local.placement, local.placement.model
+    u, group = at.x[model.bounded], model.joints.group
+    gradient = local.gradient - at.rows.T @ local.multipliers
+    force = cone_multipliers(u, gradient[model.bounded], group)
+    active = force > 1e-9 * force.max(initial=0.0)
+    B, nu = local.basis, len(group)
+    C = np.hstack([boundary_normals(u, active, group), local.rigid_rows.T])
     C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
     Z = np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
     if not Z.size:
         return np.inf
     H = local.hessian.copy()
-    H[~local.loose, ~local.loose] += force[group]
+    H[~local.unbounded, ~local.unbounded] += force[group]
     D = B @ Z
     return float(eigh(D.T @ H @ D, D.T @ model.metric @ D, eigvals_only=True)[0])

@@ -1,27 +1,26 @@
 r"""The forced assembly at least energy with finite motions: closures hold on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`assembly.linear.energy`); only the closures differ: motions follow one
-another as in :mod:`assembly.exact.placement`.  Minimised is the springs' energy minus
+model (:mod:`assembly.linear.energy`); only the closures differ: finite motions compose
+as in :mod:`assembly.exact.finite_robot`.  Minimised is the springs' energy minus
 the work of a load,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k,
 
-by the steps of :mod:`assembly.exact.descent`, from the linear answer.
+by the steps of :mod:`assembly.exact.descent`, from the linear solution.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
 ======  ====================  ========  ==============================================
 x_p     ``platform_screw``    (6,)      rotation vector of R R_nominal^T and shift of
                                         the platform's origin, base axes
-w       ``load``              (6,)      force: dead; moment: what has the work m . theta
+w       ``load``              (6,)      force: dead; moment: of the work m . theta
 W       ``loads``             J         work of weights and of loads on bodies
-r       ``closure_residual``  (6 K,)    logarithms of what closures leave open
+r       ``closure_residual``  (6 K,)    logarithms of the open closures
 ======  ====================  ========  ==============================================
 
-The problem is not convex: the answer is a local minimum, and ``docs/exact.md`` says
-what that means.
+The problem is not convex: the solution is a local minimum, see ``docs/exact.md``.
 """
 
 from dataclasses import dataclass
@@ -39,7 +38,7 @@ from assembly.exact.dead_load import (
 )
 from assembly.exact.descent import (
     CLOSED,
-    LONGEST,
+    LONGEST_STEP,
     Expansion,
     NotConverged,
     advance,
@@ -48,12 +47,14 @@ from assembly.exact.descent import (
     imbalance,
     least_curvature,
     potential,
-    whose,
+    problem_name,
 )
-from assembly.exact.placement import LINK, PLAY, SPRING, FiniteRobot, Placement
+from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
+from assembly.exact.placement import Placement, place
 from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
-from assembly.linear.energy import Assembly, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.model.clearance import (
     clearance_bounds,
     clearance_excess,
@@ -72,13 +73,13 @@ _STEPS = 80  # at most; 3 to 5 are usual
 _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
 _DECREMENT = 1e-14  # relative energy left to gain before the last step
 _STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
-_STATIONARY = 1e-7  # relative imbalance of an answer; 1e-12 is usual
-_ROUNDING = 1e-30  # [J] energies of parts without errors are some 1e-48 J of rounding
+_STATIONARY = 1e-7  # relative imbalance of a solution; 1e-12 is usual
+_ROUNDING = 1e-30  # [J] energies of robots without errors are some 1e-48 J of rounding
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisationError:
-    """What the linear model gets wrong: linear minus exact.
+    """Error of the linear model: linear minus exact.
 
     Attributes:
         rotation: (3,) [rad] of the platform.
@@ -101,8 +102,8 @@ class ExactAssembly:
     is a local minimum ``least_curvature`` says; that none is lower is not proved.
 
     Attributes:
-        linear: the linear model's answer from which this one was reached.
-        expansion: where everything is, with the multipliers of the scaled closures.
+        linear: the linear model's solution, where the steps began.
+        expansion: of the problem here, with the multipliers of the scaled closures.
         stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
         iterations: steps taken.
     """
@@ -140,7 +141,7 @@ class ExactAssembly:
     @property
     def placement(self) -> Placement:
         """Where everything is."""
-        return self.expansion.here
+        return self.expansion.placement
 
     @property
     def load(self) -> NDArray:
@@ -199,11 +200,11 @@ class ExactAssembly:
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] play, and what passive joints move, own row."""
-        play = self.placement.screws[PLAY].copy()
+        """(n, 6) [rad, m] clearances, and motions of passive joints."""
+        screws = self.placement.screws[CLEARANCE].copy()
         axes = [frame.own_axis for frame in self.posture.robot.frames]
-        play[np.arange(len(axes)), axes] += self.placement.own
-        return play
+        screws[np.arange(len(axes)), axes] += self.placement.own
+        return screws
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
@@ -234,9 +235,9 @@ class ExactAssembly:
         """(2, n, 6) [N m, N] through bodies and joints."""
         robot, T = self.posture.robot, self.transforms
         closing = closure_signs(robot).T @ self.closure_wrenches
-        held = wrenches_on_frames(self.placement, self.loads)
+        of_loads = wrenches_on_frames(self.placement, self.loads)
         readings = screw_map(T[:, :3, 3] - self.posture.platform[:3, 3], T[:, :3, :3])
-        return np.einsum("nji,knj->kni", readings, closing + np.stack(held))
+        return np.einsum("nji,knj->kni", readings, closing + np.stack(of_loads))
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
@@ -244,7 +245,7 @@ class ExactAssembly:
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
         # inside an assembly zone both are zero up to rounding
-        scale = max(self.energy, 1e-6 * self.linear.energy_without_play, _ROUNDING)
+        scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
@@ -265,14 +266,14 @@ def solve_exact(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> ExactAssembly:
-    """Close a manipulator at least energy with finite motions, from the linear answer.
+    """Close a manipulator at least energy with finite motions, from the linear model.
 
     Args:
         posture: where the robot stands; its errors, clearances, links and joint
             springs are the robot's.
         load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is
             dead; the moment's work is its product with the rotation vector.
-        start: the linear answer for this posture and these loads, if it is there.
+        start: the linear solution for this posture and these loads, if known.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
@@ -282,9 +283,9 @@ def solve_exact(
         The assembled manipulator: closed, stationary, within its cones.
 
     Raises:
-        CannotAssemble: the linear model has no answer to start from.
+        CannotAssemble: the linear model has no solution to start from.
         FreeMotion: a load drives a motion that nothing resists.
-        NotConverged: no equilibrium was found; a :class:`SolverFailed`.
+        NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads.
     """
     loads = dead_loads(posture, load, bodies, gravity, point)
@@ -297,54 +298,54 @@ def solve_exact(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"
         )
-    answer = _search(start.joints, start, loads)
-    if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # the bound of a passive joint's own motion was left out, but it matters
+    assembly = _search(start.joints, start, loads)
+    if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
+        # the bound of a passive joint's own motion was left out, but it is active
         joints = virtual_joints(posture.robot, bounded_motion=True)
-        answer = _search(joints, start, loads)
-    return answer
+        assembly = _search(joints, start, loads)
+    return assembly
 
 
 def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactAssembly:
-    """Step after step from the linear answer."""
+    """Iterate from the linear solution."""
     model = FiniteRobot(linear.posture, joints)
-    here = model.place(_begin(model, linear))
-    rigid = np.zeros(len(here.residual))
+    current = place(model, _first_guess(model, linear))
+    rigid = np.zeros(len(current.residual))
     penalty, damping, near = 0.0, 0.0, False
     for count in range(1, _STEPS + 1):
-        local = expand(here, loads, rigid)
+        local = expand(current, loads, rigid)
         penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
         step = advance(local, penalty, damping, near)
-        here, rigid, damping = step.there, step.rigid, step.damping
-        scale = max(_energy_scale(here, linear, loads), local.small_energy)
+        current, rigid, damping = step.placement, step.rigid, step.damping
+        scale = max(_energy_scale(current, linear, loads), local.small_energy)
         near = step.decrement <= _NEAR * scale
         still = damping == 0.0 and step.length <= _STILL
         still = still or abs(step.decrement) <= _DECREMENT * scale
-        if still and here.largest_gap <= CLOSED + linear.posture.mismatch:
-            last = expand(here, loads, rigid)
+        if still and current.largest_gap <= CLOSED + linear.posture.mismatch:
+            last = expand(current, loads, rigid)
             if imbalance(last) <= _STATIONARY:
                 return ExactAssembly(linear, last, imbalance(last), count)
-    left = imbalance(expand(here, loads, rigid))
+    unbalanced = imbalance(expand(current, loads, rigid))
     raise NotConverged(
-        whose(here),
-        f"after {_STEPS} steps closures are open by {here.largest_gap:.2g} and forces "
-        f"out of balance by {left:.2g}, relative",
+        problem_name(current),
+        f"after {_STEPS} steps closures are open by {current.largest_gap:.2g} and "
+        f"forces out of balance by {unbalanced:.2g}, relative",
     )
 
 
-def _begin(model: FiniteRobot, linear: Assembly) -> NDArray:
-    """(N,) the linear answer as a first guess, play drawn into the cones."""
+def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
+    """(N,) the linear solution as a first guess, clearances projected on the cones."""
     motions = np.hstack([model.joints.cones, model.joints.free])
-    play = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
-    x = np.concatenate([linear.elastic, play])
-    turned = np.linalg.norm(model.place(x).screws[..., :3], axis=-1)
-    x *= min(1.0, LONGEST / max(float(turned.max(initial=0.0)), 1e-300))
+    moved = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
+    x = np.concatenate([linear.elastic, moved])
+    turned = np.linalg.norm(place(model, x).screws[..., :3], axis=-1)
+    x *= min(1.0, LONGEST_STEP / max(float(turned.max(initial=0.0)), 1e-300))
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)
     return x
 
 
-def _energy_scale(here: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """[J] size of the energies at play."""
+def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
+    """[J] size of the energies of the problem."""
     return max(
-        energy_of(here), abs(work_of(here, loads)), 1e-3 * linear.energy_without_play
+        energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

@@ -1,4 +1,4 @@
-"""``[[effect]]`` of a robot file: effects that the machine is known to have."""
+"""``[[effect]]`` of a robot file: known effects of the machine."""
 
 from collections.abc import Sequence
 
@@ -22,24 +22,24 @@ def read_effects(tables: Sequence[Table], robot: Robot) -> dict[str, dict[str, f
         BadInput: an unknown effect or parameter, an effect given twice or at a frame
             where it cannot act, or a value that is not a finite number.
     """
-    found: dict[str, dict[str, float]] = {}
+    effects: dict[str, dict[str, float]] = {}
     for table in tables:
         name = table.choice("name", tuple(LIBRARY))
         table.place = f"effect {quoted(name)}"
-        if name in found:
+        if name in effects:
             raise table.bad("name", "found twice; expected one [[effect]] of each name")
         allowed = parameter_names(robot, name)
         inner = table.table("parameters") if table.has("parameters") else None
         table.finish()
-        found[name] = {}
+        effects[name] = {}
         for key in inner.content if inner is not None else ():
             if key not in allowed:
                 hint = nearest(key, allowed)
                 message = f"found {quoted(key)}, which is no parameter of {name} here"
                 raise table.bad("parameters", f"{message}{hint}")
             assert inner is not None
-            found[name][key] = inner.number(key, "SI")
-    return found
+            effects[name][key] = inner.number(key, "SI")
+    return effects
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:

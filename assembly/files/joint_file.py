@@ -1,11 +1,12 @@
-"""What a robot file says of a joint's imperfections: its play, its stiffness."""
+"""Clearance and stiffness of a joint, read from a robot file."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.largest import LARGEST, LARGEST_LENGTH
 from assembly.model.robot import LOCKED, Clearance
-from forcefit.inputs.table import Table, find_fault, number_array
+from forcefit.inputs.number_arrays import find_fault, number_array
+from forcefit.inputs.table import Table
 
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
@@ -58,14 +59,14 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
     K = number_array(value)
     if K is None or K.shape not in {(6,), (6, 6)} or np.isnan(K).any():
         shape = (6, 6) if isinstance(value, list) and _has_rows(value) else (6,)
-        found = find_fault(value, shape, infinite=True)
-        raise table.bad(key, f"found {found}, expected {expected}")
+        fault = find_fault(value, shape, infinite=True)
+        raise table.bad(key, f"found {fault}, expected {expected}")
     if K.ndim == 1:
-        low = K.copy()
-        if free is not None and low[free] == 0.0:
-            low[free] = 1.0
-        if low.min() <= 0:
-            raise table.bad(key, f"found {low.min():g} in it, expected {expected}")
+        checked = K.copy()
+        if free is not None and checked[free] == 0.0:
+            checked[free] = 1.0
+        if checked.min() <= 0:
+            raise table.bad(key, f"found {checked.min():g} in it, expected {expected}")
         K = np.diag(K)
     rigid = np.isposinf(np.diag(K))
     if free is not None and rigid[free]:
@@ -119,8 +120,8 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
     if diagonal.max() > LARGEST or diagonal.min() < 1 / LARGEST:
         i = int(np.argmax(np.abs(np.log(diagonal))))
         expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
-        found = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
-        raise table.bad(key, f"{found}, {expected}")
+        fault = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
+        raise table.bad(key, f"{fault}, {expected}")
     # scaled to a unit diagonal, so that rad and m weigh alike
     size = np.sqrt(diagonal)
     unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)

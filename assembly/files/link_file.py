@@ -1,4 +1,4 @@
-"""The ``link`` table of a robot file, in and out: what makes a body elastic."""
+"""The ``link`` table of a robot file, read and written: the elasticity of a body."""
 
 import os
 from pathlib import Path
@@ -18,14 +18,14 @@ from assembly.model.robot import (
 from forcefit.inputs.table import Table, describe, quoted
 from stiffness.surface.surface import UNITS
 
-_SMALLEST_LENGTH = 1e-12  # [m] below any machine
+_SMALLEST_LENGTH = 1e-12  # [m] below that of any machine
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
 )
 _KINDS = ("beam", "stiffness", "mesh", "library")
 _MATERIAL = ("young", "poisson", "density")
-_SECTIONS: dict[str, dict[str, str]] = {  # what each kind is given by, and its unit
+_SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
     "round": {"radius": "m", "inner_radius": "m"},
     "rectangular": {"width": "m", "height": "m"},
     "general": {
@@ -54,21 +54,21 @@ def read_link(frame: Table) -> Link | None:
     if not kinds and not set(link.content) <= {*_MATERIAL, "up"}:
         link.finish()  # a misspelt kind gets its suggestion
     if len(kinds) != 1:
-        found = " and ".join(map(quoted, kinds)) or "none of them"
+        given = " and ".join(map(quoted, kinds)) or "none of them"
         names = " | ".join(map(quoted, _KINDS))
-        raise link.bad("", f"found {found}, expected exactly one of {names}")
-    answer: Link
+        raise link.bad("", f"found {given}, expected exactly one of {names}")
+    result: Link
     if kinds == ["beam"]:
-        answer = _beam_link(link)
+        result = _beam_link(link)
     elif kinds == ["stiffness"]:
         K = link.array("stiffness", (6, 6), "N m/rad .. N/m")
-        answer = MatrixLink(definite(link, "stiffness", K))
+        result = MatrixLink(definite(link, "stiffness", K))
     elif kinds == ["mesh"]:
-        answer = _mesh_link(link, frame)
+        result = _mesh_link(link, frame)
     else:
-        answer = _library_link(link)
+        result = _library_link(link)
     link.finish()
-    return answer
+    return result
 
 
 def _beam_link(link: Table) -> BeamLink:
@@ -90,14 +90,17 @@ def _beam_link(link: Table) -> BeamLink:
 
 def _section(beam: Table) -> dict[str, float]:
     """Numbers of the section, one of the three kinds."""
-    found = {
+    keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
-    kinds = [kind for kind, keys in found.items() if keys]
+    kinds = [kind for kind, keys in keys_of_kind.items() if keys]
     if len(kinds) != 1:
         if not kinds:
             beam.finish()  # a misspelt key gets its suggestion
-        names = " and ".join(quoted(found[kind][0]) for kind in kinds) or "no section"
+        names = (
+            " and ".join(quoted(keys_of_kind[kind][0]) for kind in kinds)
+            or "no section"
+        )
         raise beam.bad("", f"found {names}, expected one section: {_ONE_SECTION}")
     units = dict(_SECTIONS[kinds[0]])
     inner = units.pop("inner_radius", None)
@@ -121,7 +124,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
     if (up is None) != (frame_up is None):
         message = 'missing; expected the "up" of the mesh and of the frame, or neither'
         raise (mesh if up is None else frame).bad("up", message)
-    answer = MeshLink(
+    result = MeshLink(
         surface=_path(mesh, "surface", mesh.text("surface")),
         **ends,
         **_material(link),
@@ -132,7 +135,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
         interface=mesh.choice("interface", ("rigid", "distributing"), "rigid"),
     )
     mesh.finish()
-    return answer
+    return result
 
 
 def _interface(mesh: Table, key: str) -> Any:
@@ -165,8 +168,8 @@ def _library_link(link: Table) -> LibraryLink:
     value = link.text("library")
     path, _, key = value.rpartition("#")
     if not (path and key):
-        found = describe(value)
-        raise link.bad("library", f'found {found}, expected "path/to/library#key"')
+        fault = f'found {describe(value)}, expected "path/to/library#key"'
+        raise link.bad("library", fault)
     return LibraryLink(_path(link, "library", path), key)
 
 
@@ -210,12 +213,12 @@ def _path(table: Table, key: str, path: str) -> Path:
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
-    """What a frame says of its link.
+    """The keys of a frame's table for its link.
 
     Args:
         link: of a robot.
-        folder: of the file to be written, from which paths then lead; paths are
-            written as they are without one.
+        folder: of the file to be written, to which paths are made relative; paths are
+            unchanged without one.
 
     Returns:
         The ``link`` table, and beside it the frame's ``up`` for a mesh that has one.
@@ -241,7 +244,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _from(folder: Path | None, path: Path) -> str:
-    """A path as the new file names it."""
+    """A path relative to the new file's folder."""
     if folder is None or path.is_absolute():
         return str(path)
     try:

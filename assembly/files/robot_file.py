@@ -1,4 +1,4 @@
-"""Robot files in and out (``docs/robot_files.md``), every rule checked at the door."""
+"""Robot files read and written (``docs/robot_files.md``), every rule checked."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -56,7 +56,7 @@ def robot_of(root: Table, name: str) -> Robot:
     """Robot of a robot file's root table.
 
     Args:
-        root: the table; paths in it lead from the folder of ``root.file``.
+        root: the table; paths in it are relative to the folder of ``root.file``.
         name: of the robot if the table has none.
 
     Returns:
@@ -73,7 +73,7 @@ def robot_of(root: Table, name: str) -> Robot:
 
 
 def declared_robot(root: Table, name: str) -> Robot:
-    """Robot of a root table as it is written: whether it closes is not looked at.
+    """Robot of a root table as it is written; its closures are not checked.
 
     Args:
         root: of a robot file.
@@ -88,15 +88,15 @@ def declared_robot(root: Table, name: str) -> Robot:
     name = root.text("name", name, longest=_LONGEST_NAME)
     description = root.get("description", "")
     if not isinstance(description, str):
-        found = describe(description)
-        raise root.bad("description", f"found {found}, expected a string")
+        fault = f"found {describe(description)}, expected a string"
+        raise root.bad("description", fault)
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
     effects = root.tables("effect")
     root.finish()
     if not 0 < len(tables[0]) <= _MOST_FRAMES:
-        found = f"found {len(tables[0])}" if tables[0] else "missing"
-        raise root.bad("frame", f"{found}; expected 1 to {_MOST_FRAMES} [[frame]]")
+        fault = f"found {len(tables[0])}" if tables[0] else "missing"
+        raise root.bad("frame", f"{fault}; expected 1 to {_MOST_FRAMES} [[frame]]")
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])
@@ -112,15 +112,15 @@ def declared_robot(root: Table, name: str) -> Robot:
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
-    """That the frames named have ``dh`` without ``alpha``, which turns their axis."""
-    # the other three are zero as often as not; a forgotten alpha is another machine
+    """A remark on frames with ``dh`` without ``alpha``, which turns their axis."""
+    # the other three are often zero; a forgotten alpha changes the machine
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
-    flat = [
+    without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
     ]
-    if not flat:
+    if not without_alpha:
         return ()
-    return (f"dh without alpha, taken as 0: {', '.join(flat)}",)
+    return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
 
 
 def _frame(table: Table) -> Frame:
@@ -221,9 +221,9 @@ def _check_meeting_frames(robot: Robot) -> None:
             keys = ("clearance", "joint_stiffness")
             has = [key for key in keys if getattr(frame, key) is not None]
             if frame.joint != "fixed" or has:
-                found = has[0] if has else f"a {frame.joint} joint"
+                fault = has[0] if has else f"a {frame.joint} joint"
                 raise BadInput(
-                    f"{place}: found {found} at frame {quoted(name)}; expected a fixed "
+                    f"{place}: found {fault} at frame {quoted(name)}; expected a fixed "
                     "joint without clearance or joint_stiffness (add a frame after it)"
                 )
 
@@ -233,8 +233,8 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
     Args:
         robot: to be written.
-        path: of the new file; relative paths of meshes and libraries are written as
-            they lead from there.
+        path: of the new file; relative paths of meshes and libraries are written
+            relative to its folder.
 
     Raises:
         BadInput: the file cannot be written.
@@ -246,17 +246,17 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     kinds = {"frame": frames, "closure": closures, "effect": effects}
     for kind, tables in kinds.items():
         for inner in tables:
-            said = (f"{k} = {_toml(v)}" for k, v in inner.items())
-            lines += ["", f"[[{kind}]]", *said]
+            pairs = (f"{k} = {_toml(v)}" for k, v in inner.items())
+            lines += ["", f"[[{kind}]]", *pairs]
     write_text("\n".join(lines) + "\n", path)
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
-    """What a robot file says of a robot.
+    """The content of a robot file.
 
     Args:
         robot: any.
-        folder: of the file to be written, from which paths then lead.
+        folder: of the file to be written, to which paths are made relative.
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
@@ -277,11 +277,11 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """What ``[[frame]]`` says of a frame, defaults left out.
+    """The content of ``[[frame]]``, defaults left out.
 
     Args:
         frame: of a robot.
-        folder: of the file to be written, from which paths then lead.
+        folder: of the file to be written, to which paths are made relative.
 
     Returns:
         Keys and plain values of the file format.
@@ -312,7 +312,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _toml(value: Any) -> str:
-    """A value in TOML; floats keep all their digits."""
+    """A value in TOML, arrays and tables inline; floats keep all their digits."""
+    # tomli-w writes every number of an array on a line of its own
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Where a robot stands: the nominal closures solved, equations (8) and (13)-(15).
+"""Postures: the nominal closures solved, and the maps of equations (13)-(15).
 
 Begin at ``posture.py``.
 """

@@ -9,7 +9,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import (
+    GivenIndices,
+    GivenMatrices,
+    IndexRows,
+    Indices,
+    Matrices,
+    Matrix,
+    Vector,
+    kernel,
+    part,
+)
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
 _ROUNDED = 1e-5  # scaled residual accepted where it cannot be made smaller
@@ -22,7 +32,7 @@ _NEWTON = 12  # iterations; quadratic convergence needs about 4
 def follow_all(
     parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
     platform: int, start: NDArray, poses: NDArray, held: NDArray, size: float,
-    steps: int,
+    steps: int, T: NDArray,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Follow every target along its straight line.
 
@@ -38,6 +48,7 @@ def follow_all(
         held: (k, n) coordinates, NaN where free.
         size: [m] reference length.
         steps: first number of steps; 1 takes any step, for a start that is a guess.
+        T: (k, n, 4, 4) to fill: rotations and origins of all frames where tracks end.
 
     Returns:
         (k, n) coordinates where each track ends and (k,) progress, 1 where reached.
@@ -52,14 +63,20 @@ def follow_all(
             parents, kinds, fixed, carries, pairs, platform, start, pose, held[i],
             size, steps, ends[i],
         )  # fmt: skip
+        R, p = forward(parents, kinds, fixed, ends[i])
+        for j in range(n):
+            for k in range(3):
+                T[i, j, k, 3] = p[j, k]
+                for l in range(3):
+                    T[i, j, k, l] = R[j, k, l]
     return ends, progress
 
 
-@kernel
+@part
 def _follow(
-    parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
-    platform: int, start: NDArray, pose: NDArray, held: NDArray, size: float,
-    steps: int, q: NDArray,
+    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
+    pairs: IndexRows, platform: int, start: Vector, pose: Vector,
+    held: Vector, size: float, steps: int, q: Vector,
 ) -> float:  # fmt: skip
     """One target, q: steps that halve where Newton fails, double where it does not."""
     for j in range(len(q)):
@@ -98,11 +115,12 @@ def _follow(
     return done
 
 
-@kernel
+@part
 def _newton(
-    parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
-    platform: int, begin: NDArray, pose: NDArray, held: NDArray, size: float,
-) -> tuple[NDArray, bool]:  # fmt: skip
+    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
+    pairs: IndexRows, platform: int, begin: Vector, pose: Vector,
+    held: Vector, size: float,
+) -> tuple[Vector, bool]:  # fmt: skip
     """Damped Gauss-Newton of least norm on closures and pose; whether it converged."""
     n, count = len(begin), 0
     q, free, unit = np.empty(n), np.empty(n, np.int64), np.empty(n)
@@ -136,10 +154,10 @@ def _newton(
     return q, fine
 
 
-@kernel
+@part
 def forward(
-    parents: NDArray, kinds: NDArray, fixed: NDArray, q: NDArray
-) -> tuple[NDArray, NDArray]:
+    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, q: Vector
+) -> tuple[Matrices, Matrix]:
     """Rotations (n, 3, 3) and origins (n, 3) of all frames before their own motion."""
     n = len(q)
     R, p = np.empty((n, 3, 3)), np.empty((n, 3))
@@ -166,11 +184,11 @@ def forward(
     return R, p
 
 
-@kernel
+@part
 def _equations(
-    kinds: NDArray, carries: NDArray, pairs: NDArray, platform: int, R: NDArray,
-    p: NDArray, pose: NDArray, free: NDArray, unit: NDArray, size: float, r: NDArray,
-    J: NDArray,
+    kinds: Indices, carries: Matrix, pairs: IndexRows, platform: int, R: Matrices,
+    p: Matrix, pose: Vector, free: Indices, unit: Vector, size: float, r: Vector,
+    J: Matrix,
 ) -> None:  # fmt: skip
     """Scaled residuals and their derivatives by the free joints."""
     for c in range(len(pairs)):
@@ -213,10 +231,10 @@ def _equations(
                 J[row + k, i] = 0.0
 
 
-@kernel
+@part
 def _move(
-    kind: int, R: NDArray, origin: NDArray, point: NDArray, factor: float, size: float,
-    J: NDArray, row: int, column: int,
+    kind: int, R: Matrix, origin: Vector, point: Vector, factor: float, size: float,
+    J: Matrix, row: int, column: int,
 ) -> None:  # fmt: skip
     """Screw of a unit joint motion at a point, scaled, into a column from a row on."""
     for k in range(3):
@@ -231,8 +249,8 @@ def _move(
             J[row + 3 + k, column] = factor * R[k, 2] / size
 
 
-@kernel
-def _largest(v: NDArray) -> float:
+@part
+def _largest(v: Vector) -> float:
     """Largest absolute component; not a number if one is none."""
     largest = 0.0
     for value in v:
@@ -243,8 +261,8 @@ def _largest(v: NDArray) -> float:
     return largest
 
 
-@kernel
-def _least_step(J: NDArray, r: NDArray) -> NDArray:
+@part
+def _least_step(J: Matrix, r: Vector) -> Vector:
     """Least-squares solution of J x = r, of least norm by damping at rounding level."""
     n = J.shape[1]
     N, x = np.empty((n, n)), np.zeros(n)
@@ -281,8 +299,8 @@ def _least_step(J: NDArray, r: NDArray) -> NDArray:
     return x
 
 
-@kernel
-def _times_transposed(A: NDArray, B: NDArray) -> NDArray:
+@part
+def _times_transposed(A: Matrix, B: Matrix) -> Matrix:
     """A B^T of 3 by 3 matrices."""
     C = np.zeros((3, 3))
     for i in range(3):
@@ -292,8 +310,8 @@ def _times_transposed(A: NDArray, B: NDArray) -> NDArray:
     return C
 
 
-@kernel
-def rotation_log(R: NDArray) -> NDArray:
+@part
+def rotation_log(R: Matrix) -> Vector:
     """Rotation vector of a rotation matrix, by its quaternion."""
     # the quaternion's largest component first, so that nothing cancels:
     # Shepperd (1978), Quaternion from rotation matrix
@@ -325,8 +343,8 @@ def rotation_log(R: NDArray) -> NDArray:
     return turn
 
 
-@kernel
-def _rotation_exp(x: float, y: float, z: float) -> NDArray:
+@part
+def _rotation_exp(x: float, y: float, z: float) -> Matrix:
     """Rotation matrix of a rotation vector (Rodrigues)."""
     angle = math.sqrt(x * x + y * y + z * z)
     a, b = 1.0, 0.0
@@ -336,8 +354,8 @@ def _rotation_exp(x: float, y: float, z: float) -> NDArray:
     return _turned(x, y, z, a, b)
 
 
-@kernel
-def _inverse_left_jacobian(r: NDArray) -> NDArray:
+@part
+def _inverse_left_jacobian(r: Vector) -> Matrix:
     """Change of a rotation vector per small turn in fixed axes."""
     # Chirikjian, Stochastic Models, Information Theory, and Lie Groups 2, section 10.7
     angle = max(math.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2), 1e-6)
@@ -347,8 +365,8 @@ def _inverse_left_jacobian(r: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-@kernel
-def _turned(x: float, y: float, z: float, a: float, b: float) -> NDArray:
+@part
+def _turned(x: float, y: float, z: float, a: float, b: float) -> Matrix:
     """1 + a S + b S S with S the matrix of the cross product with (x, y, z)."""
     A = np.empty((3, 3))
     A[0, 0] = 1.0 - b * (y * y + z * z)

@@ -2,7 +2,7 @@
 
 Many targets are followed at once, each along its straight line from the home pose.
 Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
-undetermined stays where it was, and overconstrained robots are no special case.  The
+undetermined stays unchanged, and overconstrained robots are no special case.  The
 loops are compiled, in :mod:`assembly.kinematics.compiled_continuation`.
 """
 
@@ -19,7 +19,7 @@ NOT_CLOSED = "expected a configuration in which every closure holds"
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where to go: one of the two, NaN where free.
+    """Targets of a continuation: poses or coordinates, NaN where free.
 
     Attributes:
         pose: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad] of the platform, or None.
@@ -36,12 +36,12 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """How far each target was followed.
+    """End of the continuation to each target.
 
     Attributes:
-        coordinates: (k, n) joint coordinates where the track ends.
+        coordinates: (k, n) joint coordinates where it ends.
         transforms: (k, n, 4, 4) frames there.
-        progress: (k,) 1 where the target was reached, less where the track broke off.
+        progress: (k,) part of the way; 1 where the target was reached.
         closure_mismatch: (k, closures) [rad, m] largest component left open.
     """
 
@@ -99,9 +99,9 @@ def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Trac
         steps: first number of steps; they shrink and grow by themselves.
 
     Returns:
-        The tracks, with how far each one came.
+        The ends of the tracks, and their progress.
     """
-    from assembly.kinematics.compiled_continuation import follow_all, forward
+    from assembly.kinematics.compiled_continuation import follow_all
 
     count, n = len(target), len(robot.frames)
     carries = robot.on_path - np.eye(n)  # a joint's motion comes after its own frame
@@ -111,18 +111,14 @@ def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Trac
     if target.coordinates is not None:
         held = np.where(kinds > 0, target.coordinates, np.nan)
     poses = np.zeros((0, 6)) if target.pose is None else target.pose
+    T = np.zeros((count, n, 4, 4))
+    T[..., 3, 3] = 1.0
     q, progress = follow_all(
         robot.parents, kinds, robot.fixed_transforms, carries,
         np.array(pairs, dtype=int).reshape(-1, 2), robot.index(robot.platform),
         np.array(start, dtype=float), np.array(poses, dtype=float), held,
-        size_of(robot), steps,
+        size_of(robot), steps, T,
     )  # fmt: skip
-    T = np.zeros((count, n, 4, 4))
-    T[..., 3, 3] = 1.0
-    for i in range(count):
-        T[i, :, :3, :3], T[i, :, :3, 3] = forward(
-            robot.parents, kinds, robot.fixed_transforms, q[i]
-        )
     return Track(q, T, progress, _closure_mismatch(robot, T))
 
 

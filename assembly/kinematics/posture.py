@@ -1,4 +1,4 @@
-"""A robot placed somewhere: where every frame is, and how a small screw travels.
+"""A robot at a posture: the poses of its frames, and the maps of small screws.
 
 ======  ==================  ============  =========================================
 symbol  code                shape         meaning
@@ -50,7 +50,7 @@ class Posture:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Where the platform stands, and what drives it there."""
+        """Pose of the platform and coordinates of the drives."""
         if self.transforms.ndim > 3:
             return {"postures": str(self.transforms.shape[:-3])}
         frames = self.robot.frames
@@ -99,8 +99,8 @@ def home_posture(robot: Robot) -> Posture:
         BadInput: a closure does not hold to 1e-6 rad and m; it is named.
     """
     actuated = np.array([f.actuated for f in robot.frames])
-    here = np.where(actuated, robot.positions, np.nan)
-    track = follow(robot, robot.positions, Target(coordinates=here[None]), steps=1)
+    held = np.where(actuated, robot.positions, np.nan)
+    track = follow(robot, robot.positions, Target(coordinates=held[None]), steps=1)
     if not track.mismatch[0] < _HOME_TOLERANCE:
         k = int(np.argmax(track.closure_mismatch[0]))
         a, b = robot.closures[k]
@@ -134,7 +134,7 @@ def place_robot(
 
     Raises:
         BadInput: both or an unknown name given, a value not finite, or out of reach;
-            the distance by which it misses is given.
+            the message gives the distance that is missing.
     """
     home = home_posture(robot)
     if pose and joints:
@@ -147,7 +147,7 @@ def place_robot(
         return home
     track = follow(robot, home.coordinates, target)
     if not track.reached[0]:
-        raise BadInput(f"{robot.name}: {miss(robot, track, target, 0)}")
+        raise BadInput(f"{robot.name}: {unreached(robot, track, target, 0)}")
     return _posture(robot, track, 0)
 
 
@@ -195,7 +195,7 @@ def place_many(
 
     Returns:
         For each pose its posture, None where it is out of reach, and for each pose an
-        empty string, or why there is no posture.
+        empty string or the reason why there is no posture.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -224,43 +224,43 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """For each target its posture, or None and why there is none."""
+    """For each target its posture, or None and the reason."""
     track = follow(robot, home_posture(robot).coordinates, target)
     postures = [
         _posture(robot, track, i) if reached else None
         for i, reached in enumerate(track.reached)
     ]
     reasons = [
-        "" if reached else miss(robot, track, target, i)
+        "" if reached else unreached(robot, track, target, i)
         for i, reached in enumerate(track.reached)
     ]
     return postures, reasons
 
 
-def miss(robot: Robot, track: Track, target: Target, i: int) -> str:
-    """Why target i was not reached, with the distance by which it misses."""
+def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
+    """Why target i was not reached, with the distance that is missing."""
     if target.pose is None:
-        left = (1.0 - track.progress[i]) * 100
+        remaining = (1.0 - track.progress[i]) * 100
         return (
             f"these joint coordinates cannot be reached: the closures stop holding "
-            f"{left:.3g} % of the way before them; {NOT_CLOSED}"
+            f"{remaining:.3g} % of the way before them; {NOT_CLOSED}"
         )
     goal = target.pose[i]
-    here = pose_components(track.transforms[i, robot.index(robot.platform)])
+    reached = pose_components(track.transforms[i, robot.index(robot.platform)])
     given = [k for k in range(6) if np.isfinite(goal[k])]
     asked = ", ".join(f"{POSE[k]}={goal[k]:.6g}" for k in given)
     gap = np.array([
-        goal[k] - here[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
+        goal[k] - reached[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
     ])
     parts = []
     if any(k < 3 for k in given):
         parts.append(f"{np.linalg.norm(gap[:3]):.6g} m")
     if any(k >= 3 for k in given):
-        between = rotation_matrix(goal[3:]) @ rotation_matrix(here[3:]).T
+        between = rotation_matrix(goal[3:]) @ rotation_matrix(reached[3:]).T
         full = np.isfinite(goal[3:]).all()
         angle = np.linalg.norm(rotation_vector(between) if full else gap[3:])
         parts.append(f"{angle:.6g} rad")
-    stop = ", ".join(f"{POSE[k]}={here[k]:.6g}" for k in given)
+    stop = ", ".join(f"{POSE[k]}={reached[k]:.6g}" for k in given)
     return (
         f"pose {asked} cannot be reached: on the straight line from home the platform "
         f"stops at {stop}, {' and '.join(parts)} short; {NOT_CLOSED}"

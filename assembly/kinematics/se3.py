@@ -1,4 +1,4 @@
-r"""Finite motions on SE(3): exponential, logarithm, and how they change.
+r"""Finite motions on SE(3): exponential, logarithm, and their derivatives.
 
 A constant screw that acts for unit time makes the finite motion ``exp(s)``; its axes
 are those of the frame it starts from.  All functions work on batches.
@@ -64,9 +64,9 @@ def logarithm(T: ArrayLike) -> NDArray:
 
 
 def inverse(T: NDArray) -> NDArray:
-    """(..., 4, 4) the motions back."""
-    back = np.swapaxes(T[..., :3, :3], -1, -2)
-    return transform(-(back @ T[..., :3, 3, None])[..., 0], back)
+    """(..., 4, 4) the inverse motions."""
+    R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
+    return transform(-(R_inverse @ T[..., :3, 3, None])[..., 0], R_inverse)
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
@@ -77,7 +77,7 @@ def turn_jacobian(turn: ArrayLike) -> NDArray:
 
 
 def left_jacobian(screw: ArrayLike) -> NDArray:
-    """Small motion, in the axes before, that a change of a screw makes.
+    """Small motion, in the axes before the motion, per change of a screw.
 
     Args:
         screw: (..., 6) [rad, m].
@@ -126,8 +126,8 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
             powers[n - 1 - k] / math.factorial(n + 1)
             for n in range(k + 2, _ORDERS + 1)
         )  # fmt: skip
-        pulled = (np.swapaxes(powers[k], -1, -2) @ w)[..., 0]
-        Z = Z + bracket_form(pulled) @ rest
+        on_power = (np.swapaxes(powers[k], -1, -2) @ w)[..., 0]
+        Z = Z + bracket_form(on_power) @ rest
     return (Z + np.swapaxes(Z, -1, -2)) / 2
 
 

@@ -1,7 +1,7 @@
-"""Legs and loops must meet: the assembly constraints, linear in the small screws.
+"""The assembly constraints, linear in the small screws.
 
 Eqs (8) and (16)-(20) for any tree with closures: the screws along the two chains that
-meet at a closure must add up to the same platform-side motion,
+meet at a closure must add up to the same motion,
 
     sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0,
 
@@ -26,7 +26,12 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
-from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.clearance import (
+    CONES,
+    Compliant,
+    clearance_bounds,
+    scales_with_margin,
+)
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.links import compliance_factor, joint_compliances, link_compliances
 from assembly.model.robot import Robot
@@ -36,7 +41,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """What may move in a robot, beside its drives: columns of small screws.
+    """All that may move in a robot beside its drives, as columns of small screws.
 
     Attributes:
         robot: of n frames.
@@ -62,31 +67,31 @@ class VirtualJoints:
 
 
 def virtual_joints(
-    robot: Robot, compliant: str = "elastic",
+    robot: Robot, compliant: Compliant = "elastic",
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Columns of everything that may move.
+    """Columns of all that may move.
 
     Args:
         robot: of n frames.
         compliant: what passive joints with stiffness do: ``"elastic"``, all springs
-            act; ``"hinged"``, they do but for the one about (or along) the joint's own
-            z, which is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and
-            the own z is locked or free: the two readings of problem (21).
+            act; ``"hinged"``, all but the one about (or along) the joint's own z, which
+            is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and the own
+            z is locked or free: the two readings of problem (21).
         bounded_motion: keep the bounds of passive joints' own motion, of all or of
-            these frames.  They are large and almost never reached, so they are left
-            out first and checked after.
+            these frames.  They are large and almost never active, so they are left
+            out first and checked afterwards.
 
     Returns:
         The columns.
     """
     if isinstance(bounded_motion, bool):
         bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
-    return _virtual_joints(_Parts(_parts(robot), robot), compliant, bounded_motion)
+    return _virtual_joints(_CacheKey(_parts(robot), robot), compliant, bounded_motion)
 
 
 @dataclass(frozen=True)
-class _Parts:
+class _CacheKey:
     """Robots that differ in errors and masses alone have the same virtual joints."""
 
     parts: tuple
@@ -107,29 +112,35 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    case: _Parts, compliant: str, bounded_motion: frozenset[int]
+    key: _CacheKey, compliant: Compliant, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
     """The columns, once for all robots of the same parts."""
-    robot = case.robot
-    turns = compliant in {"free", "hinged"}
-    bounds = clearance_bounds(robot, "free" if turns else "elastic")
-    play = scales_with_margin(robot)
+    robot = key.robot
+    bounds = clearance_bounds(robot, compliant)
+    scaled = scales_with_margin(robot)
     left_out = [i not in bounded_motion for i in range(len(bounds))]
     bounds = np.where(
-        np.array(left_out)[:, None] & ~play & (bounds > 0), np.inf, bounds
+        np.array(left_out)[:, None] & ~scaled & (bounds > 0), np.inf, bounds
     )
-    links = hinges = np.zeros((0, 6, 6))
+    links = joints = np.zeros((0, 6, 6))
     if compliant in {"elastic", "hinged"}:
-        links, hinges = link_compliances(robot), joint_compliances(robot)
+        links, joints = link_compliances(robot), joint_compliances(robot)
     if compliant == "hinged":
-        for C, frame in zip(hinges, robot.frames, strict=True):
+        for C, frame in zip(joints, robot.frames, strict=True):
             if frame.compliant:
                 C[frame.own_axis] = C[:, frame.own_axis] = 0.0
-    elastic = _elastic(links, hinges, len(robot.frames))
+    elastic, is_link = _elastic(links, joints, len(robot.frames))
+    cones, group, cone_scaled = _cones(bounds, scaled)
     return VirtualJoints(
-        robot, *elastic, *_cones(bounds, play),
-        _free(bounds), bounded_motion,
-    )  # fmt: skip
+        robot=robot,
+        elastic=elastic,
+        links=is_link,
+        cones=cones,
+        group=group,
+        scaled=cone_scaled,
+        free=_free(bounds),
+        bounded_motion=bounded_motion,
+    )
 
 
 def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
@@ -145,7 +156,7 @@ def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDAr
     return np.hstack(columns), np.array(is_link, dtype=bool)
 
 
-def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Columns of the bounded clearances, their group and whether they scale."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
@@ -154,7 +165,7 @@ def _cones(bounds: NDArray, play: NDArray) -> tuple[NDArray, NDArray, NDArray]:
             rows.append(6 * i + row)
             sizes.append(bounds[i, cone])
             group.append(count)
-            scaled.append(play[i, cone])
+            scaled.append(scales[i, cone])
         count += 1
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = sizes
@@ -194,7 +205,7 @@ class Linearisation:
 
     @cached_property
     def misfit(self) -> NDArray:
-        """(6 closures,) what the geometric errors leave open, scaled."""
+        """(6 closures,) closure error that the geometric errors cause, scaled."""
         return self.rows @ self.posture.robot.errors.ravel()
 
 
@@ -211,9 +222,9 @@ def linearise(posture: Posture) -> Linearisation:
         BadInput: a geometric error is beyond 1e6 rad or m.
     """
     robot = posture.robot
-    wrong = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
-    if wrong.any():
-        frame = robot.frames[int(np.argmax(wrong))]
+    too_large = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
+    if too_large.any():
+        frame = robot.frames[int(np.argmax(too_large))]
         raise BadInput(
             f"{robot.name}: frame {quoted(frame.name)}.geometric_error: found "
             f"{np.abs(frame.geometric_error).max():g}, expected numbers of size at "
@@ -227,10 +238,10 @@ def linearise(posture: Posture) -> Linearisation:
     platform = np.swapaxes(posture.paths * on_path[:, None, None], 0, 1)
     count = len(robot.frames)
     return Linearisation(
-        posture,
-        rows.reshape(6 * len(robot.closures), 6 * count),
-        platform.reshape(6, 6 * count),
-        size,
+        posture=posture,
+        rows=rows.reshape(6 * len(robot.closures), 6 * count),
+        platform=platform.reshape(6, 6 * count),
+        size=size,
     )
 
 

@@ -1,7 +1,7 @@
-"""All the pose errors the platform can have, as a solid to draw and to ask.
+"""The convex set of the pose errors that the platform can have.
 
-The set is convex; it is found from inside, by the points that support it in many
-directions, and from outside, by the heights there.
+It is approximated from inside, by the points that support it in many directions, and
+from outside, by the heights of its support function there.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from assembly.linear.reach import Reach
+from assembly.linear.reach import ReachableSet
 from forcefit.inputs.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
@@ -22,9 +22,9 @@ class ErrorBody:
 
     Attributes:
         part: ``"rotation"`` or ``"translation"``.
-        points: (k, 3) [rad or m] of the set, base axes; the corners of an inner body.
-        faces: (m, 3) rows of ``points``; none where the body is flat.
-        directions: (k, 3) unit vectors looked in.
+        points: (k, 3) [rad or m] of the set, base axes; vertices of the inner polytope.
+        faces: (m, 3) rows of ``points``; none where the set is flat.
+        directions: (k, 3) unit vectors.
         heights: (k,) [rad or m] certified largest component along each.
     """
 
@@ -38,7 +38,7 @@ class ErrorBody:
 
     @property
     def slack(self) -> float:
-        """[rad or m] by how much the outer body exceeds the inner in any direction."""
+        """[rad or m] most by which the outer polytope exceeds the inner."""
         inner = (self.points @ self.directions.T).max(axis=0)
         return float(np.max(self.heights - inner))
 
@@ -47,16 +47,16 @@ class ErrorBody:
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
 
 
-def error_body(reach: Reach, part: str, count: int = 200) -> ErrorBody:
+def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:
     """The set of errors, from its support functions.
 
     Args:
-        reach: of :func:`assembly.linear.reach.reachable_screws`.
+        reachable: of :func:`assembly.linear.reach.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
-        count: directions to look in, evenly spread.
+        count: number of directions, evenly spread.
 
     Returns:
-        The body between its inner and outer approximation.
+        The set between its inner and outer approximation.
 
     Raises:
         ValueError: the part is neither, or has no bound.
@@ -64,13 +64,13 @@ def error_body(reach: Reach, part: str, count: int = 200) -> ErrorBody:
     """
     if part not in PARTS:
         raise ValueError(f"part is {part!r}, expected 'rotation' or 'translation'")
-    if reach.unbounded(PARTS[part].start):
+    if reachable.unbounded(PARTS[part].start):
         raise ValueError(f"the platform moves freely: its {part} has no bound")
     directions = even_directions(count)
     weights = np.eye(6)[PARTS[part]]
-    found = [reach.support(d @ weights) for d in directions]
-    points = np.array([one.screw[PARTS[part]] for one in found])
-    heights = np.array([one.height for one in found])
+    supports = [reachable.support(d @ weights) for d in directions]
+    points = np.array([support.screw[PARTS[part]] for support in supports])
+    heights = np.array([support.height for support in supports])
     return ErrorBody(part, points, _faces(points), directions, heights)
 
 

@@ -1,13 +1,13 @@
-"""What pushes on a robot: the load on its platform, loads on its bodies, gravity.
+"""Loads on a robot: on its platform, on its bodies, and weights.
 
 A dead load does work on every small screw between it and the base.  A load on the body
 of frame j acts before j's joint: the body's own error and deformation count, the
-joint's play and spring do not.  A load on what j's joint carries acts after it.
+joint's clearance and spring do not.  A load on what j's joint carries acts after it.
 
 The weight of a beam is spread over its length.  Its equivalent at the two ends is half
 the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
-then sags and turns as under the spread load (an exact statement for its ends; between
-them the beam sags a little more).
+then deflects and turns as under the distributed load (exactly at the ends; between them
+the beam deflects a little more).
 
 Sources:
     Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
@@ -26,16 +26,18 @@ from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map
 
-LARGEST = 1e60  # [N m, N] weights of the largest masses at the largest gravity included
+_LARGEST_LOAD = (
+    1e60  # [N m, N] weights of the largest masses at the largest gravity included
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Forces:
-    """Loads as they act on the small screws of every frame, in its axes.
+class FrameLoads:
+    """Loads as wrenches on the small screws of every frame, in its axes.
 
     Attributes:
         body: (..., 6n) [N m, N] on errors and deformations of bodies.
-        joint: (..., 6n) [N m, N] on play, springs and motion of joints.
+        joint: (..., 6n) [N m, N] on clearances, springs and motions of joints.
     """
 
     body: NDArray
@@ -45,13 +47,13 @@ class Forces:
         return bool(np.any(self.body) or np.any(self.joint))
 
 
-def forces_on(
+def loads_on_frames(
     posture: Posture,
     load: ArrayLike | None = None,
     bodies: ArrayLike | None = None,
     carried: ArrayLike | None = None,
-) -> Forces:
-    """Forces on all small screws of a robot.
+) -> FrameLoads:
+    """Loads on all small screws of a robot.
 
     Args:
         posture: where it stands, of n frames; or many postures, its transforms (..., n,
@@ -61,13 +63,13 @@ def forces_on(
         carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
 
     Returns:
-        The forces; all zero where nothing is given.
+        The loads; all zero where nothing is given.
 
     Raises:
         BadInput: a number is not finite, or so large that its square overflows.
     """
     for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
-        _check(whose, given, LARGEST, "N m, N")
+        _check(whose, given, _LARGEST_LOAD, "N m, N")
     robot, T = posture.robot, posture.transforms
     on_body, after = np.zeros((2, *T.shape[:-2], 6))
     if bodies is not None:
@@ -84,7 +86,7 @@ def forces_on(
     joint = below @ (own + after) + after
     paths = posture.paths
     flat = (*T.shape[:-3], 6 * len(robot.frames))
-    return Forces(
+    return FrameLoads(
         np.einsum("...ji,...j->...i", paths, joint + own).reshape(flat),
         np.einsum("...ji,...j->...i", paths, joint).reshape(flat),
     )
@@ -98,8 +100,8 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
         gravity: (..., 3) [m/s^2] base axes, such as (0, 0, -9.81).
 
     Returns:
-        ``bodies`` and ``carried`` (..., n, 6) of :func:`forces_on` [N m, N].  Links
-        given by a matrix, a mesh or a library have no weight of their own here.
+        ``bodies`` and ``carried`` (..., n, 6) [N m, N] of :func:`loads_on_frames`.
+        Links given by a matrix, a mesh or a library have no weight here.
 
     Raises:
         BadInput: gravity is not finite, or beyond 1e6 m/s^2.
@@ -129,32 +131,32 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
-def row_forces(postures: Posture, load: NDArray, gravity: NDArray) -> Forces:
-    """Forces of load and weight in many situations.
+def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
+    """Loads of a platform load and of weight, at one posture or at many.
 
     Args:
-        postures: R of them, in one.
-        load: (R, 6) [N m, N] on the platform at its origin, base axes.
-        gravity: (R, 3) [m/s^2] base axes.
+        postures: one, or R of them in one.
+        load: (6,) or (R, 6) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) or (R, 3) [m/s^2] base axes.
 
     Returns:
-        Forces (R, 6n) on all small screws.
+        Loads (6n,) or (R, 6n) on all small screws.
     """
     bodies = carried = None
     if gravity.any():
         bodies, carried = weights(postures, gravity)
-    return forces_on(postures, load, bodies, carried)
+    return loads_on_frames(postures, load, bodies, carried)
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
-    """Refuse numbers that no machine has and no double carries on."""
+    """Refuse numbers that are not finite or too large."""
     if given is None:
         return
     values = np.asarray(given, dtype=float)
-    wrong = ~(np.abs(values) <= largest)  # so that what is not a number is wrong
-    if wrong.any():
+    refused = ~(np.abs(values) <= largest)  # NaN is refused
+    if refused.any():
         raise BadInput(
-            f"{whose}: found {values[wrong].flat[0]:g}, expected finite numbers of "
+            f"{whose}: found {values[refused].flat[0]:g}, expected finite numbers of "
             f"size at most {largest:g} [{unit}]"
         )
 

@@ -1,4 +1,4 @@
-"""How freely the perfect robot moves: ranks of its closures."""
+"""Mobility and overconstraint of the perfect robot: ranks of its closures."""
 
 from dataclasses import dataclass
 

@@ -1,12 +1,12 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
 Springs and loaded clearances are the same in all of them (:mod:`assembly.linear.reach`,
-reading ``frozen``); clearances that nothing loads may be anywhere in their cones as
-long as the closures hold.  The nearest pose is a second-order cone programme again,
+reading ``frozen``); unloaded clearances may be anywhere in their cones as long as the
+closures hold.  The nearest pose is a second-order cone programme again,
 
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1,
 
-x the deviation at the solution u, X how it follows the clearances left free.
+x the deviation at the solution u, X its derivative by the unloaded clearances.
 
 Sources:
     Public format, exact reading 15: the pose of least energy and, among those, of
@@ -19,58 +19,65 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.linear.assembled import Assembly
+from assembly.linear.certificate import LARGEST_EXCESS, unproved
 from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import EXCESS, Assembly, solve_with
+from assembly.linear.energy import solve_with
 from assembly.linear.reach import loaded_cones
-from assembly.linear.reduction import NOISE, complement
+from assembly.linear.reduction import complement
+from assembly.linear.thresholds import NOISE, RANK, ROWS_RANK, rank_tolerance
 from assembly.model.clearance import has_bounded_motion
 from assembly.solvers.conic import into_cones, minimise_energy
 from stiffness.screws import skew
 
-_RANK = 1e-10
-_STILL = 1e-11  # [rad, m] a pose that moves less is settled
+_STILL = 1e-11  # [rad, m] a pose that moves less counts as fixed
 
 
 def nearest_pose(
-    answer: Assembly, offset: ArrayLike = (0.0, 0.0, 0.0)
+    assembly: Assembly, offset: ArrayLike = (0.0, 0.0, 0.0)
 ) -> tuple[Assembly, bool]:
     """The assembly of the same energy whose pose deviates least.
 
     Args:
-        answer: at least energy.
+        assembly: of least energy.
         offset: (3,) [m] from the platform's origin to the point whose deviation counts,
             base axes.
 
     Returns:
         The assembly, its deviation (rotation vector [rad] and shift of the point [m])
-        of least Euclidean norm; and whether play leaves the pose free.
+        of least Euclidean norm; and whether clearances leave the pose free.
 
     Raises:
         SolverFailed: the cone solver gave up.
     """
-    free = _free_play(answer, offset)
+    free = _free_clearances(assembly, offset)
     if free is None:
-        return answer, False
+        return assembly, False
     h = free.deviation - free.map @ free.start
     none = np.zeros(len(free.start))
     right = free.rows @ free.start
     least = minimise_energy(free.map, h, none, free.rows, right, free.group)
-    moved = _with_play(answer, free, least.clearances) if least.feasible else answer
-    if moved.clearance_excess() > EXCESS and not answer.joints.bounded_motion:
-        # the bound of a passive joint's own motion was left out, but it matters
-        robot = answer.posture.robot
+    moved = assembly
+    if least.feasible:
+        moved = _with_clearances(assembly, free, least.clearances)
+    exceeded = moved.clearance_excess() > LARGEST_EXCESS
+    if exceeded and not assembly.joints.bounded_motion:
+        # the bound of a passive joint's own motion was left out, but it is active
+        robot = assembly.posture.robot
         if has_bounded_motion(robot):
-            joints = virtual_joints(robot, bounded_motion=True)
-            kept = solve_with(answer.linearisation, joints, answer.load, answer.forces)
-            return nearest_pose(kept, offset)
-    if moved.unproved and not answer.unproved:
-        moved = answer
+            bounded = solve_with(
+                assembly.linearisation, virtual_joints(robot, bounded_motion=True),
+                assembly.load, assembly.frame_loads,
+            )  # fmt: skip
+            return nearest_pose(bounded, offset)
+    if unproved(moved) and not unproved(assembly):
+        moved = assembly
     return moved, _moves(free)
 
 
 @dataclass(frozen=True, eq=False)
-class _FreePlay:
-    """Clearances that carry nothing, and what the platform does with them.
+class _FreeClearances:
+    """Unloaded clearances, and how the platform follows them.
 
     Attributes:
         unloaded: (nu,) bool, which columns of the cones these k are.
@@ -89,54 +96,54 @@ class _FreePlay:
     group: NDArray
 
 
-def _free_play(answer: Assembly, offset: ArrayLike) -> _FreePlay | None:
+def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
     """What may still move at least energy; None if nothing may."""
-    joints, lin = answer.joints, answer.linearisation
-    unloaded = ~loaded_cones(answer, joints)
+    joints, lin = assembly.joints, assembly.linearisation
+    unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]
     if not columns.shape[1]:
         return None
     A_q, A_v = lin.rows @ joints.free, lin.rows @ columns
-    Z = complement(A_q, _RANK + 30.0 * answer.posture.mismatch)
+    Z = complement(A_q, rank_tolerance(assembly.posture.mismatch))
     _, S, Vt = np.linalg.svd(Z.T @ A_v, full_matrices=False)
-    noise = max(NOISE * np.abs(A_v).max(initial=0.0), 1e-9 * S.max(initial=0.0))
-    follow = np.linalg.lstsq(A_q, -A_v, rcond=_RANK)[0]
+    noise = max(NOISE * np.abs(A_v).max(initial=0.0), ROWS_RANK * S.max(initial=0.0))
+    follow = np.linalg.lstsq(A_q, -A_v, rcond=RANK)[0]
     at_point = np.eye(6)
     at_point[3:, :3] = -skew(np.asarray(offset, dtype=float))
     group = np.unique(joints.group[unloaded], return_inverse=True)[1]
-    return _FreePlay(
-        unloaded,
-        at_point @ answer.platform_screw,
-        at_point @ lin.platform @ (columns + joints.free @ follow),
-        Vt[: int(np.sum(S > noise))],
-        into_cones(answer.clearances[unloaded], group),
-        group,
+    return _FreeClearances(
+        unloaded=unloaded,
+        deviation=at_point @ assembly.platform_screw,
+        map=at_point @ lin.platform @ (columns + joints.free @ follow),
+        rows=Vt[: int(np.sum(S > noise))],
+        start=into_cones(assembly.clearances[unloaded], group),
+        group=group,
     )
 
 
-def _with_play(answer: Assembly, free: _FreePlay, v: NDArray) -> Assembly:
+def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
     """The assembly with other unloaded clearances, free motions following suit."""
-    joints, lin = answer.joints, answer.linearisation
-    u = answer.clearances.copy()
+    joints, lin = assembly.joints, assembly.linearisation
+    u = assembly.clearances.copy()
     u[free.unloaded] = v
-    moved = joints.cones @ u + joints.elastic @ answer.elastic
+    moved = joints.cones @ u + joints.elastic @ assembly.elastic
     right = -lin.misfit - lin.rows @ moved
-    q = np.linalg.lstsq(lin.rows @ joints.free, right, rcond=_RANK)[0]
-    return replace(answer, clearances=u, motions=q)
+    q = np.linalg.lstsq(lin.rows @ joints.free, right, rcond=RANK)[0]
+    return replace(assembly, clearances=u, motions=q)
 
 
-def _moves(free: _FreePlay) -> bool:
-    """Whether the closures leave the platform anywhere to go."""
-    left = free.map - free.map @ free.rows.T @ free.rows
-    U, S, _ = np.linalg.svd(left, full_matrices=False)
+def _moves(free: _FreeClearances) -> bool:
+    """Whether the closures leave the platform free to move."""
+    projected = free.map - free.map @ free.rows.T @ free.rows
+    U, S, _ = np.linalg.svd(projected, full_matrices=False)
     return any(sum(_heights(free, direction)) > _STILL for direction in U.T[S > _STILL])
 
 
-def _heights(free: _FreePlay, direction: NDArray) -> Iterator[float]:
+def _heights(free: _FreeClearances, direction: NDArray) -> Iterator[float]:
     """[rad, m] how far the platform goes both ways along a direction."""
-    pull = free.map.T @ direction
-    size = float(np.linalg.norm(pull))
-    none, right = np.zeros((0, len(pull))), free.rows @ free.start
-    for way in (pull / size, -pull / size):
-        found = minimise_energy(none, np.zeros(0), way, free.rows, right, free.group)
-        yield size * float(way @ (found.clearances - free.start))
+    gradient = free.map.T @ direction
+    size = float(np.linalg.norm(gradient))
+    none, right = np.zeros((0, len(gradient))), free.rows @ free.start
+    for d in (gradient / size, -gradient / size):
+        least = minimise_energy(none, np.zeros(0), d, free.rows, right, free.group)
+        yield size * float(d @ (least.clearances - free.start))

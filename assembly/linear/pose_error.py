@@ -1,12 +1,12 @@
-"""How far off the platform can be: problem (27) with certified bounds.
+"""The largest pose error of the platform: problem (27) with certified bounds.
 
-Printed as it is, (27) is degenerate: with the deformations frozen at the solution of
-(22), complementary slackness holds every loaded clearance where it is.  So there are
-three readings of what may still move:
+As printed, (27) is degenerate: with the deformations frozen at the solution of (22),
+complementary slackness fixes every loaded clearance.  So there are three readings of
+what may still move:
 
 ======== =================================================================
 frozen   all deformations stay; only unloaded clearances move (the paper)
-free     compliant joints also turn about their own axis: play inside zones
+free     compliant joints also turn freely about their own axis
 budget   everything that closes with at most (1 + eta) times the least energy
 ======== =================================================================
 
@@ -15,9 +15,8 @@ bounded each by itself: a tool on a bearing turns freely, and its point still ha
 largest error.
 
 The set of platform screws (:mod:`assembly.linear.reach`) is convex; its farthest one is
-bracketed by :mod:`assembly.solvers.farthest`, compiled.  What that solver cannot
-certify is asked of Clarabel.  Many postures at once are bounded by
-:func:`assembly.batch.many_pose_errors.bound_pose_errors`.
+bracketed by :mod:`assembly.solvers.farthest`, compiled, with Clarabel as its fallback.
+Many postures at once: :func:`assembly.batch.many_pose_errors.bound_pose_errors`.
 """
 
 from dataclasses import dataclass
@@ -25,8 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.energy import Assembly
-from assembly.linear.reach import Reach, reachable_screws
+from assembly.linear.assembled import Assembly
+from assembly.linear.certificate import unproved
+from assembly.linear.reach import ReachableSet, reachable_screws
 from forcefit.inputs.display import Figures, bracket, html_table, short_repr
 
 
@@ -41,7 +41,7 @@ class PoseError:
         rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
         translation_screw: (6,) [rad, m] attains that of the translation.
         cuts: support functions computed.
-        unproved: what of the answer of (22), or of what was asked of the bounds, is
+        unproved: what of the solution of (22), or of the width asked of the bounds, is
             not proved; empty if nothing.
     """
 
@@ -57,16 +57,16 @@ class PoseError:
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly error`` prints of it."""
-        found = {
+        figures = {
             "reading": self.reading,
             "rotation": bracket(self.rotation_error, "mrad"),
             "translation": bracket(self.translation_error, "mm"),
         }
-        return found | ({"not proved": self.unproved} if self.unproved else {})
+        return figures | ({"not proved": self.unproved} if self.unproved else {})
 
 
 def bound_pose_error(
-    answer: Assembly,
+    assembly: Assembly,
     reading: str = "frozen",
     energy_budget: float = 0.05,
     tolerance_rotation: float = 1e-6,
@@ -76,12 +76,12 @@ def bound_pose_error(
     """Bracket the largest rotation and translation error of the platform.
 
     Args:
-        answer: the assembly at least energy, without a load in reading ``budget``.
+        assembly: of least energy, without a load in reading ``budget``.
         reading: see the head of this module.
         energy_budget: eta of reading ``budget``.
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point asked about.
+        offset: (3,) [m] from the platform's origin to the point whose error is meant.
 
     Returns:
         Bounds; wider than asked only if 400 supports did not suffice, which
@@ -92,19 +92,25 @@ def bound_pose_error(
         ValueError: the reading is unknown, or ``budget`` is asked under a load.
         SolverFailed: the cone solver gave up.
     """
-    reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
-    rotation = _farthest(reach, 0, tolerance_rotation)
-    translation = _farthest(reach, 3, tolerance_translation)
+    reachable = reachable_screws(assembly, reading, energy_budget).at_point(offset)
+    rotation, rotation_screw, supports = _farthest(reachable, 0, tolerance_rotation)
+    translation, translation_screw, more = _farthest(
+        reachable, 3, tolerance_translation
+    )
+    open_ = (
+        unproved(assembly),
+        _too_wide("rotation", rotation, tolerance_rotation, "rad"),
+        _too_wide("translation", translation, tolerance_translation, "m"),
+    )
     return PoseError(
-        reading,
-        rotation[0], translation[0], rotation[1], translation[1],
-        rotation[2] + translation[2],
-        "; ".join(filter(None, (
-            answer.unproved,
-            _too_wide("rotation", rotation[0], tolerance_rotation, "rad"),
-            _too_wide("translation", translation[0], tolerance_translation, "m"),
-        ))),
-    )  # fmt: skip
+        reading=reading,
+        rotation_error=rotation,
+        translation_error=translation,
+        rotation_screw=rotation_screw,
+        translation_screw=translation_screw,
+        cuts=supports + more,
+        unproved="; ".join(filter(None, open_)),
+    )
 
 
 def _too_wide(
@@ -112,7 +118,7 @@ def _too_wide(
 ) -> str:
     """That bounds are farther apart than asked, if they are."""
     low, high = bounds
-    # no bound at all is an answer: the platform can move without bound
+    # both infinite: the platform can move without bound
     if high - low <= tolerance or low == high:
         return ""
     return (
@@ -122,20 +128,18 @@ def _too_wide(
 
 
 def _farthest(
-    reach: Reach, part: int, tolerance: float
+    reachable: ReachableSet, part: int, tolerance: float
 ) -> tuple[tuple[float, float], NDArray, int]:
     """Bounds of the largest size of half a screw, a screw, and the supports it took."""
-    from assembly.solvers.cone_solvers import cone_solvers
-    from assembly.solvers.farthest import NEEDED, advance, begin, choose, learn
-    from assembly.solvers.polytope import empty_polytope
+    from assembly.solvers.farthest import NEEDED, begin_search, search_on
 
-    if reach.unbounded(part):
-        return (np.inf, np.inf), reach.centre, 0
-    body = reach.body
-    search = begin(body, part, tolerance, empty_polytope())
-    while advance(cone_solvers(), body, search) == NEEDED:
-        found = reach.support(search.direction @ np.eye(6)[part : part + 3])
-        learn(body, search, found.height, found.screw, found.pulls)
-        choose(search)
+    if reachable.unbounded(part):
+        return (np.inf, np.inf), reachable.centre, 0
+    body = reachable.body
+    search, nothing = begin_search(body, part, tolerance), np.zeros(0)
+    state = search_on(body, search, 0.0, nothing, nothing)
+    while state == NEEDED:
+        support = reachable.support(search.direction @ np.eye(6)[part : part + 3])
+        state = search_on(body, search, support.height, support.screw, support.gradient)
     low, high = search.bounds.tolist()
     return (low, high), search.best, int(search.counts[1])

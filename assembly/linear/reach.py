@@ -7,24 +7,37 @@ Clearances v move within their cones, free motions q follow the closures,
 A free motion that no closure holds either leaves the platform where it is or makes
 some of its components unbounded; those of the other half stay as they are.
 
-Bounds of passive joints' own motion count.  Most are ranges no play comes near, and a
-cone of 10 rad beside ones of 1e-5 costs digits; so each is left out until it is seen
-that it could be passed: dq = -A_q^+ A_v dv is largest at a sum over the cones.
+Bounds of passive joints' own motion count.  Most are ranges that clearances do not come
+near, and a cone of 10 rad beside ones of 1e-5 costs digits; so each is left out until a
+bound of the motion, the sum over the cones of |A_q^+ A_v|, passes it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
+from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.energy import Assembly, without_own_springs
-from assembly.linear.reduction import NOISE, complement
-from assembly.model.clearance import clearance_bounds, scales_with_margin
+from assembly.linear.energy import without_own_springs
+from assembly.linear.reduction import complement
+from assembly.linear.thresholds import (
+    MISMATCH_FACTOR,
+    NOISE,
+    RANK,
+    ROWS_RANK,
+    UNBOUNDED,
+)
+from assembly.model.clearance import (
+    Compliant,
+    clearance_bounds,
+    component_bounds,
+    scales_with_margin,
+)
 from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
@@ -33,8 +46,6 @@ if TYPE_CHECKING:
     from assembly.solvers.support import Body
 
 READINGS = ("frozen", "free", "budget")
-_RANK = 1e-10
-_UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion nothing holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,20 +55,36 @@ class Support:
     Attributes:
         height: certified upper bound of direction . screw over the set.
         screw: (6,) [rad, m] of the set, (nearly) attains it.
-        pulls: (nv,) what pulls each cone towards the direction, closures included.
+        gradient: (nv,) of the component by v, less what the closures' multipliers take.
     """
 
     height: float
     screw: NDArray
-    pulls: NDArray
+    gradient: NDArray
+
+
+class MovingCones(NamedTuple):
+    """Unit cones that move, nv columns in all.
+
+    Attributes:
+        closures: (6 closures, nv) columns in the scaled closures.
+        platform: (6, nv) [rad, m] columns at the platform.
+        start: (nv,) where they start, within the cones.
+        group: (nv,) cone of each column.
+    """
+
+    closures: NDArray
+    platform: NDArray
+    start: NDArray
+    group: NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class ReachableSet:
     """Platform screws that remain possible: centre + map @ (v - start).
 
     v runs over unit cones with rows @ (v - start) = 0: the homogeneous form, in which
-    an error of the solution of (22) opens no false play.
+    an error of the solution of (22) adds no motion.
 
     Attributes:
         centre: (6,) [rad, m] the screw at ``start``.
@@ -65,8 +92,8 @@ class Reach:
         rows: (p, nv) orthonormal rows of the closures.
         start: (nv,) v at the solution of (22), within its cones.
         group: (nv,) cone of each column.
-        drift: (6, k) [rad, m] screws of the platform, for a unit of motions that
-            nothing holds and nothing bounds.
+        free: (6, k) [rad, m] screws of the platform, for a unit of motions that nothing
+            resists and nothing bounds.
     """
 
     centre: NDArray
@@ -74,16 +101,16 @@ class Reach:
     rows: NDArray
     start: NDArray
     group: NDArray
-    drift: NDArray = field(default_factory=lambda: np.zeros((6, 0)))
+    free: NDArray = field(default_factory=lambda: np.zeros((6, 0)))
 
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
         """Whether the rotation (part 0), or the translation (3), has no bound."""
-        drift = self.drift[part : part + 3]
-        return bool(np.abs(drift).max(initial=0.0) > _UNBOUNDED)
+        free = self.free[part : part + 3]
+        return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
-    def at_point(self, offset: ArrayLike) -> "Reach":
+    def at_point(self, offset: ArrayLike) -> "ReachableSet":
         """The same set for another point of the platform.
 
         Args:
@@ -96,7 +123,7 @@ class Reach:
         move[3:, :3] = -skew(offset)
         return replace(
             self, centre=move @ self.centre, map=move @ self.map,
-            drift=move @ self.drift,
+            free=move @ self.free,
         )  # fmt: skip
 
     def support(self, direction: ArrayLike) -> "Support":
@@ -107,31 +134,31 @@ class Reach:
 
         Returns:
             The height with the point that attains it; infinite where the platform
-            drifts that way.
+            moves freely in that direction.
 
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.solvers.support import screw_at, within
+        from assembly.solvers.support import screw_near
 
         direction = np.asarray(direction, dtype=float)
-        pull = self.map.T @ direction
-        along = np.abs(direction @ self.drift).max(initial=0.0)
-        if along > _UNBOUNDED * np.abs(direction).max(initial=0.0):
-            return Support(np.inf, self.centre, pull)
+        gradient = self.map.T @ direction
+        along = np.abs(direction @ self.free).max(initial=0.0)
+        if along > UNBOUNDED * np.abs(direction).max(initial=0.0):
+            return Support(np.inf, self.centre, gradient)
         at_centre = float(direction @ self.centre)
-        size = float(np.linalg.norm(pull))
+        size = float(np.linalg.norm(gradient))
         if size == 0.0:
-            return Support(at_centre, self.centre, pull)
-        none, right = np.zeros((0, len(pull))), self.rows @ self.start
+            return Support(at_centre, self.centre, gradient)
+        none, right = np.zeros((0, len(gradient))), self.rows @ self.start
         least = minimise_energy(
-            none, np.zeros(0), pull / size, self.rows, right, self.group
+            none, np.zeros(0), gradient / size, self.rows, right, self.group
         )
-        height = at_centre - least.bound * size - float(pull @ self.start)
+        height = at_centre - least.bound * size - float(gradient @ self.start)
         body = self.body
-        screw = screw_at(body, within(body, least.clearances))
-        pulls = pull + self.rows.T @ least.rigid_multipliers * size
-        return Support(max(height, float(direction @ screw)), screw, pulls)
+        screw = screw_near(body, least.clearances)
+        reduced = gradient + self.rows.T @ least.rigid_multipliers * size
+        return Support(max(height, float(direction @ screw)), screw, reduced)
 
     @property
     def body(self) -> "Body":
@@ -147,12 +174,12 @@ class Reach:
 
 
 def reachable_screws(
-    answer: Assembly, reading: str, energy_budget: float = 0.05
-) -> Reach:
+    assembly: Assembly, reading: str, energy_budget: float = 0.05
+) -> ReachableSet:
     """The set of platform screws that a reading of (27) leaves possible.
 
     Args:
-        answer: the assembly at least energy.
+        assembly: of least energy.
         reading: ``"frozen"``, ``"free"`` or ``"budget"``.
         energy_budget: eta of reading ``"budget"``, >= 0.
 
@@ -164,123 +191,123 @@ def reachable_screws(
     """
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
-    if reading == "budget" and (answer.forces or energy_budget < 0):
+    if reading == "budget" and (assembly.frame_loads or energy_budget < 0):
         raise ValueError("the budget reading needs no load and a budget >= 0")
-    mode = "free" if reading == "free" else "elastic"
-    holder = answer
+    compliant: Compliant = "free" if reading == "free" else "elastic"
+    loaded = assembly
     if reading == "free":
-        # turning about the own axis costs nothing here: only what stays loaded
-        # without those soft springs is held
-        holder = without_own_springs(answer)
+        # turning about the own axis costs nothing here: a clearance is held only if it
+        # stays loaded without those soft springs
+        loaded = without_own_springs(assembly)
 
-    def play(joints: VirtualJoints) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    def moving(joints: VirtualJoints) -> MovingCones:
         held = np.zeros(joints.cones.shape[1], dtype=bool)
         if reading != "budget":
-            held = loaded_cones(holder, joints)
+            held = loaded_cones(loaded, joints)
         columns, group = joints.cones[:, ~held], joints.group[~held]
-        start = clearances_in(answer, joints)[~held]
+        start = clearances_in(assembly, joints)[~held]
         if reading == "budget":
-            radius = np.sqrt(2 * (1 + energy_budget) * answer.stored)
+            radius = np.sqrt(2 * (1 + energy_budget) * assembly.stored)
             columns = np.hstack([columns, joints.elastic * radius])
-            spring = answer.elastic / max(radius, 1e-300)
+            spring = assembly.elastic / max(radius, 1e-300)
             start = np.concatenate([start, spring])
             last = group.max(initial=-1) + 1
             group = np.concatenate([group, np.full(len(spring), last)])
-        lin = answer.linearisation
-        return lin.rows @ columns, lin.platform @ columns, start, group
+        lin = assembly.linearisation
+        return MovingCones(lin.rows @ columns, lin.platform @ columns, start, group)
 
-    return within_bounds(answer, mode, holder.joints.bounded_motion, play)
+    return within_bounds(assembly, compliant, loaded.joints.bounded_motion, moving)
 
 
 def within_bounds(
-    answer: Assembly, mode: str, kept: frozenset[int],
-    play: Callable[[VirtualJoints], tuple[NDArray, NDArray, NDArray, NDArray]],
-) -> Reach:  # fmt: skip
-    """Platform screws as cones move about an answer and free motions follow.
+    assembly: Assembly, compliant: Compliant, kept: frozenset[int],
+    moving: Callable[[VirtualJoints], MovingCones],
+) -> ReachableSet:  # fmt: skip
+    """Platform screws as cones move about an assembly and free motions follow.
 
     Args:
-        answer: where they start.
-        mode: of compliant joints, see :func:`assembly.linear.closure.virtual_joints`.
+        assembly: where they start.
+        compliant: see :func:`assembly.linear.closure.virtual_joints`.
         kept: frames whose bound of the joint's own motion is certain to count.
-        play: unit cones of given virtual joints: their columns in the closures (6
-            closures, nv) and at the platform (6, nv), start and groups (nv,).
+        moving: the cones that move, of given virtual joints.
 
     Returns:
         The set, within all bounds.
     """
-    kept = kept | answer.joints.bounded_motion
+    kept = kept | assembly.joints.bounded_motion
     while True:
-        joints = virtual_joints(answer.posture.robot, mode, bounded_motion=kept)
-        A_v, P_v, start, group = play(joints)
-        group = np.unique(group, return_inverse=True)[1]
-        moving = _Moving(answer, joints, A_v, P_v, start, group)
-        if not moving.passed:
-            return moving.reach
-        kept = kept | moving.passed
+        joints = virtual_joints(assembly.posture.robot, compliant, bounded_motion=kept)
+        cones = moving(joints)
+        group = np.unique(cones.group, return_inverse=True)[1]
+        motion = _Motion(assembly, joints, cones._replace(group=group))
+        if not motion.passed:
+            return motion.reachable
+        kept = kept | motion.passed
 
 
 @dataclass(frozen=True, eq=False)
-class _Moving:
+class _Motion:
     """Cones that move, and the free motions that follow them."""
 
-    answer: Assembly
+    assembly: Assembly
     joints: VirtualJoints
-    A_v: NDArray
-    P_v: NDArray
-    start: NDArray
-    group: NDArray
+    cones: MovingCones
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """(nq, m) free motions for what they have to close; (6, nq) the drift."""
-        lin = self.answer.linearisation
+        """(nq, m) pseudoinverse of A_q; (6, nq) motions that nothing resists."""
+        lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
-        back = np.linalg.pinv(A_q, rcond=self._rounding(_RANK))
-        drift = P_q - (P_q @ back) @ A_q
-        large = np.abs(drift).max(axis=0) > self._rounding(_UNBOUNDED)
-        return back, np.where(large, drift, 0.0)
+        inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
+        free = P_q - (P_q @ inverse) @ A_q
+        large = np.abs(free).max(axis=0) > self._with_mismatch(UNBOUNDED)
+        return inverse, np.where(large, free, 0.0)
 
-    def _rounding(self, least: float) -> float:
-        """[-] what counts as zero beside what is left of the nominal closures."""
-        return least + 30.0 * self.answer.posture.mismatch
+    def _with_mismatch(self, threshold: float) -> float:
+        """[-] a threshold plus the rounding of the nominal closures."""
+        return threshold + MISMATCH_FACTOR * self.assembly.posture.mismatch
 
     @cached_property
     def passed(self) -> frozenset[int]:
         """Frames whose own motion may pass a bound that is left out here."""
-        back, drift = self._follow
+        inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # what has no spring here has its bound in every reading
-        limit = clearance_bounds(self.joints.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()[row]
-        own = scales_with_margin(self.joints.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()[row]
-        limited = np.isfinite(limit) & ~own
+        # a joint without a spring here has its bound in every reading
+        robot, group = self.joints.robot, self.cones.group
+        limit = component_bounds(clearance_bounds(robot)).ravel()[row]
+        clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
+        limited = np.isfinite(limit) & ~clearance
         if not limited.any():
             return frozenset()
-        step = -back @ self.A_v
-        middle = self.answer.clearance_screws.ravel()[row] - step @ self.start
+        step = -inverse @ self.cones.closures
+        middle = self.assembly.clearance_screws.ravel()[row] - step @ self.cones.start
         most = np.abs(middle)
-        for c in range(self.group.max(initial=-1) + 1):
-            most = most + np.linalg.norm(step[:, self.group == c], axis=1)
-        # a motion that nothing but its bound holds goes up to it
-        passing = limited & ((most > limit) | drift.any(axis=0))
+        for c in range(group.max(initial=-1) + 1):
+            most = most + np.linalg.norm(step[:, group == c], axis=1)
+        # a motion that nothing but its bound resists goes up to it
+        passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
     @property
-    def reach(self) -> Reach:
+    def reachable(self) -> ReachableSet:
         """The set of platform screws."""
-        lin = self.answer.linearisation
-        back, drift = self._follow
-        Z = complement(lin.rows @ self.joints.free, self._rounding(_RANK))
-        rows = _rows(Z.T @ self.A_v, NOISE * np.abs(self.A_v).max(initial=0.0))
-        follow = lin.platform @ self.joints.free @ back
-        return Reach(
-            self.answer.platform_screw, self.P_v - follow @ self.A_v, rows, self.start,
-            self.group, drift,
-        )  # fmt: skip
+        lin, A_v = self.assembly.linearisation, self.cones.closures
+        inverse, free = self._follow
+        Z = complement(lin.rows @ self.joints.free, self._with_mismatch(RANK))
+        follow = lin.platform @ self.joints.free @ inverse
+        return ReachableSet(
+            centre=self.assembly.platform_screw,
+            map=self.cones.platform - follow @ A_v,
+            rows=_rows(Z.T @ A_v, NOISE * np.abs(A_v).max(initial=0.0)),
+            start=self.cones.start,
+            group=self.cones.group,
+            free=free,
+        )
 
 
-def clearances_in(answer: Assembly, joints: VirtualJoints) -> NDArray:
-    """(nu,) an answer's clearances in the unit cones of other virtual joints."""
-    screws = answer.clearance_screws.ravel()
+def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
+    """(nu,) an assembly's clearances in the unit cones of other virtual joints."""
+    screws = assembly.clearance_screws.ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)
 
@@ -288,24 +315,24 @@ def clearances_in(answer: Assembly, joints: VirtualJoints) -> NDArray:
 def _rows(A: NDArray, noise: float) -> NDArray:
     """Orthonormal rows spanning those of A, but for rounding."""
     _, S, Vt = svd(A, full_matrices=False)
-    return Vt[: int(np.sum(S > max(noise, 1e-9 * S.max(initial=0.0))))]
+    return Vt[: int(np.sum(S > max(noise, ROWS_RANK * S.max(initial=0.0))))]
 
 
-def loaded_cones(answer: Assembly, joints: VirtualJoints) -> NDArray:
-    """Which clearances press on their bound, by strict complementarity.
+def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
+    """Clearances whose constraint is active, by strict complementarity.
 
     Args:
-        answer: the assembly at least energy.
-        joints: whose columns are asked about.
+        assembly: of least energy.
+        joints: whose columns are meant.
 
     Returns:
         (nu,) bool, the same for all columns of a cone.
     """
-    wrenches = answer.joint_wrenches.ravel()
-    push = cone_sizes(joints.cones.T @ wrenches, joints.group)
-    screws = answer.clearance_screws.ravel()
+    wrenches = assembly.joint_wrenches.ravel()
+    load = cone_sizes(joints.cones.T @ wrenches, joints.group)
+    screws = assembly.clearance_screws.ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # push times slack is about the solver's gap: one of the two is nearly zero
-    scale = max(answer.energy, 1e-9 * answer.energy_without_play, 1e-300)
-    return ((push > scale * slack) & (push > 1e-9 * scale))[joints.group]
+    # load times slack is about the solver's gap: one of the two is nearly zero
+    scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
+    return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -1,18 +1,19 @@
-"""Problem (22) made small: free motions and springs eliminated exactly.
+"""Problem (22) reduced: free motions and springs eliminated exactly.
 
 With the columns of :mod:`assembly.linear.closure` the assembly constraints read
 
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
 Free motions q are projected out (rows orthogonal to A_q), then the springs y: the
-remaining rows split into those some spring can take up and those none can.  Left over
-is a problem in the clearances alone,
+remaining rows split into those that springs enter and those that none does.  What
+remains is a problem in the clearances alone,
 
     minimise  |G u + h|^2 / 2 - d.u      subject to  H u = k,  |u_k| <= 1,
 
-where G u + h is the springs' scaled deformation beyond the load's.  Springs enter by
-the square roots of their compliances, and ranks are decided on those: summing the
-compliances themselves, 1 and 1e-8 rad/(N m), would lose the stiff ones.
+where G u + h is the scaled deformation of the springs (their strain) beyond that of the
+loads alone.  Springs enter by the square roots of their compliances, and ranks are
+decided on those: in a sum of compliances, such as 1 and 1e-8 rad/(N m), the stiff ones
+would be lost to rounding.
 
 Sources:
     Golub, Van Loan, Matrix Computations, 4th ed., sections 5.4-5.5 (rank-revealing
@@ -26,12 +27,9 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, svd
 
 from assembly.linear.closure import Linearisation, VirtualJoints
-from assembly.linear.load import Forces, forces_on
+from assembly.linear.load import FrameLoads, loads_on_frames
+from assembly.linear.thresholds import NOISE, RANK, ROWS_RANK, rank_tolerance
 from forcefit.inputs.display import html_table, short_repr
-
-_RANK = 1e-10  # relative size below which a singular value counts as zero
-# what a projection leaves of columns that it removes whole is rounding of their size
-NOISE = 1e-12
 
 
 class FreeMotion(ValueError):
@@ -40,24 +38,24 @@ class FreeMotion(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """The small problem, and the way back to the large one.
+    """The reduced problem, and the map back to the full one.
 
     Attributes:
         linearisation: the assembly constraints.
         joints: the columns eliminated and kept.
-        G: (r, nu) [sqrt(2 J)] springs' answer to the clearances.
-        h: (r,) [sqrt(2 J)] springs' deformation without clearances and load.
+        G: (r, nu) [sqrt(2 J)] sensitivity of the scaled strains to the clearances.
+        h: (r,) [sqrt(2 J)] scaled strains with zero clearances and no loads.
         d: (nu,) [J] work of the load along the clearances.
-        H: (p, nu) rows that no spring can take up.
+        H: (p, nu) rows that no spring enters.
         k: (p,) their right sides.
-        inconsistent: [-] scaled misfit that nothing at all can take up; 0 if none.
-        forces: of the loads on every small screw.
-        preload: (6 closures,) multipliers by which the loads pass free motions.
+        inconsistent: [-] scaled closure error that nothing can close; 0 if none.
+        frame_loads: on every small screw.
+        load_multipliers: (6 closures,) that balance the loads on free motions.
         basis: (6 closures, m) orthonormal, orthogonal to all free motions.
         rigid: (m, p) rows of ``basis`` combined into those of H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
-        spread: (ny, r) orthonormal, from the small problem's springs to all of them.
-        ranks: what was decided: free, elastic, rigid, redundant rows.
+        spread: (ny, r) orthonormal, from the reduced problem's springs to all of them.
+        ranks: numbers of rows: free, elastic, rigid, redundant.
     """
 
     linearisation: Linearisation
@@ -68,8 +66,8 @@ class Reduction:
     H: NDArray
     k: NDArray
     inconsistent: float
-    forces: Forces
-    preload: NDArray
+    frame_loads: FrameLoads
+    load_multipliers: NDArray
     basis: NDArray
     rigid: NDArray
     elastic_inverse: NDArray
@@ -84,12 +82,14 @@ class Reduction:
 
     @property
     def load_springs(self) -> NDArray:
-        """(ny,) [sqrt(2 J)] the deformation the loads alone would cause."""
-        return spring_pull(self.linearisation, self.joints, self.forces, self.preload)
+        """(ny,) [sqrt(2 J)] scaled deformation that the loads alone would cause."""
+        return spring_deformations(
+            self.linearisation, self.joints, self.frame_loads, self.load_multipliers
+        )
 
     @property
-    def energy_without_play(self) -> float:
-        """[J] what closing would cost if every bounded clearance stayed at zero."""
+    def energy_without_clearance(self) -> float:
+        """[J] least energy if every bounded clearance stayed at zero."""
         return float(self.h @ self.h) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
@@ -97,24 +97,26 @@ class Reduction:
         A = self.linearisation.rows
         moved = self.joints.cones @ u + self.joints.elastic @ y
         right = -self.linearisation.misfit - A @ moved
-        return np.linalg.lstsq(A @ self.joints.free, right, rcond=_RANK)[0]
+        return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
         """(6 closures,) scaled closure wrenches, the least where not unique."""
-        own = self.spread @ springs
-        inner = self.elastic_inverse.T @ own + self.rigid @ rigid_multipliers
-        return self.preload + self.basis @ inner
+        all_springs = self.spread @ springs
+        inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
+        return self.load_multipliers + self.basis @ inner
 
 
 def reduce_problem(
-    linearisation: Linearisation, joints: VirtualJoints, forces: Forces | None = None
+    linearisation: Linearisation,
+    joints: VirtualJoints,
+    frame_loads: FrameLoads | None = None,
 ) -> Reduction:
     """Eliminate free motions and springs.
 
     Args:
         linearisation: the assembly constraints.
         joints: what may move.
-        forces: of the loads on every small screw; none if absent.
+        frame_loads: on every small screw; none if absent.
 
     Returns:
         The problem in the clearances.
@@ -122,37 +124,53 @@ def reduce_problem(
     Raises:
         FreeMotion: a load works along a motion that nothing resists.
     """
-    if forces is None:
-        forces = forces_on(linearisation.posture)
+    if frame_loads is None:
+        frame_loads = loads_on_frames(linearisation.posture)
     A = linearisation.rows
-    tolerance = _RANK + 30.0 * linearisation.posture.mismatch
+    tolerance = rank_tolerance(linearisation.posture.mismatch)
     Z = complement(A @ joints.free, tolerance)
-    preload = _preload(A @ joints.free, joints.free.T @ forces.joint)
+    load_multipliers = _load_multipliers(
+        A @ joints.free, joints.free.T @ frame_loads.joint
+    )
     A_u, A_y = Z.T @ A @ joints.cones, Z.T @ A @ joints.elastic
-    d = joints.cones.T @ (A.T @ preload + forces.joint)
-    sag = spring_pull(linearisation, joints, forces, preload)
-    right = -Z.T @ linearisation.misfit - A_y @ sag
+    d = joints.cones.T @ (A.T @ load_multipliers + frame_loads.joint)
+    load_springs = spring_deformations(
+        linearisation, joints, frame_loads, load_multipliers
+    )
+    right = -Z.T @ linearisation.misfit - A_y @ load_springs
 
     U, S, Vt = svd(A_y, full_matrices=True)
     noise = NOISE * np.abs(A @ joints.elastic).max(initial=0.0)
     rank = int(np.sum(S > max(noise, tolerance * S.max(initial=0.0))))
-    grip, loose = U[:, :rank], U[:, rank:]
-    G = -(grip.T @ A_u) / S[:rank, None]
-    h = grip.T @ right / S[:rank]
+    elastic_rows, rigid_rows = U[:, :rank], U[:, rank:]  # springs enter, none does
+    G = -(elastic_rows.T @ A_u) / S[:rank, None]
+    h = elastic_rows.T @ right / S[:rank]
     H, k, rigid, inconsistent = _rigid_rows(
-        loose, A_u, right, linearisation, tolerance,
+        rigid_rows, A_u, right, linearisation, tolerance,
         noise=NOISE * np.abs(A @ joints.cones).max(initial=0.0),
     )  # fmt: skip
     return Reduction(
-        linearisation, joints, G, h, d, H, k, inconsistent,
-        forces, preload, Z, rigid,
-        elastic_inverse=(Vt[:rank].T / S[:rank]) @ grip.T,
+        linearisation=linearisation,
+        joints=joints,
+        G=G,
+        h=h,
+        d=d,
+        H=H,
+        k=k,
+        inconsistent=inconsistent,
+        frame_loads=frame_loads,
+        load_multipliers=load_multipliers,
+        basis=Z,
+        rigid=rigid,
+        elastic_inverse=(Vt[:rank].T / S[:rank]) @ elastic_rows.T,
         spread=Vt[:rank].T,
         ranks={
-            "free": A.shape[0] - Z.shape[1], "elastic": rank, "rigid": len(k),
+            "free": A.shape[0] - Z.shape[1],
+            "elastic": rank,
+            "rigid": len(k),
             "redundant": Z.shape[1] - rank - len(k),
         },
-    )  # fmt: skip
+    )
 
 
 def complement(A: NDArray, tolerance: float) -> NDArray:
@@ -171,36 +189,40 @@ def complement(A: NDArray, tolerance: float) -> NDArray:
     return Q[:, rank:]
 
 
-def spring_pull(
-    lin: Linearisation, joints: VirtualJoints, forces: Forces, multipliers: NDArray
+def spring_deformations(
+    lin: Linearisation,
+    joints: VirtualJoints,
+    frame_loads: FrameLoads,
+    multipliers: NDArray,
 ) -> NDArray:
-    """How closures and loads pull the springs.
+    """Deformations of the springs in balance with closures and loads.
 
     Args:
         lin: the assembly constraints.
         joints: whose springs are asked about.
-        forces: of the loads.
+        frame_loads: on every small screw.
         multipliers: (6 closures,) of the scaled closures.
 
     Returns:
-        (ny,) [sqrt(2 J)]: the springs' scaled deformations in balance with them.
+        (ny,) [sqrt(2 J)] scaled.
     """
     closing = lin.rows.T @ multipliers
-    body = joints.elastic.T @ (closing + forces.body)
-    return np.where(joints.links, body, joints.elastic.T @ (closing + forces.joint))
+    of_links = joints.elastic.T @ (closing + frame_loads.body)
+    of_joints = joints.elastic.T @ (closing + frame_loads.joint)
+    return np.where(joints.links, of_links, of_joints)
 
 
-def _preload(A_q: NDArray, drive: NDArray) -> NDArray:
+def _load_multipliers(A_q: NDArray, drive: NDArray) -> NDArray:
     """Multipliers that balance the loads along every free motion."""
-    found = np.linalg.lstsq(A_q.T, -drive, rcond=_RANK)[0]
-    left = np.abs(A_q.T @ found + drive).max(initial=0.0)
-    if left > 1e-8 * np.abs(drive).max(initial=1e-300):
+    multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
+    unbalanced = np.abs(A_q.T @ multipliers + drive).max(initial=0.0)
+    if unbalanced > 1e-8 * np.abs(drive).max(initial=1e-300):
         raise FreeMotion("the load drives a motion that no joint or spring resists")
-    return found
+    return multipliers
 
 
 def _rigid_rows(
-    loose: NDArray,
+    rigid_rows: NDArray,
     A_u: NDArray,
     right: NDArray,
     lin: Linearisation,
@@ -208,17 +230,19 @@ def _rigid_rows(
     noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
     """Independent rows that only clearances can satisfy, and what nothing satisfies."""
-    rows, wanted = loose.T @ A_u, loose.T @ right
+    rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
     # clearances are small: their columns count against their own size
-    rank = int(np.sum(S > max(noise, 1e-9 * S.max(initial=0.0)))) if A_u.size else 0
+    rank = (
+        int(np.sum(S > max(noise, ROWS_RANK * S.max(initial=0.0)))) if A_u.size else 0
+    )
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
-    left = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
+    unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * errors
-    keep = U[:, :rank]
+    independent = U[:, :rank]
     return (
-        keep.T @ rows,
-        keep.T @ wanted,
-        loose @ keep,
-        float(left) if left > allowed else 0.0,
+        independent.T @ rows,
+        independent.T @ wanted,
+        rigid_rows @ independent,
+        float(unclosed) if unclosed > allowed else 0.0,
     )

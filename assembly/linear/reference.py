@@ -1,12 +1,12 @@
 """Problems (21) and (22) once more, written in cvxpy as the paper prints them.
 
-Slow and plain on purpose: every screw of every frame is a variable, every constraint
-an equation of the paper.  The fast road of :mod:`assembly.linear.energy` and
-:mod:`assembly.linear.zone` is tested against it; the two share the robot, the bounds
+Slow and simple on purpose: every screw of every frame is a variable, every constraint
+an equation of the paper.  :mod:`assembly.linear.energy` and
+:mod:`assembly.linear.zone` are tested against it; the two share the robot, the bounds
 c-bar, the compliances and eqs (13)-(15), and nothing of how the problems are solved.
 
-Two departures from the print: screws are in mrad and mm (the solver's tolerances mean
-something then), and a rigid direction is a screw fixed at zero.
+Two departures from the printed problems: screws are in mrad and mm, to which the
+solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.
 """
 
 import warnings
@@ -16,7 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.clearance import (
+    CONES,
+    Compliant,
+    clearance_bounds,
+    scales_with_margin,
+)
 from assembly.model.links import joint_compliances, link_compliances
 
 OPTIMAL = {"optimal", "optimal_inaccurate"}
@@ -65,7 +70,7 @@ def reference_energy(
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
 
-def reference_margin(posture: Posture, compliant: str = "rigid") -> float | None:
+def reference_margin(posture: Posture, compliant: Compliant = "rigid") -> float | None:
     """Margin of problem (21): the least factor on the clearances that assembles.
 
     Args:
@@ -109,22 +114,22 @@ def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
     """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
     robot = posture.robot
 
-    def end(name: str) -> Any:
-        """Eq. (8): what the screws along the path move the frame by."""
+    def pose_error(name: str) -> Any:
+        """Eq. (8): displacement of a frame by the screws along its path."""
         path = np.flatnonzero(robot.on_path[robot.index(name)])
         return sum(posture.paths[j] @ screws[j] for j in path)
 
-    meets = [end(a) == end(b) for a, b in robot.closures]
-    return [x_p == end(robot.platform), *meets]
+    closures = [pose_error(a) == pose_error(b) for a, b in robot.closures]
+    return [x_p == pose_error(robot.platform), *closures]
 
 
 def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve with tight tolerances; complain if the answer is not of a kind allowed."""
+    """Solve with tight tolerances; raise if the status is not allowed."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        with warnings.catch_warnings():  # of inaccuracy: the status tells, too
+        with warnings.catch_warnings():  # of inaccuracy: the status says it, too
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)
     except cp.error.SolverError as error:

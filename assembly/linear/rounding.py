@@ -1,7 +1,7 @@
-"""What rounding leaves of an answer: energies that are none, springs that drown others.
+"""Rounding: energies that cannot be told from zero, and ill-conditioned stiffnesses.
 
-Closures are sums of screws that cancel; in floating point they stay open by some units
-in the last place of their terms, and the wrenches' work on that is worth nothing.
+Closures are sums of screws that cancel.  In floating point they stay open by some units
+in the last place of their terms, and the wrenches' work on that means nothing.
 """
 
 import numpy as np
@@ -25,46 +25,46 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
         8 units in the last place of the sum of errors and clearances.
     """
     weights = np.repeat([1.0, 1.0 / size], 3)
-    play = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
-    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((play @ weights).sum())
+    clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
+    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((clearances @ weights).sum())
     return ROUNDING * sums
 
 
-def told_from_zero(
-    energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, left: ArrayLike
+def differs_from_zero(
+    energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, residual: ArrayLike
 ) -> NDArray:
     """Whether least energies differ from zero by more than their certificate can tell.
 
-    Springs are known to sqrt(2 gap), so an energy up to the gap may be none; and the
-    wrenches' work on what rounding leaves open in the closures is worth nothing.
+    Springs are known to sqrt(2 gap), so an energy up to the gap may be zero; and the
+    wrenches' work on the closures' rounding means nothing.
 
     Args:
         energy: (...,) [J].
         gap: (...,) [J] energy minus its certified bound.
         multipliers: (..., 6 closures) of the scaled closures.
-        left: (...,) [rad, lengths] open in the closures, rounding included.
+        residual: (...,) [rad, lengths] open in the closures, rounding included.
 
     Returns:
         (...,) bool; also where the energy is not a number.
     """
-    worth = np.asarray(gap) + left * np.abs(multipliers).sum(axis=-1)
-    return ~(np.asarray(energy) <= worth)
+    uncertainty = np.asarray(gap) + residual * np.abs(multipliers).sum(axis=-1)
+    return ~(np.asarray(energy) <= uncertainty)
 
 
 def drop_zeros(
-    energy: NDArray, bound: NDArray, multipliers: NDArray, left: NDArray
+    energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray
 ) -> None:
-    """Make zero, in place, the energies of unloaded robots that cannot be told from it.
+    """Set to zero, in place, energies of unloaded robots that do not differ from it.
 
     Args:
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound.
         multipliers: (k, 6 closures) of the scaled closures; zero where they are no more
             than rounding.
-        left: (k,) [rad, lengths] open in the closures, rounding included.
+        residual: (k,) [rad, lengths] open in the closures, rounding included.
     """
-    rounding = ~told_from_zero(energy, 0.0, multipliers, left)
-    zero = ~told_from_zero(energy, energy - bound, multipliers, left)
+    rounding = ~differs_from_zero(energy, 0.0, multipliers, residual)
+    zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
     energy[zero], multipliers[rounding] = 0.0, 0.0
     bound[zero] = np.minimum(bound[zero], 0.0)
 

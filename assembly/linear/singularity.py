@@ -1,4 +1,4 @@
-r"""How near a posture is to a singularity, of which kind, and which joints show it.
+r"""Distance of a posture to singularities of each kind, and the joints involved.
 
 The closures of the rigid robot let its drives and its platform move together in a
 space of directions.  With an orthonormal basis of it, rates (q_a, t) of drives and
@@ -10,9 +10,9 @@ code     zero means           kind of Gosselin and Angeles
 ======== ==================== ==================================================
 serial   a drive moves, the   1st (type 1): the platform loses a freedom
          platform does not
-parallel the platform moves,  2nd (type 2): the locked robot gives way
+parallel the platform moves,  2nd (type 2): the locked robot gains a freedom
          no drive does
-closure  a closure can carry  constraint: the robot gains a freedom, or changes
+closure  a closure transmits  constraint: the robot gains a freedom, or changes
          no wrench any more   its assembly mode
 ======== ==================== ==================================================
 
@@ -38,7 +38,7 @@ from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero
-_NUDGES = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, to find the ranks
+_PERTURBATIONS = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, for ranks
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,16 +94,16 @@ class Singularities:
         }
         texts = []
         for i in range(len(self.serial)):
-            said = []
+            near_kinds = []
             for kind in KINDS:
                 if getattr(self, kind)[i] < near:
                     joint = np.abs(moving[kind][i]).argmax()
                     text = f"{kind}: {robot.frames[joint].name}"
                     if kind == "parallel":
-                        way = SCREW[np.abs(self.parallel_screws[i]).argmax()]
-                        text += f", platform {way}"
-                    said.append(text)
-            texts.append("; ".join(said))
+                        component = np.abs(self.parallel_screws[i]).argmax()
+                        text += f", platform {SCREW[component]}"
+                    near_kinds.append(text)
+            texts.append("; ".join(near_kinds))
         return texts
 
 
@@ -132,7 +132,7 @@ class _Ranks:
 
 @lru_cache(maxsize=16)
 def _generic_ranks(robot: Robot) -> _Ranks:
-    """The largest ranks met at home and a little beside it."""
+    """The largest ranks at home and at perturbed drives."""
     home = home_posture(robot)
     driven = np.array([f.actuated for f in robot.frames])
     unit = np.array([
@@ -141,7 +141,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
     # the drives move unequally: symmetric steps may stay in a singular set
     spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
     goals = np.where(
-        driven, home.coordinates + np.outer(_NUDGES, unit * spread), np.nan
+        driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
     )
     track = follow(robot, home.coordinates, Target(coordinates=goals))
     A, B, P = _matrices(robot, track.transforms[track.reached])
@@ -178,7 +178,7 @@ def _matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Rows (k, m - rank, m) that A maps to nothing, least value kept and its row."""
+    """Null space (k, m - rank, m), the least singular value above it and its row."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -207,12 +207,14 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
         return full
 
     return Singularities(
-        serial, parallel, closure,
-        all_joints((still_platform[:, None] @ rates)[:, 0]),
-        all_joints((still_drives[:, None] @ rates)[:, 0]),
-        (still_drives[:, None] @ Q[..., drives:])[:, 0],
-        all_joints(resisting),
-    )  # fmt: skip
+        serial=serial,
+        parallel=parallel,
+        closure=closure,
+        serial_joints=all_joints((still_platform[:, None] @ rates)[:, 0]),
+        parallel_joints=all_joints((still_drives[:, None] @ rates)[:, 0]),
+        parallel_screws=(still_drives[:, None] @ Q[..., drives:])[:, 0],
+        closure_joints=all_joints(resisting),
+    )
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:

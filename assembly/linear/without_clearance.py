@@ -1,4 +1,4 @@
-"""Least energy (22) of a robot without play, for many postures and loads at once.
+"""Least energy (22) of a robot without clearances, at many postures and loads.
 
 Without clearances nothing in (22) has a bound: it is a linear system in the closures'
 multipliers and the free motions,
@@ -6,7 +6,7 @@ multipliers and the free motions,
     [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
     [ F' J'     0  ] [  q   ]  = - [    F' f      ]
 
-with C the compliances of bodies and joints, f the forces on them, J the closures.
+with C the compliances of bodies and joints, f the loads on them, J the closures.
 One factorisation serves every row at a posture.
 
 ======  ====================  ===========  ===========================================
@@ -30,87 +30,88 @@ from numpy.typing import NDArray
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import closure_signs, virtual_joints
-from assembly.linear.load import Forces
-from assembly.model.clearance import clearance_bounds
+from assembly.linear.load import FrameLoads
+from assembly.linear.thresholds import RANK
+from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.links import joint_compliances, link_compliances
 
-# eigenvalues of the scaled system between these are neither rounding nor rank
-_ROUNDING, _RANK = 1e-13, 1e-10
-_PADDED = 4  # times the rows: where postures differ more in theirs, each by itself
+# relative size of an eigenvalue that is rounding; up to RANK the rank is ambiguous
+_ROUNDING = 1e-13
+_PADDING = 4  # most padding, in numbers of rows; beyond it each row by itself
 _CLOSED = 1e-9  # relative residual of a system that was solved
-_SHUT = 1e-12  # [rad, reference lengths] that is rounding, whatever it is relative to
+_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """A robot without play at c postures, ready for any errors and forces.
+    """A robot without clearances at c postures, prepared for any errors and loads.
 
     Attributes:
         rows: (c, 6K, 6n) scaled closures.
         platform: (c, 6, 6n) screws to the platform screw.
-        bodies: (n, 6, 6) compliances of bodies, in the frames' axes.
-        joints: (n, 6, 6) compliances of joints.
+        body_compliances: (n, 6, 6) in the frames' axes.
+        joint_compliances: (n, 6, 6) likewise.
         free: (6n, q) unit columns of the free motions.
         limit: (q,) [rad, m] bounds of the free motions, inf where there are none.
         inverse: (c, m, m) of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
         softness: by which compliances were divided to make the system of order one.
-        doubt: (c,) bool, where its rank cannot be told from rounding.
+        ambiguous: (c,) bool, where its numerical rank is ambiguous.
     """
 
     rows: NDArray
     platform: NDArray
-    bodies: NDArray
-    joints: NDArray
+    body_compliances: NDArray
+    joint_compliances: NDArray
     free: NDArray
     limit: NDArray
     inverse: NDArray
     system: NDArray
     softness: float
-    doubt: NDArray
+    ambiguous: NDArray
 
     @cached_property
     def compliance(self) -> NDArray:
         """(n, 6, 6) of body and joint together."""
-        return self.bodies + self.joints
+        return self.body_compliances + self.joint_compliances
 
     def solve(
-        self, posture: NDArray, errors: NDArray, forces: Forces
+        self, posture: NDArray, errors: NDArray, loads: FrameLoads
     ) -> "FlexibleAssembly":
-        """Close the robot in R situations.
+        """Close the robot under R conditions.
 
         Args:
             posture: (R,) which of the c postures each row has.
             errors: (R, 6n) [rad, m] screws that come without stress.
-            forces: on every small screw, (R, 6n).
+            loads: on every small screw, (R, 6n).
 
         Returns:
             The assemblies; rows where :attr:`FlexibleAssembly.solved` is false are not.
         """
-        loose = errors + _each(self.bodies, forces.body)
-        loose += _each(self.joints, forces.joint)
+        unclosed = errors + _each(self.body_compliances, loads.body)
+        unclosed += _each(self.joint_compliances, loads.joint)
         J, size, times = self.rows, self.softness, at_postures(posture)
-        b = -np.concatenate([times(J, loose), forces.joint @ self.free * size], axis=1)
+        on_free = loads.joint @ self.free * size
+        b = -np.concatenate([times(J, unclosed), on_free], axis=1)
         x = times(self.inverse, b)
-        x -= times(self.inverse, times(self.system, x) - b)  # what rounding left
+        x -= times(self.inverse, times(self.system, x) - b)  # iterative refinement
         count = J.shape[1]
         multipliers, motions = x[:, :count] / size, x[:, count:]
-        left = times(self.system, x) - b
+        residual = np.abs(times(self.system, x) - b).max(axis=1, initial=0.0)
         scale = np.abs(b).max(axis=1, initial=0.0)
-        gap = np.abs(left).max(axis=1, initial=0.0)
-        closed = gap <= np.maximum(_CLOSED * scale, _SHUT)
+        closed = residual <= np.maximum(_CLOSED * scale, _CLOSED_ABSOLUTE)
         within = np.all(np.abs(motions) <= self.limit, axis=1)
         closing = times(np.swapaxes(J, 1, 2), multipliers)
-        screws = loose + _each(self.compliance, closing) + motions @ self.free.T
+        screws = unclosed + _each(self.compliance, closing) + motions @ self.free.T
         return FlexibleAssembly(
-            times(self.platform, screws),
-            closing + forces.joint,
-            multipliers,
-            closed & within & ~self.doubt[posture],
+            platform_screw=times(self.platform, screws),
+            joint_wrenches=closing + loads.joint,
+            multipliers=multipliers,
+            solved=closed & within & ~self.ambiguous[posture],
         )
 
     def self_stress(self, columns: NDArray) -> NDArray:
-        """Forces that stress-free screws meet from the structure they are built into.
+        """Generalised forces by which the closed structure resists stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
@@ -124,7 +125,7 @@ class Flexibility:
         return -np.einsum("cks,ckl,clt->cst", through, inner, through)
 
     def platform_of(self, columns: NDArray) -> NDArray:
-        """Where stress-free screws at the frames take the platform.
+        """Platform screw that stress-free screws at the frames cause.
 
         Args:
             columns: (6n, s) screws at the frames.
@@ -146,7 +147,7 @@ class Flexibility:
 
 @dataclass(frozen=True, eq=False)
 class FlexibleAssembly:
-    """R assemblies of a robot without play.
+    """R assemblies of a robot without clearances.
 
     Attributes:
         platform_screw: (R, 6) [rad, m] at the platform's origin, base axes.
@@ -162,9 +163,9 @@ class FlexibleAssembly:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """How matrices of postures multiply vectors of the rows that stand there.
+    """Product of the matrices of postures with vectors of rows at these postures.
 
-    Rows at one posture are multiplied together: nothing is copied for every row.
+    Rows at one posture are multiplied together: no matrix is copied for every row.
 
     Args:
         posture: (R,) which of c postures each row has.
@@ -179,7 +180,7 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     most = int(count.max(initial=0))
 
     def times(matrices: NDArray, vectors: NDArray) -> NDArray:
-        if len(names) * most > _PADDED * len(own):
+        if len(names) * most > _PADDING * len(own):
             return np.einsum("rij,rj->ri", matrices[posture], vectors)
         used = matrices if len(names) == len(matrices) else matrices[names]
         together = np.zeros((len(names), most, vectors.shape[1]))
@@ -210,16 +211,16 @@ def in_groups(postures: Posture) -> tuple[Posture, NDArray]:
 
 
 def flexibility(postures: Posture) -> Flexibility:
-    """Factorise the closures of a robot without play.
+    """Factorise the closures of a robot without clearances.
 
     Args:
         postures: c of them, transforms (c, n, 4, 4).
 
     Returns:
-        What solves any situation at these postures.
+        What solves any conditions at these postures.
 
     Raises:
-        ValueError: the robot has play.
+        ValueError: the robot has clearances.
     """
     robot = postures.robot
     bodies, joints = link_compliances(robot), joint_compliances(robot)
@@ -232,11 +233,11 @@ def flexibility(postures: Posture) -> Flexibility:
         postures.transforms,
     ):
         digest.update(np.ascontiguousarray(numbers).tobytes())
-    return _factorise(_Case(digest.digest(), postures, bodies, joints))
+    return _factorise(_CacheKey(digest.digest(), postures, bodies, joints))
 
 
 @dataclass(frozen=True)
-class _Case:
+class _CacheKey:
     """Robots that differ in errors and loads alone share one factorisation."""
 
     digest: bytes
@@ -246,9 +247,9 @@ class _Case:
 
 
 @lru_cache(maxsize=4)
-def _factorise(case: _Case) -> Flexibility:
+def _factorise(key: _CacheKey) -> Flexibility:
     """The system of every posture, and its inverse."""
-    postures, C_body, C_joint = case.postures, case.bodies, case.joints
+    postures, C_body, C_joint = key.postures, key.bodies, key.joints
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:
@@ -270,29 +271,37 @@ def _factorise(case: _Case) -> Flexibility:
     M[:, : S.shape[1], : S.shape[1]] = S / softness
     M[:, : S.shape[1], S.shape[1] :] = JF
     M[:, S.shape[1] :, : S.shape[1]] = np.swapaxes(JF, 1, 2)
-    inverse, doubt = pseudo_inverse(M)
+    inverse, ambiguous = pseudo_inverse(M)
     return Flexibility(
-        J, P, C_body, C_joint, joints.free, _limits(postures, joints.free),
-        inverse, M, softness, doubt,
-    )  # fmt: skip
+        rows=J,
+        platform=P,
+        body_compliances=C_body,
+        joint_compliances=C_joint,
+        free=joints.free,
+        limit=_limits(postures, joints.free),
+        inverse=inverse,
+        system=M,
+        softness=softness,
+        ambiguous=ambiguous,
+    )
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """(c, m, m) inverses on the range, and (c,) where the range is in doubt."""
+    """(c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
     if not M.shape[1]:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
     relative = size / size.max(axis=1, keepdims=True)
-    kept = relative > _RANK
-    doubt = np.any((relative > _ROUNDING) & ~kept, axis=1)
+    kept = relative > RANK
+    ambiguous = np.any((relative > _ROUNDING) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
-    return np.einsum("cij,cj,ckj->cik", vectors, inverted, vectors), doubt
+    return np.einsum("cij,cj,ckj->cik", vectors, inverted, vectors), ambiguous
 
 
 def _limits(postures: Posture, free: NDArray) -> NDArray:
     """(q,) bounds of the free motions."""
-    bounds = clearance_bounds(postures.robot)[:, [0, 0, 1, 2, 2, 3]].ravel()
+    bounds = component_bounds(clearance_bounds(postures.robot)).ravel()
     return bounds[np.abs(free).argmax(axis=0)] if free.size else np.zeros(0)
 
 

@@ -1,4 +1,4 @@
-"""What an instrument would read of a robot with effects, row by row.
+"""Predicted readings of a measuring device on a robot with effects.
 
-Begin at ``conditions.py``, what a row is measured under, and ``predict.py``.
+Begin at ``conditions.py``, the conditions of each measurement, and ``predict.py``.
 """

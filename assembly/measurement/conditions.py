@@ -1,19 +1,20 @@
-"""A robot in the situations in which it was, or will be, measured.
+"""Conditions under which a robot was, or will be, measured.
 
 What the model of a robot lacks is an *effect* (:mod:`assembly.effects`).  An effect
-changes one or more of the fields below and nothing else, so that effects add up in any
-number, and :func:`assembly.measurement.predict.predict` needs to know none of them.
+changes one or more of the fields below and nothing else.  So any number of effects can
+be combined, and :func:`assembly.measurement.predict.predict` needs to know none.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
 ======  ====================  =========  =============================================
 T       ``transforms``        (R,n,4,4)  nominal frames seen from the base
-dl      ``errors``            (R, n, 6)  screws that come without stress, frame axes
+dl      ``errors``            (R, n, 6)  stress-free screws, frame axes
 w       ``load``              (R, 6)     on the platform at ``point``, base axes
 g       ``gravity``           (R, 3)     base axes
 ======  ====================  =========  =============================================
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,6 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
+
+COVARIATES = ("temperature", "time", "approach")
 
 
 @dataclass(frozen=True)
@@ -43,14 +46,14 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """R situations of one robot; without effects, what its file declares.
+    """R rows of conditions of one robot; without effects, as its file declares it.
 
     Attributes:
         robot: of n frames; its links, springs and clearances are those of all rows.
         coordinates: (R, n) [rad or m] commanded, of every joint.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
         mismatch: (R,) [rad, m] nominal closure error left.
-        errors: (R, n, 6) [rad, m] screws that come without stress.
+        errors: (R, n, 6) [rad, m] stress-free screws.
         point: (3,) [m] reference point: loaded and measured, platform axes.
         load: (R, 6) [N m, N] on the platform at the reference point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
@@ -59,15 +62,14 @@ class Conditions:
         approach: (R,) -1 or 1; NaN where not known.
         laws: contact springs in series with joints.
         exact: finite motions instead of the linear model.
-        second_order: (R, 6) [rad, m] what finite motions add to the linear platform
-            screw without load; see
-            :func:`assembly.measurement.predict.with_second_order`.
-        rest: (R, n, 6) where play rests, in units of its bounds; None where the least
-            energy is to say.
-        base: (6,) [rad, m] turn and shift of the measuring frame, acting on the left.
-        tool: (3,) [m] from the reference point to the one really measured, platform
-            axes.
-        reading: (R, 6) [rad, m] added to what is read.
+        second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
+            see :func:`assembly.measurement.predict.with_second_order`.
+        rest: (R, n, 6) rest positions of the clearances, in units of their bounds; None
+            where they follow from the least energy.
+        base: (6,) [rad, m] rotation and shift of the measuring frame, acting on the
+            left.
+        tool: (3,) [m] from the reference point to the one measured, platform axes.
+        reading: (R, 6) [rad, m] added to the reading.
     """
 
     robot: Robot
@@ -96,7 +98,7 @@ class Conditions:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether the device reads something else than the platform's pose."""
+        """Whether a reading differs from the pose error of the reference point."""
         return bool(self.base.any() or self.tool.any() or np.any(self.reading))
 
     @property
@@ -126,7 +128,7 @@ class Conditions:
             rows: indices or a mask.
 
         Returns:
-            The same robot in those situations only.
+            The conditions of those rows only.
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
@@ -152,9 +154,7 @@ def as_declared(
     mismatch: ArrayLike = 0.0,
     point: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
-    temperature: ArrayLike = np.nan,
-    time: ArrayLike = np.nan,
-    approach: ArrayLike = np.nan,
+    covariates: Mapping[str, ArrayLike] | None = None,
 ) -> Conditions:
     """Conditions of a robot as its file declares it.
 
@@ -164,13 +164,13 @@ def as_declared(
         mismatch: (R,) [rad, m] nominal closure error left.
         point: (3,) [m] the reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] base axes.
-        temperature: (R,) [K], or one number for all; likewise the next two.
-        time: [s].
-        approach: -1 or 1.
+        covariates: (R,) or one number for all rows, of :data:`COVARIATES`:
+            ``temperature`` [K], ``time`` [s], ``approach`` -1 or 1; NaN if absent.
 
     Returns:
-        The conditions, R of them.
+        R rows.
     """
+    given = dict.fromkeys(COVARIATES, np.nan) | dict(covariates or {})
     robot = postures.robot
     n = len(robot.frames)
     T = postures.transforms.reshape(-1, n, 4, 4)
@@ -180,8 +180,15 @@ def as_declared(
         return np.array(np.broadcast_to(values, (count, *shape)), dtype=float)
 
     return Conditions(
-        robot, postures.coordinates.reshape(-1, n), T, rows(mismatch),
-        rows(robot.errors, n, 6), np.array(point, dtype=float),
-        rows(np.zeros(6) if load is None else load, 6), rows(gravity, 3),
-        rows(temperature), rows(time), rows(approach),
-    )  # fmt: skip
+        robot=robot,
+        coordinates=postures.coordinates.reshape(-1, n),
+        transforms=T,
+        mismatch=rows(mismatch),
+        errors=rows(robot.errors, n, 6),
+        point=np.array(point, dtype=float),
+        load=rows(np.zeros(6) if load is None else load, 6),
+        gravity=rows(gravity, 3),
+        temperature=rows(given["temperature"]),
+        time=rows(given["time"]),
+        approach=rows(given["approach"]),
+    )

@@ -1,11 +1,11 @@
-r"""The exact equilibrium of a robot without play, in many situations at once.
+r"""The exact equilibrium of a robot without clearances, for many rows at once.
 
 The equations are those of :mod:`assembly.exact.exact`: closures hold on SE(3), every
-body and spring gives by its compliance times what goes through it, free motions carry
-nothing.  All rows are corrected together by the linear model's inverse at the nominal
-posture (:mod:`assembly.linear.without_clearance`), so the first correction is the
-linear answer and each further one shrinks the error by the size of the motions (a chord
-method).  Rows that do not come to rest are left to
+body and spring deforms by its compliance times its wrench, free motions carry no load.
+All rows are iterated together with the inverse of the linear model at the nominal
+posture (:mod:`assembly.linear.without_clearance`).  The first iterate is the linear
+solution; each further one reduces the error by a factor of the size of the motions (a
+chord method).  Rows that do not converge are left to
 :func:`assembly.exact.exact.solve_exact`.
 
 ======  =============  ===========  ==================================================
@@ -14,7 +14,7 @@ symbol  code           shape        meaning
 e b     ``screws``     (2, R, n, 6) deformation of bodies and of joints, logarithms
 q       ``motions``    (R, q)       free motions of passive joints
 lambda  multipliers    (R, 6K)      of the scaled closures
-d       ``give``       (R, s)       deflections of contacts
+d       deflections    (R, s)       of contacts
 ======  =============  ===========  ==================================================
 
 Sources:
@@ -29,8 +29,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import DeadLoads, resultants, row_loads
-from assembly.exact.placement import along_own
+from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
+from assembly.exact.finite_robot import along_own
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.se3 import (
     exponential,
@@ -50,179 +50,201 @@ from assembly.linear.without_clearance import (
 from assembly.measurement.conditions import Conditions
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_CORRECTIONS = 60  # at most; 5 to 12 are usual
-_STILL = 1e-12  # [rad, reference lengths] largest change of a screw at the end
-_CLOSED = 1e-11  # [rad, reference lengths] what an answer may leave open
-_FREE = 1e-5  # of the largest wrench: what may push on a motion that stays where it is
-_MISFIT = 1e-9  # [rad, reference lengths] whose wrench counts as none
-_SHRINKS = 0.8  # by which every correction but the first few must be smaller
-_TRUSTED = 3  # corrections that may grow
-_TINY = 1e-9  # [rad or m] deflections of a contact below which it is linear
-_AT_ONCE = 100  # rows, so that memory stays small
+_MOST_ITERATIONS = 60  # at most; 5 to 12 are usual
+_CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
+_CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
+_FREE_FORCE = 1e-5  # of the largest wrench: largest force along a free motion
+_ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: wrenches below are zero
+_CONTRACTION = 0.8  # largest ratio of two successive changes, after the first few
+_TRANSIENT = 3  # iterations in which changes may grow
+_LINEAR_BELOW = 1e-9  # [rad or m] deflections of a contact below which it is linear
+_BATCH = 100  # rows, so that memory stays small
 
 
-def solve_rows(here: Conditions, give: NDArray) -> tuple[NDArray, NDArray]:
-    """Where finite motions take the platform under every row's loads.
+def solve_rows(
+    conditions: Conditions, linear_deflections: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Platform screws of finite motions under every row's loads.
 
     Args:
-        here: R situations of a robot without play; ``exact`` is taken for granted.
-        give: (R, s) [rad or m] deflections of the s contacts in the linear model.
+        conditions: R rows of a robot without clearances, solved as if ``exact``.
+        linear_deflections: (R, s) [rad or m] of the s contacts in the linear model.
 
     Returns:
         (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the origin, base
-        axes, and (R,) where they are found; elsewhere nothing is claimed.
+        axes, and (R,) whether they converged; the other rows are not to be used.
     """
-    screws, found = np.full((len(here), 6), np.nan), np.zeros(len(here), dtype=bool)
-    distinct, which = in_groups(here.postures)
+    screws, converged = (
+        np.full((len(conditions), 6), np.nan),
+        np.zeros(len(conditions), dtype=bool),
+    )
+    distinct, posture_of_row = in_groups(conditions.postures)
     flexible = flexibility(distinct)
-    own = [6 * i + f.own_axis for i, f in enumerate(here.robot.frames) if f.passive]
+    own_axes = [
+        6 * i + f.own_axis for i, f in enumerate(conditions.robot.frames) if f.passive
+    ]
     moved = np.flatnonzero(flexible.free.any(axis=1))
-    if not np.isin(moved, own).all():
-        return screws, found  # a fixed joint that is free to move: row by row
-    for begin in range(0, len(here), _AT_ONCE):
-        rows = slice(begin, begin + _AT_ONCE)
-        some = here.take(np.arange(len(here))[rows])
-        batch = _Rows(some, flexible, which[rows], give[rows])
-        screws[rows], found[rows] = _come_to_rest(batch)
-    return screws, found
+    if not np.isin(moved, own_axes).all():
+        return screws, converged  # a fixed joint that is free to move: one by one
+    for begin in range(0, len(conditions), _BATCH):
+        rows = slice(begin, begin + _BATCH)
+        some = conditions.take(np.arange(len(conditions))[rows])
+        batch = _Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
+        screws[rows], converged[rows] = _solve(batch)
+    return screws, converged
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows to be solved, and what does not change while they are.
+    """Rows to be solved, and what is constant during the iteration.
 
     Attributes:
-        here: R situations.
+        conditions: R rows.
         flexible: the linear model at the distinct postures.
-        which: (R,) which of them a row has.
-        give: (R, s) [rad or m] deflections of contacts in the linear model.
+        posture_of_row: (R,) index of each row's posture among these.
+        linear_deflections: (R, s) [rad or m] of contacts in the linear model.
     """
 
-    here: Conditions
+    conditions: Conditions
     flexible: Flexibility
-    which: NDArray
-    give: NDArray
+    posture_of_row: NDArray
+    linear_deflections: NDArray
 
     @cached_property
     def loads(self) -> DeadLoads:
-        """All that acts."""
-        h = self.here
-        return row_loads(h.postures, h.errors, h.load, h.gravity, h.point)
+        """Loads and weights."""
+        c = self.conditions
+        return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
     @cached_property
-    def soft(self) -> tuple[NDArray, NDArray]:
-        """Frames whose bodies, and whose joints, give."""
-        own = [self.here.robot.index(law.frame) for law in self.here.laws]
-        bodies = np.flatnonzero(self.flexible.bodies.any(axis=(1, 2)))
-        joints = np.flatnonzero(self.flexible.joints.any(axis=(1, 2)))
-        return bodies, np.union1d(joints, own).astype(int)
+    def elastic_frames(self) -> tuple[NDArray, NDArray]:
+        """Frames whose bodies, and whose joints, are elastic."""
+        with_contact = [
+            self.conditions.robot.index(law.frame) for law in self.conditions.laws
+        ]
+        bodies = np.flatnonzero(self.flexible.body_compliances.any(axis=(1, 2)))
+        joints = np.flatnonzero(self.flexible.joint_compliances.any(axis=(1, 2)))
+        return bodies, np.union1d(joints, with_contact).astype(int)
 
     @cached_property
-    def loose(self) -> NDArray:
-        """Frames whose joints move freely."""
+    def free_frames(self) -> NDArray:
+        """Frames whose joints have free motions."""
         moved = self.flexible.free.any(axis=1).reshape(-1, 6)
         return np.flatnonzero(moved.any(axis=1))
 
     @cached_property
     def contacts(self) -> NDArray:
         """(6n, s) unit screws of the joints with a contact."""
-        columns = np.zeros((6 * len(self.here.robot.frames), len(self.here.laws)))
-        for k, law in enumerate(self.here.laws):
-            i = self.here.robot.index(law.frame)
-            columns[6 * i + self.here.robot.frames[i].own_axis, k] = 1.0
+        columns = np.zeros((
+            6 * len(self.conditions.robot.frames),
+            len(self.conditions.laws),
+        ))
+        for k, law in enumerate(self.conditions.laws):
+            i = self.conditions.robot.index(law.frame)
+            columns[6 * i + self.conditions.robot.frames[i].own_axis, k] = 1.0
         return columns
 
     @cached_property
-    def law(self) -> tuple[NDArray, NDArray]:
+    def law_constants(self) -> tuple[NDArray, NDArray]:
         """(s,) coefficients and exponents of contacts."""
-        laws = self.here.laws
+        laws = self.conditions.laws
         return (
             np.array([law.coefficient for law in laws]),
             np.array([law.exponent for law in laws]),
         )
 
     @cached_property
-    def slope(self) -> NDArray:
-        """(R, s) [rad/(N m), m/N] how much more contacts give per load."""
-        c, n = self.law
-        size = np.abs(self.give)
+    def contact_compliance(self) -> NDArray:
+        """(R, s) [rad/(N m), m/N] tangent compliance of contacts."""
+        c, n = self.law_constants
+        size = np.abs(self.linear_deflections)
         return (
-            np.where(size > _TINY, 1 / n, 1.0) * np.maximum(size, _TINY) ** (1 - n) / c
+            np.where(size > _LINEAR_BELOW, 1 / n, 1.0)
+            * np.maximum(size, _LINEAR_BELOW) ** (1 - n)
+            / c
         )
 
-    def tangent(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] deflections under loads, on the linear answer's tangent."""
-        c, n = self.law
-        load = c * np.maximum(np.abs(self.give), _TINY) ** (n - 1) * self.give
-        return self.give + self.slope * (w - load)
+    def tangent_deflection(self, w: NDArray) -> NDArray:
+        """(R, s) [rad or m] deflections under loads w, by the tangent of the law."""
+        c, n = self.law_constants
+        load = (
+            c
+            * np.maximum(np.abs(self.linear_deflections), _LINEAR_BELOW) ** (n - 1)
+            * self.linear_deflections
+        )
+        return self.linear_deflections + self.contact_compliance * (w - load)
 
     def deflection(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] of the contacts under loads."""
-        c, n = self.law
-        least = c * _TINY**n
+        """(R, s) [rad or m] of the contacts under loads w."""
+        c, n = self.law_constants
+        least = c * _LINEAR_BELOW**n
         large = np.maximum(np.abs(w), least)
         return (large / c) ** (1 / n) * w / large
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """What multiplies vectors of the rows by matrices of their postures."""
-        return at_postures(self.which)
+        """Product of the postures' matrices and the rows' vectors."""
+        return at_postures(self.posture_of_row)
 
-    def corrected(self, b: NDArray) -> NDArray:
-        """(R, m) what the linear model makes of right sides (R, m)."""
-        if not self.here.laws:
-            return self.times(self.flexible.inverse, b)
-        return np.einsum("rij,rj->ri", self._with_contacts, b)
+    def corrected(self, right_side: NDArray) -> NDArray:
+        """(R, m) solution of the linear model for right sides (R, m)."""
+        if not self.conditions.laws:
+            return self.times(self.flexible.inverse, right_side)
+        return np.einsum("rij,rj->ri", self._with_contacts, right_side)
 
     @cached_property
     def _with_contacts(self) -> NDArray:
-        """(R, m, m) inverse of the scaled system, contacts springs of their slope."""
+        """(R, m, m) inverse of the scaled system, contacts as tangent springs."""
         flexible = self.flexible
-        through = np.einsum("cki,is->cks", flexible.rows, self.contacts)[self.which]
-        M = flexible.system[self.which].copy()
-        count = through.shape[1]
-        softer = self.slope / flexible.softness
-        M[:, :count, :count] += np.einsum("rks,rs,rls->rkl", through, softer, through)
+        contact_rows = np.einsum("cki,is->cks", flexible.rows, self.contacts)[
+            self.posture_of_row
+        ]
+        M = flexible.system[self.posture_of_row].copy()
+        count = contact_rows.shape[1]
+        compliance = self.contact_compliance / flexible.softness
+        M[:, :count, :count] += np.einsum(
+            "rks,rs,rls->rkl", contact_rows, compliance, contact_rows
+        )
         return pseudo_inverse(M)[0]
 
     @cached_property
     def bodies(self) -> NDArray:
         """(R, n, 4, 4) bodies with their errors, seen from after the parent."""
-        errors = self.here.errors
-        off = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
-        return self.here.robot.fixed_transforms @ off
+        errors = self.conditions.errors
+        error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
+        return self.conditions.robot.fixed_transforms @ error_motion
 
     @cached_property
     def commanded(self) -> NDArray:
         """(R, n, 4, 4) motions of the joints as commanded."""
-        return along_own(self.here.robot, self.here.coordinates)
+        return along_own(self.conditions.robot, self.conditions.coordinates)
 
     @cached_property
     def scale(self) -> NDArray:
-        """(6,) of a screw: translations by the reference length."""
-        return np.array([1.0, 1.0, 1.0, *[1 / size_of(self.here.robot)] * 3])
+        """(6,) factors on a screw: translations over the reference length."""
+        return np.array([1.0, 1.0, 1.0, *[1 / size_of(self.conditions.robot)] * 3])
 
     @cached_property
-    def closed(self) -> NDArray:
+    def closure_frames(self) -> NDArray:
         """(2, K) frames that closures join."""
-        robot = self.here.robot
+        robot = self.conditions.robot
         pairs = [[robot.index(a), robot.index(b)] for a, b in robot.closures]
         return np.array(pairs, dtype=int).reshape(-1, 2).T
 
     @cached_property
-    def shut(self) -> NDArray:
+    def nominal_closures(self) -> NDArray:
         """(R, K, 4, 4) a closure's second frame seen from its first, nominally."""
-        first, second = self.closed
-        T = self.here.transforms
+        first, second = self.closure_frames
+        T = self.conditions.transforms
         return inverse(T[:, first]) @ T[:, second]
 
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where R rows are.
+    """The current iterate of R rows.
 
     Attributes:
-        rows: which.
+        rows: their constants.
         screws: (2, R, n, 6) deformations of bodies and of joints.
         motions: (R, q) free motions.
         multipliers: (R, 6K) of the scaled closures.
@@ -234,64 +256,69 @@ class _State:
     multipliers: NDArray
 
     @cached_property
-    def own(self) -> NDArray:
-        """(R, n) [rad or m] what passive joints move beyond their coordinate."""
+    def passive_motion(self) -> NDArray:
+        """(R, n) [rad or m] motions of passive joints from their coordinates."""
         moved = self.motions @ self.rows.flexible.free.T
         return moved.reshape(*self.screws.shape[1:]).sum(axis=-1)
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) before a body's deformation, after it, the joint's, all."""
+        """(R, n, 4, 4) before a body's deformation, after it, after joints', all."""
         rows = self.rows
-        local = [rows.bodies]
-        for frames, screws in zip(rows.soft, self.screws, strict=True):
-            T = local[-1].copy()
+        partial = [rows.bodies]
+        for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
+            T = partial[-1].copy()
             T[:, frames] = T[:, frames] @ exponential(screws[:, frames])
-            local.append(T)
-        local.append(local[-1] @ along_own(rows.here.robot, self.own))
-        step = local[-1] @ rows.commanded
-        after = np.empty_like(step)
-        before = np.broadcast_to(np.eye(4), step.shape).copy()
-        for i, parent in enumerate(rows.here.robot.parents):
+            partial.append(T)
+        partial.append(
+            partial[-1] @ along_own(rows.conditions.robot, self.passive_motion)
+        )
+        relative = partial[-1] @ rows.commanded
+        after = np.empty_like(relative)
+        before = np.broadcast_to(np.eye(4), relative.shape).copy()
+        for i, parent in enumerate(rows.conditions.robot.parents):
             if parent >= 0:
                 before[:, i] = after[:, parent]
-            after[:, i] = before[:, i] @ step[:, i]
-        return tuple(before @ T for T in local)
+            after[:, i] = before[:, i] @ relative[:, i]
+        return tuple(before @ T for T in partial)
 
     @property
     def platform(self) -> NDArray:
-        """(R, 4, 4) where the platform is."""
-        robot = self.rows.here.robot
+        """(R, 4, 4) pose of the platform."""
+        robot = self.rows.conditions.robot
         return self.poses[3][:, robot.index(robot.platform)]
 
     @cached_property
     def platform_screw(self) -> NDArray:
         """(R, 6) rotation vector of R R_nominal^T and shift of the origin."""
-        nominal = self.rows.here.postures.platform
+        nominal = self.rows.conditions.postures.platform
         back = np.swapaxes(nominal[:, :3, :3], 1, 2)
         turn = rotation_vector(self.platform[:, :3, :3] @ back)
         return np.concatenate([turn, self.platform[:, :3, 3] - nominal[:, :3, 3]], 1)
 
     @cached_property
     def residual(self) -> NDArray:
-        """(R, 6K) how closures are open: [rad], translations per reference length."""
-        first, second = self.rows.closed
-        T, origin = self.poses[3], self.rows.here.postures.platform[:, None, :3, 3]
-        G = T[:, first] @ self.rows.shut @ inverse(T[:, second])
+        """(R, 6K) closure residuals: [rad], translations per reference length."""
+        first, second = self.rows.closure_frames
+        T, origin = (
+            self.poses[3],
+            self.rows.conditions.postures.platform[:, None, :3, 3],
+        )
+        G = T[:, first] @ self.rows.nominal_closures @ inverse(T[:, second])
         turn = G[..., :3, :3] - np.eye(3)
         G[..., :3, 3] += (turn @ origin[..., None])[..., 0]
         return (logarithm(G) * self.rows.scale).reshape(len(G), -1)
 
     @cached_property
-    def through(self) -> NDArray:
-        """(2, R, n, 6) on all that bodies hold and on all that joints hold, base axes.
+    def total_wrenches(self) -> NDArray:
+        """(2, R, n, 6) wrenches through bodies and through joints, base axes.
 
-        At the platform's nominal origin.
+        Read at the platform's nominal origin.
         """
-        here, loads = self.rows.here, self.rows.loads
-        posture, robot = here.postures, here.robot
+        conditions, loads = self.rows.conditions, self.rows.loads
+        posture, robot = conditions.postures, conditions.robot
         last = robot.index(robot.platform)
-        closing = self.multipliers.reshape(len(here), -1, 6) * self.rows.scale
+        closing = self.multipliers.reshape(len(conditions), -1, 6) * self.rows.scale
         closing = np.einsum("kn,rkj->rnj", closure_signs(robot), closing)
         J = turn_jacobian(self.platform_screw[:, :3])
         moment = np.linalg.solve(np.swapaxes(J, 1, 2), loads.load[:, :3, None])[..., 0]
@@ -300,99 +327,119 @@ class _State:
         on_body = robot.on_path[last][:, None] * platform
         on_joint = on_body.copy()
         on_joint[:, last] = 0.0  # the load acts on the platform's body
-        through = np.stack([on_body, on_joint]) + closing
+        total = np.stack([on_body, on_joint]) + closing
         if loads.beyond_platform:
             carried = self.poses[3] @ self.rows.commanded
-            through += resultants(posture, loads, self.poses[1], carried)[:2]
-        return through
+            total += resultants(posture, loads, self.poses[1], carried)[:2]
+        return total
 
-    def wrenches(self, through: NDArray, place: NDArray, frames: NDArray) -> NDArray:
-        """(R, k, 6) wrenches at the platform's origin, read at some frames' places."""
-        origin = self.rows.here.postures.platform[:, None, :3, 3]
-        T, w = place[:, frames], through[:, frames]
+    def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
+        """(R, k, 6) wrenches at the platform's origin, read at some frames' poses."""
+        origin = self.rows.conditions.postures.platform[:, None, :3, 3]
+        T, w = poses[:, frames], total[:, frames]
         moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])
-        both = np.stack([moment, w[..., 3:]], axis=-2) @ T[..., :3, :3]
-        return both.reshape(w.shape)
+        parts = np.stack([moment, w[..., 3:]], axis=-2) @ T[..., :3, :3]
+        return parts.reshape(w.shape)
 
-    def misfit(self) -> tuple[NDArray, NDArray, NDArray]:
-        """(2, R, n, 6) what springs lack; forces on motions (R, q), contacts (R, s)."""
+    def imbalance(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Residuals of the constitutive laws and of the equilibrium.
+
+        Returns:
+            (2, R, n, 6) screws that compliances give less those of the iterate, (R, q)
+            forces along free motions, (R, s) loads of contacts.
+        """
         rows, flexible = self.rows, self.rows.flexible
-        lack = -self.screws
+        screw_residual = -self.screws
         generalised = np.zeros_like(self.screws)
-        for k, frames in enumerate(rows.soft):
-            w = self.wrenches(self.through[k], self.poses[k], frames)
+        for k, frames in enumerate(rows.elastic_frames):
+            w = self.wrenches(self.total_wrenches[k], self.poses[k], frames)
             J = left_jacobian(self.screws[k][:, frames])
             w = (w[..., None, :] @ J)[..., 0, :]
             generalised[k][:, frames] = w
-            C = (flexible.bodies, flexible.joints)[k][frames]
-            lack[k][:, frames] += np.einsum("kij,rkj->rki", C, w)
-        own = np.zeros_like(self.screws[0])
-        frames = rows.loose
-        own[:, frames] = self.wrenches(self.through[1], self.poses[2], frames)
-        free = own.reshape(len(own), -1) @ flexible.free
-        w = generalised[1].reshape(len(own), -1) @ rows.contacts
-        return lack, free, w
+            C = (flexible.body_compliances, flexible.joint_compliances)[k][frames]
+            screw_residual[k][:, frames] += np.einsum("kij,rkj->rki", C, w)
+        joint_wrenches = np.zeros_like(self.screws[0])
+        frames = rows.free_frames
+        joint_wrenches[:, frames] = self.wrenches(
+            self.total_wrenches[1], self.poses[2], frames
+        )
+        free = joint_wrenches.reshape(len(joint_wrenches), -1) @ flexible.free
+        w = generalised[1].reshape(len(joint_wrenches), -1) @ rows.contacts
+        return screw_residual, free, w
 
 
-def _come_to_rest(rows: _Rows) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws after corrections, and (R,) whether they came to rest."""
-    flexible, count = rows.flexible, len(rows.here)
-    n, K = len(rows.here.robot.frames), 6 * len(rows.here.robot.closures)
+def _solve(rows: _Rows) -> tuple[NDArray, NDArray]:
+    """(R, 6) platform screws, and (R,) whether they converged."""
+    flexible, count = rows.flexible, len(rows.conditions)
+    n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
     state = _State(
         rows, np.zeros((2, count, n, 6)), np.zeros((count, q)), np.zeros((count, K))
     )
-    size, going = np.full(count, np.inf), ~flexible.doubt[rows.which]
-    going &= np.isfinite(rows.slope).all(axis=1)
-    for turn in range(_CORRECTIONS):
-        screws, motions, multipliers = _correction(state, first=turn == 0)
-        moves = screws.sum(axis=0) * rows.scale
-        moves = moves.reshape(count, -1) + motions @ flexible.free.T
-        last, size = size, np.abs(moves).max(axis=1, initial=0.0)
-        growing = size > (_SHRINKS if turn > _TRUSTED else 1e3) * last
-        going &= np.isfinite(size) & (size < 1.0) & ~(growing & (size > _STILL))
-        if np.all(~going | (size <= _STILL)):
+    size, active = np.full(count, np.inf), ~flexible.ambiguous[rows.posture_of_row]
+    active &= np.isfinite(rows.contact_compliance).all(axis=1)
+    for iteration in range(_MOST_ITERATIONS):
+        screws, motions, multipliers = _correction(state, first=iteration == 0)
+        changes = screws.sum(axis=0) * rows.scale
+        changes = changes.reshape(count, -1) + motions @ flexible.free.T
+        previous_size, size = size, np.abs(changes).max(axis=1, initial=0.0)
+        diverging = (
+            size > (_CONTRACTION if iteration > _TRANSIENT else 1e3) * previous_size
+        )
+        active &= np.isfinite(size) & (size < 1.0) & ~(diverging & (size > _CONVERGED))
+        if np.all(~active | (size <= _CONVERGED)):
             break
-        still = ~going
+        inactive = ~active
         for part in (screws.swapaxes(0, 1), motions, multipliers):
-            part[still] = 0.0
+            part[inactive] = 0.0
         state = _State(
             rows, state.screws + screws, state.motions + motions,
             state.multipliers + multipliers,
         )  # fmt: skip
-    found = going & (size <= _STILL)
-    found &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSED
-    found &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
-    _, pushed, _ = state.misfit()
-    least = _MISFIT / flexible.softness  # without load there is but rounding
-    largest = np.abs(state.through / rows.scale).max(axis=(0, 2, 3), initial=least)
-    found &= np.all(np.abs(pushed) * _lever(rows) <= _FREE * largest[:, None], axis=1)
-    return state.platform_screw, found
+    converged = active & (size <= _CONVERGED)
+    converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
+    converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
+    _, free_forces, _ = state.imbalance()
+    zero_load = _ZERO_LOAD / flexible.softness  # without load there is but rounding
+    largest = np.abs(state.total_wrenches / rows.scale).max(
+        axis=(0, 2, 3), initial=zero_load
+    )
+    converged &= np.all(
+        np.abs(free_forces) * _lever_arms(rows) <= _FREE_FORCE * largest[:, None],
+        axis=1,
+    )
+    return state.platform_screw, converged
 
 
-def _lever(rows: _Rows) -> NDArray:
-    """(q,) [1 or m] by which forces on free motions become moments."""
+def _lever_arms(rows: _Rows) -> NDArray:
+    """(q,) [1 or m] factors from forces along free motions to moments."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 
 
 def _correction(state: _State, first: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """Changes of screws, motions and multipliers that the linear model asks for."""
+    """Changes of screws, motions and multipliers by the linear model's inverse."""
     rows, flexible = state.rows, state.rows.flexible
-    lack, free, w = state.misfit()
-    count, shape = len(rows.here), (len(rows.here), -1, 6)
-    if rows.here.laws:
-        give = rows.tangent(w) if first else rows.deflection(w)
-        lack[1] += (give @ rows.contacts.T).reshape(shape)
+    screw_residual, free, w = state.imbalance()
+    count, shape = len(rows.conditions), (len(rows.conditions), -1, 6)
+    if rows.conditions.laws:
+        deflections = rows.tangent_deflection(w) if first else rows.deflection(w)
+        screw_residual[1] += (deflections @ rows.contacts.T).reshape(shape)
     J, softness, times = flexible.rows, flexible.softness, rows.times
-    left = state.residual + times(J, lack.sum(axis=0).reshape(count, -1))
-    b = -np.concatenate([left, free * softness], axis=1)
-    x = rows.corrected(b)
+    residual = state.residual + times(J, screw_residual.sum(axis=0).reshape(count, -1))
+    right_side = -np.concatenate([residual, free * softness], axis=1)
+    x = rows.corrected(right_side)
     multipliers, motions = x[:, : J.shape[1]] / softness, x[:, J.shape[1] :]
     closing = times(np.swapaxes(J, 1, 2), multipliers)
-    if rows.here.laws:
-        further = (closing @ rows.contacts) * rows.slope @ rows.contacts.T
-        lack[1] += further.reshape(shape)
-    lack[0] += np.einsum("nij,rnj->rni", flexible.bodies, closing.reshape(shape))
-    lack[1] += np.einsum("nij,rnj->rni", flexible.joints, closing.reshape(shape))
-    return lack, motions, multipliers
+    if rows.conditions.laws:
+        contact_part = (
+            (closing @ rows.contacts) * rows.contact_compliance @ rows.contacts.T
+        )
+        screw_residual[1] += contact_part.reshape(shape)
+    screw_residual[0] += np.einsum(
+        "nij,rnj->rni", flexible.body_compliances, closing.reshape(shape)
+    )
+    screw_residual[1] += np.einsum(
+        "nij,rnj->rni", flexible.joint_compliances, closing.reshape(shape)
+    )
+    return screw_residual, motions, multipliers

@@ -1,9 +1,9 @@
-"""What a measuring device reads: the platform's deviation, row by row of conditions.
+"""Predicted readings: the platform's deviation under each row of the conditions.
 
-Robots without play are solved together (:mod:`assembly.linear.without_clearance`, with
-finite motions :mod:`assembly.measurement.exact_rows`); rows with play, or whose
-closures' rank is in doubt, go through :mod:`assembly.linear.energy` and
-:mod:`assembly.exact.exact` one by one.
+Robots without clearances are solved together (:mod:`assembly.linear.without_clearance`,
+with finite motions :mod:`assembly.measurement.exact_rows`).  Rows with clearances, or
+whose closures have a numerically ambiguous rank, are solved one by one by
+:mod:`assembly.linear.energy` and :mod:`assembly.exact.exact`.
 
 Sources:
     Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
@@ -19,21 +19,25 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.without_clearance import flexibility, in_groups
 from assembly.measurement.conditions import Conditions, ContactLaw
 from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.settled_clearance import at_rest, fractions, taken_up
+from assembly.measurement.settled_clearance import (
+    fractions,
+    with_clearances_at_rest,
+    with_clearances_taken_up,
+)
 from assembly.model.links import in_series, own_screw
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
-_STEPS = 100
-_CORRECTED = 40  # configurations whose second order is found, of those one by one
-_SETTLED = 1e-11  # relative change of a contact's deflection
-_SETTLED_FINITE = 1e-5  # likewise, from the linear model's answer
+_ITERATIONS = 100  # at most
+_MOST_ONE_BY_ONE = 40  # configurations corrected to second order one by one
+_CONVERGED = 1e-11  # relative change of a contact's deflection
+_CONVERGED_FINITE = 1e-5  # likewise, from the solution of the linear model
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,229 +45,254 @@ class Prediction:
     """What R measurements should read.
 
     Attributes:
-        deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without an answer.
+        deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
         reason: (R,) why there is none, else empty.
-        open: (R,) bool, play leaves the pose free: the one shown is, in a closed chain,
-            the nearest to nominal, in an open one that of play in the middle.
+        undetermined: (R,) bool, clearances leave the pose undetermined.  The pose given
+            is, in a closed chain, the nearest to nominal; in an open one, that of
+            centred clearances.
     """
 
     deviation: NDArray
     reason: NDArray
-    open: NDArray
+    undetermined: NDArray
 
 
-def predict(here: Conditions) -> Prediction:
+def predict(conditions: Conditions) -> Prediction:
     """The platform's deviation from its nominal pose at the reference point.
 
     Args:
-        here: R situations of a robot.
+        conditions: R rows.
 
     Returns:
-        What is read in each.
+        The readings.
     """
-    play = bool(virtual_joints(here.robot).cones.shape[1])
-    open_ = np.zeros(len(here), dtype=bool)
+    has_clearance = bool(virtual_joints(conditions.robot).cones.shape[1])
+    undetermined = np.zeros(len(conditions), dtype=bool)
     one_by_one = None
-    if play and here.rest is not None:
-        here = at_rest(here)
-        # held play that finite motions cannot close has no answer one by one either
-        one_by_one = 0 if here.exact else None
-    elif play and not here.robot.closures and not here.exact:
-        here, open_ = taken_up(here)
-    screws, reason, left = _platform_screws(here, one_by_one)
-    open_ |= left
-    if not here.exact:
-        screws = screws + here.second_order
+    if has_clearance and conditions.rest is not None:
+        conditions = with_clearances_at_rest(conditions)
+        # clearances held at rest that finite motions cannot close: no solution either
+        # way
+        one_by_one = 0 if conditions.exact else None
+    elif has_clearance and not conditions.robot.closures and not conditions.exact:
+        conditions, undetermined = with_clearances_taken_up(conditions)
+    screws, reason, also_undetermined = _platform_screws(conditions, one_by_one)
+    undetermined |= also_undetermined
+    if not conditions.exact:
+        screws = screws + conditions.second_order
     known = np.isfinite(screws).all(axis=1)
     deviation = np.full_like(screws, np.nan)
     if known.any():
-        deviation[known] = read(here.take(known), screws[known])
-    return Prediction(deviation, reason, open_)
+        deviation[known] = read(conditions.take(known), screws[known])
+    return Prediction(deviation, reason, undetermined)
 
 
 def _platform_screws(
-    here: Conditions, one_by_one: int | None = None
+    conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Platform screws, some rows one by one.
 
     Returns:
-        (R, 6) the screws, (R,) why there are none, (R,) whether play leaves them free.
+        (R, 6) screws, (R,) why there is none, (R,) whether clearances leave the screw
+        undetermined.
     """
-    screws, open_ = np.full((len(here), 6), np.nan), np.zeros(len(here), dtype=bool)
-    reason = np.full(len(here), "", dtype=object)
-    left = np.ones(len(here), dtype=bool)
-    if not virtual_joints(here.robot).cones.shape[1]:
-        screws, solved = _without_play(here)
-        left = ~solved
-        screws[left], reason[left] = np.nan, "does not close together with others"
-    for row in np.flatnonzero(left)[:one_by_one].tolist():
+    screws, undetermined = (
+        np.full((len(conditions), 6), np.nan),
+        np.zeros(len(conditions), dtype=bool),
+    )
+    reason = np.full(len(conditions), "", dtype=object)
+    unsolved = np.ones(len(conditions), dtype=bool)
+    if not virtual_joints(conditions.robot).cones.shape[1]:
+        screws, solved = _without_clearance(conditions)
+        unsolved = ~solved
+        screws[unsolved], reason[unsolved] = (
+            np.nan,
+            "does not close together with others",
+        )
+    for row in np.flatnonzero(unsolved)[:one_by_one].tolist():
         try:
-            answer, open_[row] = _settled(here, row)
-            screws[row], reason[row] = answer.platform_screw, ""
+            assembly, undetermined[row] = _nearest_assembly(conditions, row)
+            screws[row], reason[row] = assembly.platform_screw, ""
         except (CannotAssemble, FreeMotion, SolverFailed) as error:
             screws[row], reason[row] = np.nan, str(error)
-    return screws, reason, open_
+    return screws, reason, undetermined
 
 
-def _settled(here: Conditions, row: int) -> tuple[Assembly | ExactAssembly, bool]:
-    """One situation, play where the pose is nearest to nominal.
+def _nearest_assembly(
+    conditions: Conditions, row: int
+) -> tuple[Assembly | ExactAssembly, bool]:
+    """One row's assembly, of the possible ones that with the pose nearest to nominal.
 
-    With finite motions that is so of the linear answer from which they start.
+    With finite motions this holds for the linear solution from which they start.
 
     Returns:
-        The assembly, and whether play leaves its pose free.
+        The assembly, and whether clearances leave its pose undetermined.
     """
-    answer = assemble_row(here, row)
-    offset = here.posture(row).platform[:3, :3] @ here.point
-    if isinstance(answer, Assembly):
-        return nearest_pose(answer, offset)
-    start, open_ = nearest_pose(answer.linear, offset)
-    if open_:
-        gravity = here.gravity[row] if here.gravity[row].any() else None
-        answer = solve_exact(
-            start.posture, here.load[row], start, gravity=gravity, point=here.point
+    assembly = assemble_row(conditions, row)
+    offset = conditions.posture(row).platform[:3, :3] @ conditions.point
+    if isinstance(assembly, Assembly):
+        return nearest_pose(assembly, offset)
+    start, undetermined = nearest_pose(assembly.linear, offset)
+    if undetermined:
+        gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
+        assembly = solve_exact(
+            start.posture,
+            conditions.load[row],
+            start,
+            gravity=gravity,
+            point=conditions.point,
         )
-    return answer, open_
+    return assembly, undetermined
 
 
-def with_second_order(here: Conditions) -> Conditions:
-    """Conditions whose linear answers carry what the declared errors do beyond it.
+def with_second_order(conditions: Conditions) -> Conditions:
+    """Conditions with the second-order part of the declared errors added.
 
     Near a singularity a robot's own geometric errors move it so far that the linear
     model is wrong by more than a device's noise, whatever the load.  The difference of
-    the exact and the linear platform screw without load is found once a configuration;
-    effects of load stay linear.
+    the exact and the linear platform screw without load is computed once for each
+    configuration; effects of load stay linear.
 
     Args:
-        here: R situations of a robot, as declared.
+        conditions: R rows, as declared.
 
     Returns:
         The same, ``second_order`` given.
     """
-    if virtual_joints(here.robot).cones.shape[1]:
-        return here  # where play rests without load is open
-    zero = np.zeros_like(here.load)
-    _, which = in_groups(here.postures)
+    if virtual_joints(conditions.robot).cones.shape[1]:
+        return conditions  # the rest position without load is undetermined
+    zero = np.zeros_like(conditions.load)
+    _, which = in_groups(conditions.postures)
     _, first = np.unique(which, return_index=True)
-    still = replace(here, load=zero, gravity=np.zeros_like(here.gravity), laws=())
-    found = _finite_part(still.take(first), _CORRECTED)
-    return replace(here, second_order=found[which])
+    unloaded = replace(
+        conditions, load=zero, gravity=np.zeros_like(conditions.gravity), laws=()
+    )
+    second_order = _finite_part(unloaded.take(first), _MOST_ONE_BY_ONE)
+    return replace(conditions, second_order=second_order[which])
 
 
-def with_finite_motions(here: Conditions) -> Conditions:
-    """Conditions whose linear answers carry all that finite motions add to them.
+def with_finite_motions(conditions: Conditions) -> Conditions:
+    """Conditions with all added that finite motions change in the linear model.
 
-    As :func:`with_second_order`, but row by row and under the loads there: what is
-    declared is then exact, and effects are to first order beside it.
+    As :func:`with_second_order`, but row by row and under each row's loads: the
+    declared model is then exact, and effects are added to first order.
 
     Args:
-        here: R situations of a robot, as declared.
+        conditions: R rows, as declared.
 
     Returns:
         The same, ``second_order`` given, and no longer ``exact`` if they were.
     """
-    return replace(here, exact=False, second_order=_finite_part(here))
+    return replace(conditions, exact=False, second_order=_finite_part(conditions))
 
 
-def _finite_part(here: Conditions, one_by_one: int | None = None) -> NDArray:
-    """(R, 6) exact minus linear platform screws; none where one has no answer."""
+def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
+    """(R, 6) exact minus linear platform screws; zero where one has no solution."""
     exact, linear = (
-        _platform_screws(replace(here, exact=finite), one_by_one)[0]
+        _platform_screws(replace(conditions, exact=finite), one_by_one)[0]
         for finite in (True, False)
     )
     return np.nan_to_num(exact - linear)
 
 
-def settle(here: Conditions) -> Conditions:
-    """Conditions that say where play rests, found once by the least energy.
+def with_rest_positions(conditions: Conditions) -> Conditions:
+    """Conditions with the rest positions of the clearances, by the least energy.
 
-    Effects may then be tried on them at the cost of a robot without play, true to first
-    order as long as joints keep touching where they touch.
+    Effects may then be tried at the cost of a robot without clearances, correct to
+    first order as long as the points of contact stay the same.
 
     Args:
-        here: R situations of a robot.
+        conditions: R rows.
 
     Returns:
-        The same, ``rest`` given; rows without an answer have it in the middle.
+        The same, ``rest`` given; centred in rows without a solution.
     """
-    rest = np.zeros_like(here.errors)
-    for row in range(len(here)):
+    rest = np.zeros_like(conditions.errors)
+    for row in range(len(conditions)):
         try:
-            answer, _ = _settled(here, row)
+            assembly, _ = _nearest_assembly(conditions, row)
         except (CannotAssemble, FreeMotion, SolverFailed):
             continue
-        rest[row] = fractions(here.robot, answer.clearance_screws)
-    return replace(here, rest=rest)
+        rest[row] = fractions(conditions.robot, assembly.clearance_screws)
+    return replace(conditions, rest=rest)
 
 
-def read(here: Conditions, screws: NDArray) -> NDArray:
-    """What the device makes of platform screws.
+def read(conditions: Conditions, screws: NDArray) -> NDArray:
+    """The device's readings of platform screws.
 
     Args:
-        here: R situations.
+        conditions: R rows.
         screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the
             platform's origin, base axes.
 
     Returns:
         (R, 6) [rad, m] the deviation read at the reference point.
     """
-    platform = here.postures.platform
+    platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
-    arm = R @ here.point
-    swung = np.einsum("rij,rj->ri", turn - np.eye(3), R @ (here.point + here.tool))
-    shift = screws[:, 3:] + swung + R @ here.tool
-    base = rotation_matrix(here.base[:3])
-    # the device's turn acts on the place itself; without one nothing is rounded off
-    where = (p + arm) @ (base - np.eye(3)).T + shift @ base.T + here.base[3:]
-    turned = rotation_vector(base @ turn) if here.base[:3].any() else screws[:, :3]
-    return np.concatenate([turned, where], axis=1) + here.reading
+    arm = R @ conditions.point
+    lever = np.einsum(
+        "rij,rj->ri", turn - np.eye(3), R @ (conditions.point + conditions.tool)
+    )
+    shift = screws[:, 3:] + lever + R @ conditions.tool
+    base = rotation_matrix(conditions.base[:3])
+    # the device's rotation acts on the position itself; without one, no rounding
+    translation = (
+        (p + arm) @ (base - np.eye(3)).T + shift @ base.T + conditions.base[3:]
+    )
+    rotation = (
+        rotation_vector(base @ turn) if conditions.base[:3].any() else screws[:, :3]
+    )
+    return np.concatenate([rotation, translation], axis=1) + conditions.reading
 
 
-def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
-    """One situation in full: every screw and wrench of the robot.
+def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
+    """One row in full: every screw and wrench of the robot.
 
     Args:
-        here: situations.
-        row: which.
+        conditions: of all rows.
+        row: index of one.
 
     Returns:
         The linear or the exact assembly, as the conditions ask.
 
     Raises:
-        CannotAssemble: a closure is open that nothing can close.
+        CannotAssemble: a closure cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the solver gave up.
+        SolverFailed: the solver failed, or contacts did not converge.
     """
-    posture = here.posture(row)
-    load = here.load_at_origin()[row]
-    gravity = here.gravity[row] if here.gravity[row].any() else None
-    give = np.zeros(len(here.laws))
-    if here.exact and here.laws:  # the linear model settles them almost, and at once
-        linear = assemble_row(replace(here, exact=False), row)
-        give = _secants(linear, here.laws)
-    answer: Assembly | ExactAssembly
-    for _ in range(_STEPS):
-        there = _softened(posture, here.laws, give)
-        if here.exact:
-            answer = solve_exact(
-                there, here.load[row], gravity=gravity, point=here.point
+    posture = conditions.posture(row)
+    load = conditions.load_at_origin()[row]
+    gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
+    compliances = np.zeros(len(conditions.laws))
+    if conditions.exact and conditions.laws:  # close to converged by the linear model
+        linear = assemble_row(replace(conditions, exact=False), row)
+        compliances = _secants(linear, conditions.laws)
+    assembly: Assembly | ExactAssembly
+    for _ in range(_ITERATIONS):
+        softened = _softened(posture, conditions.laws, compliances)
+        if conditions.exact:
+            assembly = solve_exact(
+                softened, conditions.load[row], gravity=gravity, point=conditions.point
             )
         else:
-            answer = solve_assembly(there, load, gravity=gravity)
-        before, give = give, _secants(answer, here.laws)
-        near = _SETTLED_FINITE if here.exact else _SETTLED
-        if np.all(np.abs(give - before) <= near * give):
-            return answer
-    raise SolverFailed("contact", f"deflections that do not settle in {_STEPS} steps")
+            assembly = solve_assembly(softened, load, gravity=gravity)
+        before, compliances = compliances, _secants(assembly, conditions.laws)
+        tolerance = _CONVERGED_FINITE if conditions.exact else _CONVERGED
+        if np.all(np.abs(compliances - before) <= tolerance * compliances):
+            return assembly
+    raise SolverFailed("contact", f"no convergence in {_ITERATIONS} iterations")
 
 
-def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> Posture:
+def _softened(
+    posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
+) -> Posture:
     """The posture with linear springs of the laws' secant compliance in series."""
-    if not give.any():
+    if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
-    for law, compliance in zip(laws, give, strict=True):
+    for law, compliance in zip(laws, compliances, strict=True):
         i = posture.robot.index(law.frame)
         f = frames[i]
         K = in_series(f.joint_stiffness, f.own_axis, float(compliance))
@@ -271,16 +300,20 @@ def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> 
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
 
-def _secants(answer: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]) -> NDArray:
+def _secants(
+    assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
+) -> NDArray:
     """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
-    robot = answer.posture.robot
-    through = answer.joint_wrenches if isinstance(answer, Assembly) else answer.wrenches
-    give = []
+    robot = assembly.posture.robot
+    through = (
+        assembly.joint_wrenches if isinstance(assembly, Assembly) else assembly.wrenches
+    )
+    compliances = []
     for law in laws:
         i = robot.index(law.frame)
         load = abs(through[i] @ own_screw(robot.frames[i]))
-        give.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
-    return np.array(give)
+        compliances.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
+    return np.array(compliances)
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
@@ -288,35 +321,37 @@ def _deflection(law: ContactLaw, load: float) -> float:
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 
-def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws of a robot without play, (R,) where they are solved."""
-    distinct, which = in_groups(here.postures)
+def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
+    """(R, 6) platform screws of a robot without clearances, (R,) whether solved."""
+    distinct, which = in_groups(conditions.postures)
     flexible = flexibility(distinct)
-    forces = row_forces(here.postures, here.load_at_origin(), here.gravity)
-    errors = here.errors.reshape(len(here), -1)
-    answer = flexible.solve(which, errors, forces)
-    screws, solved = answer.platform_screw, answer.solved
-    give = np.zeros((len(here), 0))
-    if here.laws:
-        columns = _law_columns(here)
-        w = answer.joint_wrenches @ columns
+    forces = loads_with_weight(
+        conditions.postures, conditions.load_at_origin(), conditions.gravity
+    )
+    errors = conditions.errors.reshape(len(conditions), -1)
+    solution = flexible.solve(which, errors, forces)
+    screws, solved = solution.platform_screw, solution.solved
+    deflections = np.zeros((len(conditions), 0))
+    if conditions.laws:
+        columns = _law_columns(conditions)
+        w = solution.joint_wrenches @ columns
         A = flexible.self_stress(columns)[which]
-        give, settled = _deflections(here.laws, w, A)
-        reach = flexible.platform_of(columns)[which]
-        screws = screws + np.einsum("rij,rj->ri", reach, give)
+        deflections, settled = _deflections(conditions.laws, w, A)
+        platform_screws = flexible.platform_of(columns)[which]
+        screws = screws + np.einsum("rij,rj->ri", platform_screws, deflections)
         solved = solved & settled
-    if here.exact:
-        screws, found = solve_rows(here, give)
-        solved = solved & found
+    if conditions.exact:
+        screws, converged = solve_rows(conditions, deflections)
+        solved = solved & converged
     return screws, solved
 
 
-def _law_columns(here: Conditions) -> NDArray:
+def _law_columns(conditions: Conditions) -> NDArray:
     """(6n, s) unit screws of the joints with a contact law."""
-    columns = np.zeros((6 * len(here.robot.frames), len(here.laws)))
-    for k, law in enumerate(here.laws):
-        i = here.robot.index(law.frame)
-        columns[6 * i : 6 * i + 6, k] = own_screw(here.robot.frames[i])
+    columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
+    for k, law in enumerate(conditions.laws):
+        i = conditions.robot.index(law.frame)
+        columns[6 * i : 6 * i + 6, k] = own_screw(conditions.robot.frames[i])
     return columns
 
 
@@ -325,11 +360,11 @@ def _deflections(
 ) -> tuple[NDArray, NDArray]:
     """Deflections d of contacts, c |d|^n sign(d) = w + A d.
 
-    Least of a strictly convex function (A is negative semidefinite): Newton's method,
-    each step halved until the gradient shrinks.
+    They minimise a strictly convex function (A is negative semidefinite): Newton's
+    method, each step halved until the gradient decreases.
 
     Returns:
-        (R, s) deflections, and (R,) whether they were found.
+        (R, s) deflections, and (R,) whether they converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])
@@ -340,21 +375,21 @@ def _deflections(
         return (own - w - np.einsum("rij,rj->ri", A, d)) / scale
 
     d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
-    left = gradient(d)
+    residual = gradient(d)
     tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
-    for _ in range(_STEPS):
-        norm = np.linalg.norm(left, axis=1)
-        if np.all(norm <= _SETTLED):
+    for _ in range(_ITERATIONS):
+        norm = np.linalg.norm(residual, axis=1)
+        if np.all(norm <= _CONVERGED):
             break
         slope = c * n * np.abs(d) ** (n - 1) + tiny
         H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
-        step = -np.linalg.solve(H, (left * scale)[..., None])[..., 0]
-        length = np.where(norm <= _SETTLED, 0.0, 1.0)
+        step = -np.linalg.solve(H, (residual * scale)[..., None])[..., 0]
+        length = np.where(norm <= _CONVERGED, 0.0, 1.0)
         for _ in range(30):
-            there = gradient(d + length[:, None] * step)
-            worse = (np.linalg.norm(there, axis=1) > norm) & (length > 0)
+            trial = gradient(d + length[:, None] * step)
+            worse = (np.linalg.norm(trial, axis=1) > norm) & (length > 0)
             if not worse.any():
                 break
             length = np.where(worse, length / 2, length)
-        d, left = d + length[:, None] * step, there
-    return d, np.linalg.norm(left, axis=1) <= 1e-8
+        d, residual = d + length[:, None] * step, trial
+    return d, np.linalg.norm(residual, axis=1) <= 1e-8

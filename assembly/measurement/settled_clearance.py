@@ -1,8 +1,8 @@
-"""Play taken up by the load: each joint rests against its cone, where the load pushes.
+"""Clearances taken up by the load: each joint rests in contact, at its bound.
 
 A joint that transmits the wrench w rests at the point of its clearance cones farthest
 along w.  In a robot without closures the wrenches follow from the loads alone, and this
-is the exact minimum of (22); with closures it is its limit for small play, by the
+is the exact minimum of (22); with closures it is its limit for small clearances, by the
 envelope theorem: dE/d(bound) = -|w| in the cone's directions.
 """
 
@@ -11,85 +11,101 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.without_clearance import flexibility, in_groups
 from assembly.measurement.conditions import Conditions
-from assembly.model.clearance import CONES, clearance_bounds, scales_with_margin
+from assembly.model.clearance import (
+    CONES,
+    clearance_bounds,
+    component_bounds,
+    scales_with_margin,
+)
 from assembly.model.robot import Clearance, Frame, Robot
 
-_PUSHED = 1e-9  # of the largest wrench of its kind: less pushes nowhere
+_UNLOADED = 1e-9  # of the largest wrench of its kind: less is no load
 
 
-def taken_up(here: Conditions) -> tuple[Conditions, NDArray]:
-    """Conditions with play replaced by the screws it takes up under the load.
+def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
+    """Conditions with clearances replaced by their screws under the load.
 
     Args:
-        here: R situations of a robot with play.
+        conditions: R rows of a robot with clearances.
 
     Returns:
-        The same situations of the robot without play, the play among its errors, and
-        (R,) whether some joint with play transmits nothing, so that where it rests is
-        open; it is then left in the middle.
+        The same rows of the robot without clearances, their screws among its errors,
+        and (R,) whether some joint with a clearance transmits no load, so that its rest
+        position is undetermined; it is then centred.
     """
-    tight = replace(here, robot=without_play(here.robot))
-    distinct, which = in_groups(tight.postures)
-    errors = here.errors.reshape(len(here), -1)
-    forces = row_forces(tight.postures, tight.load_at_origin(), tight.gravity)
-    through = flexibility(distinct).solve(which, errors, forces).joint_wrenches
-    wrenches = through.reshape(len(here), -1, 6)
-    bounds = np.where(scales_with_margin(here.robot), clearance_bounds(here.robot), 0.0)
-    play, open_ = np.zeros_like(wrenches), np.zeros(len(here), dtype=bool)
+    tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
+    distinct, posture_of_row = in_groups(tight.postures)
+    errors = conditions.errors.reshape(len(conditions), -1)
+    loads = loads_with_weight(tight.postures, tight.load_at_origin(), tight.gravity)
+    through = flexibility(distinct).solve(posture_of_row, errors, loads).joint_wrenches
+    wrenches = through.reshape(len(conditions), -1, 6)
+    bounds = np.where(
+        scales_with_margin(conditions.robot), clearance_bounds(conditions.robot), 0.0
+    )
+    clearance_screws, undetermined = (
+        np.zeros_like(wrenches),
+        np.zeros(len(conditions), dtype=bool),
+    )
     for cone, rows in enumerate(CONES):
-        pushed = wrenches[:, :, list(rows)]
-        size = np.linalg.norm(pushed, axis=2)
-        rests = size > _PUSHED * size.max(initial=0.0)
-        unit = pushed / np.where(rests, size, 1.0)[:, :, None]
-        play[:, :, list(rows)] = unit * (rests * bounds[:, cone])[:, :, None]
-        open_ |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
-    return replace(tight, errors=here.errors + play), open_
+        parts = wrenches[:, :, list(rows)]
+        size = np.linalg.norm(parts, axis=2)
+        rests = size > _UNLOADED * size.max(initial=0.0)
+        unit = parts / np.where(rests, size, 1.0)[:, :, None]
+        clearance_screws[:, :, list(rows)] = (
+            unit * (rests * bounds[:, cone])[:, :, None]
+        )
+        undetermined |= np.any(~rests & (bounds[:, cone] > 0.0), axis=1)
+    return replace(tight, errors=conditions.errors + clearance_screws), undetermined
 
 
-def at_rest(here: Conditions) -> Conditions:
-    """Conditions with play replaced by the screws at which it is said to rest.
+def with_clearances_at_rest(conditions: Conditions) -> Conditions:
+    """Conditions with clearances replaced by their screws at the rest positions.
 
     Args:
-        here: R situations of a robot with play, ``rest`` given.
+        conditions: R rows of a robot with clearances, ``rest`` given.
 
     Returns:
-        The same situations of the robot without play, the play among its errors.
+        The same rows of the robot without clearances, their screws among its errors.
 
     Raises:
         ValueError: no ``rest`` is given.
     """
-    if here.rest is None:
-        raise ValueError("at_rest: conditions do not say where play rests")
-    play = here.rest * _bounds_by_row(here.robot)
-    robot = without_play(here.robot)
-    return replace(here, robot=robot, errors=here.errors + play, rest=None)
+    if conditions.rest is None:
+        raise ValueError("conditions have no rest positions of the clearances")
+    clearance_screws = conditions.rest * _component_bounds(conditions.robot)
+    robot = without_joint_clearances(conditions.robot)
+    return replace(
+        conditions, robot=robot, errors=conditions.errors + clearance_screws, rest=None
+    )
 
 
-def _bounds_by_row(robot: Robot) -> NDArray:
-    """(n, 6) bound of every row of a clearance screw; 0 where it is no play."""
+def _component_bounds(robot: Robot) -> NDArray:
+    """(n, 6) bound of every component of a clearance screw; 0 without clearance."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
-    return bounds[:, [0, 0, 1, 2, 2, 3]]
+    return component_bounds(bounds)
 
 
-def fractions(robot: Robot, play: NDArray) -> NDArray:
+def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
     """Clearance screws in units of their bounds.
 
     Args:
         robot: of n frames.
-        play: (n, 6) [rad, m].
+        clearance_screws: (n, 6) [rad, m].
 
     Returns:
-        (n, 6) [-], 0 where there is no play.
+        (n, 6) [-], 0 where there is no clearance.
     """
-    bounds = _bounds_by_row(robot)
+    bounds = _component_bounds(robot)
     finite = np.isfinite(bounds) & (bounds > 0)
-    return np.divide(play, bounds, out=np.zeros_like(play), where=finite)
+    return np.divide(
+        clearance_screws, bounds, out=np.zeros_like(clearance_screws), where=finite
+    )
 
 
-def without_play(robot: Robot) -> Robot:
+def without_joint_clearances(robot: Robot) -> Robot:
     """The robot with tight joints; bounds of passive joints' own motion stay.
 
     Args:

@@ -1,4 +1,4 @@
-"""How much each joint may play: the clearance cones, eqs (1)-(5).
+"""Joint clearances, eqs (1)-(5): bounds on small screws, each a cone.
 
 ======  ====================  =======  ==========================================
 symbol  code                  shape    meaning
@@ -10,38 +10,49 @@ The free motion of a passive joint is one of these directions without a bound (o
 the bound the file gives for it), so a joint's own motion needs no special place.
 """
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Clearance, Frame, Robot
 
-CONES = ((0, 1), (2,), (3, 4), (5,))  # rows of the screw that each bound limits
+# what passive joints with stiffness do, see assembly.linear.closure.virtual_joints
+Compliant = Literal["elastic", "hinged", "rigid", "free"]
+CONES = ((0, 1), (2,), (3, 4), (5,))  # components of the screw that each bound limits
+BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # the bound that limits each component
 _KEYS = ("tilt", "spin", "radial", "axial")
 
 
-def clearance_bounds(robot: Robot, compliant: str = "elastic") -> NDArray:
-    """Bounds of every joint's play.
+def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
+    """Bounds of every joint's clearance.
 
     Args:
         robot: of n frames.
         compliant: what a passive joint with stiffness does about or along its own z:
-            ``"elastic"``, only its spring moves (and ``spin``, if given, is play in
-            series); ``"free"``, it moves freely: the second reading of problem (21).
+            ``"elastic"``, only its spring moves (and ``spin``, if given, is a clearance
+            in series); ``"free"``, it moves freely: the second reading of problem (21);
+            ``"rigid"`` bounds are the elastic ones, ``"hinged"`` the free ones.
 
     Returns:
         (n, 4) [rad, rad, m, m] for [RXY RZ TXY TZ]: 0 is rigid, inf is free.
     """
     bounds = np.zeros((len(robot.frames), 4))
     for i, frame in enumerate(robot.frames):
-        play = frame.clearance or Clearance()
-        bounds[i] = [getattr(play, key) or 0.0 for key in _KEYS]
+        clearance = frame.clearance or Clearance()
+        bounds[i] = [getattr(clearance, key) or 0.0 for key in _KEYS]
         own = own_cone(frame)
         if own is not None:
-            given = getattr(play, _KEYS[own])
+            given = getattr(clearance, _KEYS[own])
             bounds[i, own] = np.inf if given is None else given
-        elif frame.compliant and compliant == "free":
+        elif frame.compliant and compliant in {"free", "hinged"}:
             bounds[i, 3 if frame.joint == "prismatic" else 1] = np.inf
     return bounds
+
+
+def component_bounds(bounds: NDArray) -> NDArray:
+    """(n, 6) the bound of each component of a screw, from bounds (n, 4)."""
+    return bounds[:, list(BOUND_OF_COMPONENT)]
 
 
 def own_cone(frame: Frame) -> int | None:
@@ -52,7 +63,7 @@ def own_cone(frame: Frame) -> int | None:
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """(n, 4) bool: bounds that are play, not the range of a passive joint's motion."""
+    """(n, 4) bool: bounds of clearances, not the range of a passive joint's motion."""
     scaled = np.ones((len(robot.frames), 4), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)

@@ -1,4 +1,4 @@
-"""How geometric errors are distributed, and draws of them that any worker can repeat.
+"""Distributions of the geometric errors, and draws that any process can repeat.
 
 Each source is one component of one frame's delta l and reads ``centre + scale s``:
 
@@ -9,15 +9,15 @@ normal      s ~ N(0, 1), scale the standard deviation
 truncated   the same, cut where abs(s) exceeds ``limit`` standard deviations
 =========== ======================================================================
 
-Draw number i takes its numbers from one place of a counter-based generator, whatever
-was drawn before and by whom: a run may be cut, resumed or spread in any way.
+Draw number i takes its numbers from one place of a counter-based generator, whichever
+draws came before: a run may be interrupted, resumed or distributed in any way.
 
 Sources:
     Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
     (Philox).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,10 @@ from stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")
 _LARGEST = 1e3  # [rad, m] beyond any error
+# columns of the rows of _rows
+_COLUMNS = (
+    "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
+)  # fmt: skip
 _WORDS = 4  # numbers that one step of Philox gives
 
 
@@ -78,13 +82,13 @@ class ErrorSources:
         """(..., m) the values s that go with numbers uniform between 0 and 1."""
         v = 2.0 * uniform - 1.0
         size = self.least + (1.0 - self.least) * np.where(self.signed, abs(v), uniform)
-        even = np.where(self.signed, np.copysign(size, v), size)
+        uniform_values = np.where(self.signed, np.copysign(size, v), size)
         if not (self.kind > 0).any():
-            return even
-        # a truncated source uses the part of the bell within its limits only
+            return uniform_values
+        # a truncated source uses the normal distribution within its limits only
         tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
-        bell = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
-        return np.where(self.kind == 0, even, bell)
+        normal_values = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
+        return np.where(self.kind == 0, uniform_values, normal_values)
 
     def values(self, standard: NDArray) -> NDArray:
         """(..., m) [rad or m] errors that go with values s."""
@@ -105,8 +109,8 @@ class ErrorSources:
         steps = -(-max(1, len(self)) // _WORDS)
         philox = np.random.Philox(key=np.array([seed, stream], dtype=np.uint64))
         philox.advance(first * steps)
-        numbers = np.random.Generator(philox).random((count, steps * _WORDS))
-        return numbers[:, : len(self)]
+        uniform = np.random.Generator(philox).random((count, steps * _WORDS))
+        return uniform[:, : len(self)]
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
         """(count, m) [rad or m] the errors of some draws; see :meth:`uniforms`."""
@@ -128,23 +132,20 @@ class ErrorSources:
     def variance(self) -> NDArray:
         """(m,) [rad^2 or m^2] of every error."""
         a = self.least
-        even = np.where(self.signed, (1 + a + a**2) / 3, (1 - a) ** 2 / 12)
+        uniform = np.where(self.signed, (1 + a + a**2) / 3, (1 - a) ** 2 / 12)
         cut = np.where(self.kind == 2, self.limit, 8.0)
         density = np.exp(-(cut**2) / 2) / np.sqrt(2 * np.pi)
         inside = 1.0 - 2.0 * ndtr(-cut)
-        bell = np.where(self.kind == 2, 1.0 - 2.0 * cut * density / inside, 1.0)
-        return self.scale**2 * np.where(self.kind == 0, even, bell)
+        normal = np.where(self.kind == 2, 1.0 - 2.0 * cut * density / inside, 1.0)
+        return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
         """The same sources with other scales (m,) [rad or m]."""
-        return ErrorSources(
-            self.robot, self.frame, self.component, self.kind, self.centre,
-            np.asarray(scale, dtype=float), self.least, self.limit, self.signed,
-        )  # fmt: skip
+        return replace(self, scale=np.asarray(scale, dtype=float))
 
 
 def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
-    """Random numbers of one draw, as many as it likes.
+    """Generator of the random numbers of one draw.
 
     Args:
         seed: of all draws, below 2^64.
@@ -184,16 +185,24 @@ def tolerance_sources(
     names = frames_named(robot, frames) if frames is not None else tuple(
         f.name for f in robot.frames if f.link is not None or f.geometric_error.any()
     )  # fmt: skip
-    some = np.flatnonzero(np.asarray(tolerances, dtype=float) > 0)
+    components = np.flatnonzero(np.asarray(tolerances, dtype=float) > 0)
     rows = np.array([robot.index(name) for name in names], dtype=int)
-    frame, component = np.repeat(rows, len(some)), np.tile(some, len(rows))
+    frame, component = (
+        np.repeat(rows, len(components)), np.tile(components, len(rows))
+    )  # fmt: skip
     count, cut = len(frame), distribution == "truncated"
     width = np.asarray(tolerances, dtype=float)[component]
     return ErrorSources(
-        robot, frame, component, np.full(count, KINDS.index(distribution)),
-        np.zeros(count), width / deviations if cut else width, np.zeros(count),
-        np.full(count, deviations), np.ones(count, dtype=bool),
-    )  # fmt: skip
+        robot=robot,
+        frame=frame,
+        component=component,
+        kind=np.full(count, KINDS.index(distribution)),
+        centre=np.zeros(count),
+        scale=width / deviations if cut else width,
+        least=np.zeros(count),
+        limit=np.full(count, deviations),
+        signed=np.ones(count, dtype=bool),
+    )
 
 
 def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
@@ -223,15 +232,14 @@ def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
             name = f"{robot.frames[i].name}.{SCREW[c]}"
             raise table.bad("", f"found {quoted(name)} again, first in {seen[i, c]}")
         seen[i, c] = table.place
-    columns = [np.array(column) for column in zip(*(r for r, _ in rows), strict=True)]
-    frame, component, kind, centre, scale, least, limit, signed = columns
+    columns = zip(*(row for row, _ in rows), strict=True)
     return ErrorSources(
-        robot, frame, component, kind, centre, scale, least, limit, signed
+        robot, **dict(zip(_COLUMNS, map(np.array, columns), strict=True))
     )
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """What one ``[[errors]]`` table says, a row for each source."""
+    """The sources of one ``[[errors]]`` table: a row each, and the table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")

@@ -48,15 +48,15 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))
         x, y, z = (axis / length).tolist()
-        answer = replace(link, length=length, axis=(x, y, z)) if shift else link
+        spanned = replace(link, length=length, axis=(x, y, z)) if shift else link
     else:
-        axis, answer = np.array(link.axis), link
+        axis, spanned = np.array(link.axis), link
     try:
         section_axes(axis, link.up)
     except BadInput as error:
         place = f"frame {quoted(frame.name)}.link.beam.up"
         raise BadInput(f"{place}: {error}; expected another direction") from None
-    return answer
+    return spanned
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:

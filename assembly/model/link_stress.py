@@ -1,10 +1,10 @@
 """The largest stress in every link, from the wrench it transmits.
 
 A link is held at its base and loaded by its frame's wrench at the tip.  Beams follow
-the formulas of :mod:`stiffness.beam.beam_stress`; links given by a surface the
-influence of unit wrenches found by finite elements (:mod:`stiffness.fem.stress`), which
-leaves out what is nearer than an interface's radius to a clamped, singular edge.  A
-link given by its stiffness alone has no known stress.
+the formulas of :mod:`stiffness.beam.beam_stress`.  Links given by a surface follow the
+stress influence of unit wrenches, by finite elements (:mod:`stiffness.fem.stress`); it
+leaves out points nearer than an interface's radius to a clamped, singular edge.  The
+stress of a link given by its stiffness alone is not known.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,7 +42,7 @@ class LinkStress:
 
 @lru_cache(maxsize=16)
 def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
-    """Links whose stress can be known, in the robot's order of frames.
+    """Links whose stress can be computed, in the robot's order of frames.
 
     Args:
         robot: any.
@@ -138,8 +138,8 @@ def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
     section, R = frame.link.section, section_axes(axis, frame.link.up)
 
     def peak(wrench: NDArray) -> NDArray:
-        own = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
-        return peak_beam_stress(section, length, own)[0]
+        in_section_axes = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
+        return peak_beam_stress(section, length, in_section_axes)[0]
 
     return peak
 
@@ -165,11 +165,11 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
     R = mesh_turn(frame, solved.link.tip - solved.link.base)
 
     def peak(wrench: NDArray) -> NDArray:
-        own = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
-        peaks = np.zeros(len(own))
-        for first in range(0, len(own), _CHUNK):
-            some = own[first : first + _CHUNK]
-            stress = np.tensordot(some, influence.influence, axes=(1, 1))
+        in_mesh_axes = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
+        peaks = np.zeros(len(in_mesh_axes))
+        for first in range(0, len(in_mesh_axes), _CHUNK):
+            chunk = in_mesh_axes[first : first + _CHUNK]
+            stress = np.tensordot(chunk, influence.influence, axes=(1, 1))
             peaks[first : first + _CHUNK] = von_mises(stress).max(axis=1)
         return peaks
 

@@ -1,4 +1,4 @@
-"""K_E of a mesh link, put where the robot has it: turned from mesh to frame axes."""
+"""K_E of a mesh link, rotated from the mesh's axes to the frame's."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,10 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     place = f'frame "{frame.name}".link.mesh'
     solved = _solved(link, accuracy, place)
-    reach = solved.tip - solved.base
-    turn = mesh_turn(frame, reach)
+    span = solved.tip - solved.base
+    turn = mesh_turn(frame, span)
     if link.axis is None:
-        _check_tip(place, turn @ reach, _between_origins(frame))
+        _check_tip(place, turn @ span, _between_origins(frame))
     return turn_link(solved, turn)
 
 
@@ -42,7 +42,7 @@ def mesh_compliance(frame: Frame) -> NDArray:
     return mesh_link_stiffness(frame).compliance
 
 
-_KNOWN: dict[tuple, LinkStiffness] = {}  # solved before by this process
+_SOLVED: dict[tuple, LinkStiffness] = {}  # by this process
 
 
 def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
@@ -58,30 +58,30 @@ def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
         ) from None
     shape = (link.surface, stamp, link.unit, repr(link.base), repr(link.tip))
     key = (*shape, link.young, link.poisson, link.interface, accuracy)
-    if key not in _KNOWN:
-        _KNOWN[key] = mesh_link(
+    if key not in _SOLVED:
+        _SOLVED[key] = mesh_link(
             link.surface,
             parse_interface(link.base, f"{place}.base"),
             parse_interface(link.tip, f"{place}.tip"),
             link.young, link.poisson,
             unit=link.unit, accuracy=accuracy, interface=link.interface,
         )  # fmt: skip
-    return _KNOWN[key]
+    return _SOLVED[key]
 
 
-def mesh_turn(frame: Frame, reach: NDArray) -> NDArray:
+def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
     """Rotation from a frame's mesh's axes to the frame's.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
-        reach: (3,) [m] from base to tip in the mesh's axes.
+        mesh_span: (3,) [m] from base to tip in the mesh's axes.
 
     Returns:
-        (3, 3) it lays the reach along the link's ``axis``, or along the way from the
+        (3, 3) it lays the span along the link's ``axis``, or along the line from the
         parent's origin to the frame's if it has none.
 
     Raises:
-        BadInput: the mesh's ``up`` lies along the reach.
+        BadInput: the mesh's ``up`` lies along the span.
         ValueError: the frame has no mesh link.
     """
     link = frame.link
@@ -89,12 +89,12 @@ def mesh_turn(frame: Frame, reach: NDArray) -> NDArray:
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     if link.up is not None:
         try:
-            section_axes(reach, link.up)
+            section_axes(mesh_span, link.up)
         except BadInput as error:
             place = f"frame {quoted(frame.name)}.link.mesh.up"
             raise BadInput(f"{place}: {error}; expected another direction") from None
     span = _between_origins(frame) if link.axis is None else np.array(link.axis)
-    return mesh_rotation(reach, span, link.up, link.frame_up)
+    return mesh_rotation(mesh_span, span, link.up, link.frame_up)
 
 
 def _between_origins(frame: Frame) -> NDArray:

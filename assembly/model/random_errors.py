@@ -75,8 +75,8 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
         BadInput: a name fits no frame.
     """
     known = [f.name for f in robot.frames]
-    found = set()
+    chosen = set()
     for name in names:
         fits = {k for k in known if k == name or k.split(".", 1)[-1] == name}
-        found |= fits or {known[robot.index(name)]}  # index() names the nearest
-    return tuple(k for k in known if k in found)
+        chosen |= fits or {known[robot.index(name)]}  # index() names the nearest
+    return tuple(k for k in known if k in chosen)

@@ -1,222 +1,37 @@
 """A manipulator as data: a tree of frames, and the closures that hold it together.
 
-A frame stands for two things, the body that reaches from its parent to it and the
-joint at the body's far end (``docs/robot_files.md``).  Small screws act at it in the
-paper's order, in its axes: geometric error, link deformation, joint clearance, joint
-deformation; then the joint's own motion about or along its z carries the children.
+What a frame is: :mod:`assembly.model.frame`, whose names may be imported from here.
 """
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.model.frame import (
+    BASE,
+    JOINTS,
+    LOCKED,
+    BeamLink,
+    Clearance,
+    Frame,
+    LibraryLink,
+    Link,
+    MatrixLink,
+    MeshLink,
+    beam_axis,
+    locked,
+)
 from forcefit.inputs.display import Figures, html_table, largest, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import rotation_matrix, transform
 
-JOINTS = ("fixed", "revolute", "prismatic")
-BASE = "base"
-LOCKED = (
-    "found inf along the own motion of a passive joint, which would lock it; expected "
-    '0 (free, as a bearing), a number > 0 (a spring), or joint = "fixed"'
-)
-
-
-@dataclass(frozen=True)
-class Clearance:
-    """Bounds of a joint's play, the paper's c-bar of eqs. (1)-(5).
-
-    ``None`` is "not given": no play, except along the free motion of a passive joint,
-    where it means unbounded.
-
-    Attributes:
-        radial: [m] radius of the disc for (TX, TY), eq. (2).
-        axial: [m] bound of abs(TZ), eq. (3).
-        tilt: [rad] radius of the disc for (RX, RY), eq. (4).
-        spin: [rad] bound of abs(RZ), eq. (5).
-    """
-
-    radial: float | None = None
-    axial: float | None = None
-    tilt: float | None = None
-    spin: float | None = None
-
-
-@dataclass(frozen=True)
-class BeamLink:
-    """A straight beam between the parent's origin and the frame's.
-
-    Attributes:
-        section: the section's declared numbers, such as ``{"radius": 0.04}`` [m].
-        young: [Pa] Young's modulus.
-        poisson: [-] Poisson's ratio.
-        density: [kg/m^3] or None if the link has no declared mass.
-        theory: ``"timoshenko"`` or ``"euler"``.
-        length: [m] if it is not the distance of the origins, else None.
-        axis: unit vector from base to tip in the frame's axes, together with length.
-        up: direction of the section's height in the frame's axes, or None.
-    """
-
-    section: dict[str, float]
-    young: float
-    poisson: float
-    density: float | None = None
-    theory: str = "timoshenko"
-    length: float | None = None
-    axis: tuple[float, float, float] | None = None
-    up: tuple[float, float, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class MatrixLink:
-    """A link given by its stiffness K_E at the frame, in the frame's axes.
-
-    Attributes:
-        stiffness: (6, 6) [N m/rad .. N/m] symmetric positive definite.
-    """
-
-    stiffness: NDArray
-
-
-@dataclass(frozen=True)
-class MeshLink:
-    """A link whose K_E comes from finite elements on its surface.
-
-    Attributes:
-        surface: the surface file.
-        base: interface at the parent's side, as written in robot files.
-        tip: interface at the frame's side.
-        young: [Pa] Young's modulus.
-        poisson: [-] Poisson's ratio.
-        density: [kg/m^3] or None.
-        unit: length unit of the surface file.
-        up: with ``frame_up`` fixes the roll: a direction in the mesh's axes.
-        frame_up: the same direction in the frame's axes.
-        axis: direction from base to tip in the frame's axes; None from the parent's
-            origin to the frame's.
-        interface: ``"rigid"`` or ``"distributing"``.
-    """
-
-    surface: Path
-    base: str | dict
-    tip: str | dict
-    young: float
-    poisson: float
-    density: float | None = None
-    unit: str = "m"
-    up: tuple[float, float, float] | None = None
-    frame_up: tuple[float, float, float] | None = None
-    interface: str = "rigid"
-    axis: tuple[float, float, float] | None = None
-
-
-@dataclass(frozen=True)
-class LibraryLink:
-    """A link whose K_E is kept in a stiffness library.
-
-    Attributes:
-        library: the library's path.
-        key: the entry's key.
-    """
-
-    library: Path
-    key: str
-
-
-Link = BeamLink | MatrixLink | MeshLink | LibraryLink
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One body and the joint at its far end; see the head of this module.
-
-    Attributes:
-        name: unique; dots group by leg.
-        parent: name of the parent frame, or ``"base"``.
-        translation: (3,) [m] origin seen from the parent's frame after its joint.
-        rotation: (3,) [rad] rotation vector of the axes, likewise.
-        joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
-        actuated: a locked, commanded joint; otherwise its motion is free.
-        position: [rad or m] joint coordinate in the home pose.
-        geometric_error: (6,) [rad, m] delta l.
-        clearance: the joint's play, None if it has none.
-        joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
-            0 along a passive joint's own motion (its row and column) leaves it free.
-        link: elasticity of the body, None if rigid.
-        mass: [kg] of the body beside its link's own.
-        centre_of_mass: (3,) [m] of that mass, in the frame's axes.
-    """
-
-    name: str
-    parent: str = BASE
-    translation: NDArray = field(default_factory=lambda: np.zeros(3))
-    rotation: NDArray = field(default_factory=lambda: np.zeros(3))
-    joint: str = "fixed"
-    actuated: bool = False
-    position: float = 0.0
-    geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
-    clearance: Clearance | None = None
-    joint_stiffness: NDArray | None = None
-    link: Link | None = None
-    mass: float = 0.0
-    centre_of_mass: NDArray = field(default_factory=lambda: np.zeros(3))
-
-    __repr__, _repr_html_ = short_repr, html_table
-
-    def __post_init__(self) -> None:
-        for name, shape in _SHAPES.items():
-            value = getattr(self, name)
-            if value is not None:
-                value = _locked(value, shape, f"frame '{self.name}': {name}")
-                object.__setattr__(self, name, value)
-        own = self.own_stiffness
-        if self.passive and own is not None and np.isinf(own):
-            raise BadInput(f"frame {quoted(self.name)}.joint_stiffness: {LOCKED}")
-
-    @property
-    def passive(self) -> bool:
-        """Whether the joint moves by itself: a mobile joint that is not driven."""
-        return self.joint != "fixed" and not self.actuated
-
-    @property
-    def compliant(self) -> bool:
-        """Whether the joint is passive and its motion is a spring's."""
-        return self.passive and bool(self.own_stiffness)
-
-    @property
-    def own_axis(self) -> int:
-        """Row of the screw along which the joint moves: RZ, or TZ if prismatic."""
-        return 5 if self.joint == "prismatic" else 2
-
-    @property
-    def own_stiffness(self) -> float | None:
-        """[N m/rad or N/m] of K_B along the joint's motion, None without K_B."""
-        K = self.joint_stiffness
-        return None if K is None else float(K[self.own_axis, self.own_axis])
-
-    @property
-    def springs(self) -> NDArray | None:
-        """(6, 6) K_B of what deforms: ``inf`` also along a motion that is free."""
-        K = self.joint_stiffness
-        if K is None or self.compliant or not self.passive:
-            return K
-        K = K.copy()
-        K[self.own_axis, self.own_axis] = np.inf
-        return K
-
-
-_SHAPES = {
-    "translation": (3,),
-    "rotation": (3,),
-    "geometric_error": (6,),
-    "joint_stiffness": (6, 6),
-    "centre_of_mass": (3,),
-}
+__all__ = [
+    "BASE", "JOINTS", "LOCKED", "BeamLink", "Clearance", "Frame", "LibraryLink",
+    "Link", "MatrixLink", "MeshLink", "Robot", "beam_axis", "parents_first",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +48,7 @@ class Robot:
         description: one line.
         effects: parameters of the effects that the machine is known to have, by name;
             see :mod:`assembly.effects`.
-        remarks: what its file leaves to a default that is easily overlooked.
+        remarks: defaults of its file that are easily overlooked.
     """
 
     name: str
@@ -247,7 +62,7 @@ class Robot:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """What one asks for first."""
+        """The summary that is printed."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
         return {
@@ -255,7 +70,7 @@ class Robot:
             "closures": str(len(self.closures)),
             "platform": self.platform,
             "links": f"{sum(f.link is not None for f in self.frames)} elastic",
-            "play": f"in {sum(f.clearance is not None for f in self.frames)} joints",
+            "clearance": f"in {sum(map(_has_clearance, self.frames))} joints",
             "largest error": largest(self.errors),
             **({"effects": ", ".join(self.effects)} if self.effects else {}),
         }
@@ -332,7 +147,7 @@ class Robot:
         Returns:
             A new robot.
         """
-        rows = _locked(errors, (len(self.frames), 6), f"{self.name}: errors")
+        rows = locked(errors, (len(self.frames), 6), f"{self.name}: errors")
         frames = zip(self.frames, rows, strict=True)
         return replace(
             self, frames=tuple(replace(f, geometric_error=e) for f, e in frames)
@@ -344,6 +159,11 @@ class Robot:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
         return replace(self, frames=tuple(frames))
+
+
+def _has_clearance(frame: Frame) -> bool:
+    """Whether a clearance was given."""
+    return frame.clearance is not None
 
 
 def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
@@ -403,39 +223,3 @@ def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ..
             return tuple(sorted(frames, key=lambda f: depth[f.name]))
         seen.add(frame.name)
     return frames
-
-
-def _locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
-    """A read-only float copy of the right shape, without NaN."""
-    array = np.array(value, dtype=float)
-    if array.shape != shape:
-        raise ValueError(f"{whose} has shape {array.shape}, expected {shape}")
-    if np.isnan(array).any():
-        raise ValueError(f"{whose} contains NaN")
-    array.setflags(write=False)
-    return array
-
-
-def beam_axis(frame: Frame) -> tuple[float, NDArray]:
-    """Length and direction of a frame's beam.
-
-    Args:
-        frame: one with a :class:`BeamLink`.
-
-    Returns:
-        [m] length, and (3,) unit vector from base to tip in the frame's axes.
-
-    Raises:
-        ValueError: the frame has no beam, or the two origins coincide.
-    """
-    if not isinstance(frame.link, BeamLink):
-        raise ValueError(f"frame '{frame.name}' has no beam")
-    if frame.link.length is not None and frame.link.axis is not None:
-        axis = np.array(frame.link.axis)
-        return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent turns the beam about its start, which changes neither
-    along = rotation_matrix(frame.rotation).T @ frame.translation
-    length = math.sqrt(along @ along)
-    if length == 0.0:
-        raise ValueError(f"frame '{frame.name}': a beam of no length")
-    return length, along / length

@@ -1,4 +1,4 @@
-"""Answers as labelled arrays (xarray) and tables (pandas).
+"""Results as labelled arrays (xarray) and tables (pandas).
 
 Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
 ``long_name`` are attributes of every variable.  Neither package is imported before it
@@ -6,19 +6,17 @@ is asked for.
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.robot import Robot
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-    from assembly.exact.exact import ExactAssembly
-    from assembly.linear.energy import Assembly
 
 _LABELS = {
     "screw": SCREW, "wrench_component": WRENCH, "bound": ("lower", "upper")
@@ -27,7 +25,7 @@ _SCREW, _WRENCH = ("rad, m", ("screw",)), ("N m, N", ("wrench_component",))
 # name: unit, dimensions beside those of the points or frames, meaning
 _OF_FRAMES = {
     "geometric_error": (*_SCREW, "delta l"),
-    "clearance_screw": (*_SCREW, "play, and small motions of passive joints"),
+    "clearance_screw": (*_SCREW, "clearance, and small motions of passive joints"),
     "link_screw": (*_SCREW, "deformation of the body"),
     "joint_screw": (*_SCREW, "deformation of the joint"),
     "wrench": (*_WRENCH, "what the outer part exerts on the inner, at the frame"),
@@ -48,43 +46,86 @@ _OF_POINTS = {
     "translation_error": ("m", ("bound",), "bounds of the largest translation error"),
     "rotation_screw": (*_SCREW, "attains the lower bound of the rotation"),
     "translation_screw": (*_SCREW, "attains the lower bound of the translation"),
-    "status": ("", (), "ok, or why there is no answer"),
-    "reason": ("", (), "what was said where the status is not ok"),
+    "status": ("", (), "ok, or why there is no result"),
+    "reason": ("", (), "message where the status is not ok"),
 }
 
 
-def assembly_dataset(answer: "Assembly | ExactAssembly") -> "xarray.Dataset":
+class PlacedRobot(Protocol):
+    """A robot at a nominal posture."""
+
+    @property
+    def robot(self) -> Robot:
+        """The manipulator."""
+
+    def pose(self) -> dict[str, float]:
+        """Nominal platform pose by component."""
+
+
+class ForcedAssembly(Protocol):
+    """An assembly by the linear model or with finite motions; arrays as named."""
+
+    @property
+    def posture(self) -> PlacedRobot:
+        """Where the robot stands nominally."""
+
+    @property
+    def clearance_screws(self) -> NDArray:
+        """(n, 6) [rad, m]."""
+
+    @property
+    def link_screws(self) -> NDArray:
+        """(n, 6) [rad, m]."""
+
+    @property
+    def joint_screws(self) -> NDArray:
+        """(n, 6) [rad, m]."""
+
+    @property
+    def wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] through bodies."""
+
+    @property
+    def joint_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] through joints."""
+
+    @property
+    def closure_wrenches(self) -> NDArray:
+        """(closures, 6) [N m, N]."""
+
+
+def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
     """An assembly over its frames and closures, with the platform's error.
 
     Args:
-        answer: by the linear model or with finite motions.
+        assembly: by the linear model or with finite motions.
 
     Returns:
         Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
         ``closure``; the pose is in coordinates without dimension.
     """
-    robot = answer.posture.robot
+    robot = assembly.posture.robot
     frames = {
         "geometric_error": robot.errors,
-        "clearance_screw": answer.clearance_screws,
-        "link_screw": answer.link_screws,
-        "joint_screw": answer.joint_screws,
-        "wrench": answer.wrenches,
-        "joint_wrench": answer.joint_wrenches,
+        "clearance_screw": assembly.clearance_screws,
+        "link_screw": assembly.link_screws,
+        "joint_screw": assembly.joint_screws,
+        "wrench": assembly.wrenches,
+        "joint_wrench": assembly.joint_wrenches,
     }
     single = {
-        name: getattr(answer, name)
+        name: getattr(assembly, name)
         for name in ("energy", "potential", "platform_screw", "load")
     }
     data = _dataset(frames, _OF_FRAMES, "frame", [f.name for f in robot.frames])
     pose = {
         name: ((), value, {"units": "m" if name[0] == "t" else "rad"})
-        for name, value in answer.posture.pose().items()
+        for name, value in assembly.posture.pose().items()
     }
     data = data.merge(_dataset(single, _OF_POINTS)).assign_coords(pose)
     about = {"units": "N m, N", "long_name": "second chain on first, at the platform"}
     data["closure_wrench"] = (
-        ("closure", "wrench_component"), answer.closure_wrenches, about
+        ("closure", "wrench_component"), assembly.closure_wrenches, about
     )  # fmt: skip
     data = data.assign_coords(closure=[" - ".join(pair) for pair in robot.closures])
     return data.assign_attrs(robot=robot.name)

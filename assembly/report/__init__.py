@@ -1,4 +1,4 @@
-"""Answers as text, JSON, tables and pictures.
+"""Results as text, JSON, tables and plots.
 
 Begin at ``results.py``.
 """

@@ -1,4 +1,4 @@
-"""Pictures of the robot itself, deformed, and of the errors its platform can have.
+"""Plots of the deformed robot, and of the body of its platform's possible errors.
 
 Functions take a result and return a plotter; none shows or saves.
 """
@@ -16,17 +16,17 @@ from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix, screw_map
 
 
-def draw_assembly(
-    answer: Assembly,
+def plot_assembly(
+    assembly: Assembly,
     exaggeration: float | None = None,
     errors: str | None = None,
     reading: str = "budget",
     off_screen: bool = True,
 ) -> Any:
-    """Draw an assembled robot and, if asked, the body of its platform's errors.
+    """Plot an assembled robot and, if asked, the body of its platform's errors.
 
     Args:
-        answer: an assembled robot.
+        assembly: of the robot.
         exaggeration: factor on all displacements; chosen if absent.
         errors: ``"translation"`` or ``"rotation"``, or None for no body.
         reading: of problem (27), for the body.
@@ -37,32 +37,32 @@ def draw_assembly(
 
     Raises:
         BadInput: the platform moves freely, so its errors have no bound.
-        SolverFailed: the cone solver gave up on the errors.
+        SolverFailed: the cone solver failed for the errors.
     """
-    plotter = robot_plotter(answer, exaggeration, off_screen)
+    plotter = robot_plotter(assembly, exaggeration, off_screen)
     if errors is not None:
-        reach = reachable_screws(answer, reading)
+        reach = reachable_screws(assembly, reading)
         if reach.unbounded(PARTS[errors].start):
             raise BadInput(
-                f"{answer.posture.robot.name}: its platform moves freely, so its "
+                f"{assembly.posture.robot.name}: its platform moves freely, so its "
                 f"{errors} error has no bound; expected none to be drawn"
             )
         body = error_body(reach, errors)
-        size = 0.15 * float(np.ptp(answer.posture.transforms[:, :3, 3], axis=0).max())
-        add_error_body(plotter, body, answer.posture.platform[:3, 3], size, reading)
+        size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())
+        add_error_body(plotter, body, assembly.posture.platform[:3, 3], size, reading)
     return plotter
 
 
 def robot_plotter(
-    answer: Assembly, exaggeration: float | None = None, off_screen: bool = True
+    assembly: Assembly, exaggeration: float | None = None, off_screen: bool = True
 ) -> Any:
-    """Draw the nominal robot (grey) and the forced one (coloured), exaggerated.
+    """Plot the nominal robot (grey) and the deformed one (coloured), exaggerated.
 
     Args:
-        answer: an assembled robot.
-        exaggeration: factor on all displacements, written on the picture; if absent,
-            such that the largest shows as a tenth of the robot and no turn as more
-            than 0.5 rad.
+        assembly: of the robot.
+        exaggeration: factor on all displacements, written in the plot; if absent, such
+            that the largest is a tenth of the robot's size and no rotation more than
+            0.5 rad.
         off_screen: False for a window.
 
     Returns:
@@ -71,22 +71,26 @@ def robot_plotter(
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display VTK looks for other ways to draw, and says so on stderr
+    # without a display VTK tries other back ends, and reports it on stderr
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    bodies = displaced_bodies(answer)
+    bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
-    factor = exaggeration or _exaggeration(bodies, size)
+    exaggeration_factor = exaggeration or _exaggeration(bodies, size)
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1100, 800))
-    for i, frame in enumerate(answer.posture.robot.frames):
+    for i, frame in enumerate(assembly.posture.robot.frames):
         start, end = bodies.starts[i], bodies.ends[i]
         if np.linalg.norm(end - start) < 1e-9:
             continue
         grey = pyvista.Line(start, end).tube(radius=0.005 * size)
         plotter.add_mesh(grey, color="lightgrey")
-        line = pyvista.Spline(_shape(bodies, i, factor), 40).tube(radius=0.008 * size)
+        line = pyvista.Spline(_shape(bodies, i, exaggeration_factor), 40).tube(
+            radius=0.008 * size
+        )
         plotter.add_mesh(line, color="crimson" if frame.link else "steelblue")
-    said = f"displacements x {factor:g}; red: elastic links; grey: nominal"
-    plotter.add_text(said, font_size=9, name="caption")
+    caption = (
+        f"displacements x {exaggeration_factor:g}; red: elastic links; grey: nominal"
+    )
+    plotter.add_text(caption, font_size=9, name="caption")
     plotter.add_axes()
     plotter.view_vector((0.55, -1.0, 0.35))
     plotter.camera.zoom(1.5)
@@ -96,13 +100,13 @@ def robot_plotter(
 def add_error_body(
     plotter: Any, body: ErrorBody, origin: NDArray, size: float, reading: str
 ) -> None:
-    """Add a body of translation or rotation errors to a picture, magnified.
+    """Add a body of translation or rotation errors to a plot, magnified.
 
     Args:
         plotter: of :func:`robot_plotter`.
-        body: what to draw.
-        origin: (3,) [m] where no error is, the platform's nominal origin.
-        size: [m] that the largest error is drawn with.
+        body: of the errors.
+        origin: (3,) [m] of zero error, the platform's nominal origin.
+        size: [m] of the largest error in the plot.
         reading: of problem (27), written below with the largest error.
     """
     import pyvista
@@ -115,16 +119,16 @@ def add_error_body(
         solid = pyvista.PolyData(shown, np.hstack([count, body.faces]).ravel())
     plotter.add_mesh(solid, color="gold", opacity=0.6, point_size=6)
     unit, scale = ("mm", 1e3) if body.part == "translation" else ("mrad", 1e3)
-    said = (
+    caption = (
         f"gold: {body.part} errors possible ({reading}), "
         f"up to {largest * scale:.3g} {unit}"
     )
-    plotter.add_text(said, position="lower_left", font_size=9, name="body")
+    plotter.add_text(caption, position="lower_left", font_size=9, name="body")
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
-    """Where each body of an assembled robot runs, and how it moves and bends.
+class DisplacedBodies:
+    """Positions, displacements and bending of each body of an assembled robot.
 
     Attributes:
         starts: (n, 3) [m] nominal start of each frame's body, base axes.
@@ -141,19 +145,19 @@ class Bodies:
     bends: NDArray
 
 
-def displaced_bodies(answer: Assembly) -> Bodies:
-    """Follow the small screws down the tree: errors and links bodies, then joints.
+def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
+    """Displacements of all bodies, by the small screws along the tree.
 
     Args:
-        answer: an assembled robot of n frames.
+        assembly: of a robot of n frames.
 
     Returns:
         All bodies, in the robot's order of frames.
     """
-    posture = answer.posture
+    posture = assembly.posture
     turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
-    body = turned @ (posture.robot.errors + answer.link_screws)[..., None]
-    joint = turned @ (answer.clearance_screws + answer.joint_screws)[..., None]
+    body = turned @ (posture.robot.errors + assembly.link_screws)[..., None]
+    joint = turned @ (assembly.clearance_screws + assembly.joint_screws)[..., None]
     ends = posture.transforms[:, :3, 3]
     starts, at_start, at_end = np.zeros_like(ends), *np.zeros((2, len(ends), 6))
     for i, parent in enumerate(posture.robot.parents):
@@ -162,12 +166,12 @@ def displaced_bodies(answer: Assembly) -> Bodies:
             at_start[i] = at_end[parent] + joint[parent, :, 0]
         carried = screw_map(starts[i] - ends[i]) @ at_start[i]
         at_end[i] = carried + body[i, :, 0]
-    bends = turned @ answer.link_screws[..., None]
-    return Bodies(starts, ends, at_start, at_end, bends[:, :3, 0])
+    bends = turned @ assembly.link_screws[..., None]
+    return DisplacedBodies(starts, ends, at_start, at_end, bends[:, :3, 0])
 
 
-def _exaggeration(bodies: Bodies, size: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that keeps the picture readable."""
+def _exaggeration(bodies: DisplacedBodies, size: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that keeps the plot readable."""
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
     if shift == turn == 0.0:
@@ -177,15 +181,15 @@ def _exaggeration(bodies: Bodies, size: float) -> float:
     return float(power * max(d for d in (1, 2, 5) if d * power <= most * (1 + 1e-12)))
 
 
-def _shape(bodies: Bodies, i: int, factor: float) -> NDArray:
-    """(20, 3) points of a displaced body: a cubic, as a beam bends."""
+def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
+    """(20, 3) points of a displaced body: a cubic, the deflection of a beam."""
     a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
     b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return np.linspace(a, b, 20)
     bend = rotation_matrix(factor * bodies.bends[i])
     chord = b - a
-    # the end turns by twice what the chord leaves of the bend, in a beam's first shape
+    # end slopes halfway between the chord and the chord turned by the bending
     slope_a, slope_b = bend.T @ chord, bend @ chord
     slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
     s = np.linspace(0, 1, 20)[:, None]

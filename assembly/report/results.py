@@ -1,43 +1,41 @@
-"""What an assembly tells machines (the keys of the public format) and people."""
+"""Results of assemblies as plain values (the keys of the public format) and as text."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.mobility import mobility
-from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.reach import READINGS, reachable_screws
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.screw_bound import unproved_screw
+from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import bracket, numbers, rounded, screw_text
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.display import numbers, rounded, screw_text
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
     """Margins of (21) in both readings of compliant joints, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
-    open_ = "; ".join(filter(None, (rigid.unproved, free.unproved)))
+    unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
-        "status": "not proved" if open_ else "ok",
+        "status": "not proved" if unproved_parts else "ok",
         "assemblable": rigid.assemblable,
         "assemblable_free": free.assemblable,
         "margin": rigid.margin,
         "margin_free": free.margin,
         "margin_bound": rigid.bound,
         "margin_free_bound": free.bound,
-    } | ({"reason": open_} if open_ else {})
+    } | ({"reason": unproved_parts} if unproved_parts else {})
 
 
 def zone_text(zone: dict[str, Any]) -> str:
-    """Margins for people: one line, and what of them is not proved."""
+    """Margins for people: one line, and a second where they are not proved."""
     line = (
         f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
         f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
@@ -50,17 +48,17 @@ def solution_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Everything ``assembly solve`` reports, as plain values.
+    """Results of ``assembly solve`` as plain values.
 
     Args:
-        posture: where the robot stands.
+        posture: of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The keys of the public format; ``status`` is ``"ok"``; or ``"not proved"``, with
-        the answer and, as ``reason``, what its certificate leaves open; or says what
-        could not be answered, and the answer is then null.
+        The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
+        with the solution and the gap of its certificate as ``reason``; or the kind of
+        failure, and the solution is then null.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -78,69 +76,78 @@ def solution_of(
     empty = {"energy": None, "platform_screw": None, "frames": None, "closures": None}
     try:
         results["zone"] = zone_of(posture)
-        answer = solve_assembly(posture, load, gravity=gravity)
-        open_ = filter(None, (
+        assembly = solve_assembly(posture, load, gravity=gravity)
+        bound = bound_screw(assembly)
+        unproved_parts = filter(None, (
             results["zone"].get("reason"),
-            answer.unproved or "; ".join(unproved_screw(answer)),
+            unproved(assembly) or "; ".join(unproved_screw(assembly, bound)),
         ))  # fmt: skip
-        return results | _answer(answer, gravity) | _status("; ".join(open_))
+        return (
+            results
+            | _assembly_results(assembly, bound, gravity)
+            | proof_status("; ".join(unproved_parts))
+        )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
         return results | empty | {"status": status, "reason": str(error)}
 
 
-def _status(unproved: str) -> dict[str, str]:
-    """That an answer is proved, or what of it is not."""
-    return {"status": "not proved", "reason": unproved} if unproved else {}
+def proof_status(reason: str) -> dict[str, str]:
+    """Status and reason of a solution with an incomplete proof; empty otherwise."""
+    return {"status": "not proved", "reason": reason} if reason else {}
 
 
-def _answer(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
-    """The part that only a solved assembly has."""
+def _assembly_results(
+    assembly: Assembly, bound: ScrewBound, gravity: ArrayLike | None
+) -> dict[str, Any]:
+    """Results of a solved assembly."""
     certificate = {
-        "closure_residual": answer.closure_residual(),
-        "reference_length": answer.linearisation.size,
-        "clearance_excess": answer.clearance_excess(),
-        "duality_gap": answer.duality_gap(),
-        "relative_gap": answer.relative_gap(),
-    } | {f"screw_{name}": value for name, value in vars(answer.screw_bound).items()}
+        "closure_residual": assembly.closure_residual(),
+        "reference_length": assembly.linearisation.size,
+        "clearance_excess": assembly.clearance_excess(),
+        "duality_gap": assembly.duality_gap(),
+        "relative_gap": assembly.relative_gap(),
+    } | {f"screw_{name}": value for name, value in vars(bound).items()}
     return {
-        **_screws_and_wrenches(answer),
+        **_screws_and_wrenches(assembly),
         "certificate": certificate,
-        "ranks": answer.ranks,
-        "linearisation_error": _linearisation_error(answer, gravity),
+        "ranks": assembly.ranks,
+        "linearisation_error": _linearisation_error(assembly, gravity),
     }
 
 
-def _screws_and_wrenches(answer: Assembly | ExactAssembly) -> dict[str, Any]:
-    """Energy, pose error, and what happens at every frame and closure."""
-    robot = answer.posture.robot
+def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
+    """Energy, pose error, screws and wrenches of every frame and closure."""
+    robot = assembly.posture.robot
     frames = {
         f.name: {
-            "clearance": answer.clearance_screws[i],
-            "link": answer.link_screws[i],
-            "joint": answer.joint_screws[i],
-            "wrench": answer.wrenches[i],
-            "joint_wrench": answer.joint_wrenches[i],
+            "clearance": assembly.clearance_screws[i],
+            "link": assembly.link_screws[i],
+            "joint": assembly.joint_screws[i],
+            "wrench": assembly.wrenches[i],
+            "joint_wrench": assembly.joint_wrenches[i],
         }
         for i, f in enumerate(robot.frames)
     }
     closures = [
-        {"frames": list(pair), "wrench": answer.closure_wrenches[k]}
+        {"frames": list(pair), "wrench": assembly.closure_wrenches[k]}
         for k, pair in enumerate(robot.closures)
     ]
     return {
-        "energy": answer.energy,
-        "potential": answer.potential,
-        "platform_screw": answer.platform_screw,
+        "energy": assembly.energy,
+        "potential": assembly.potential,
+        "platform_screw": assembly.platform_screw,
         "frames": frames,
         "closures": closures,
     }
 
 
-def _linearisation_error(answer: Assembly, gravity: ArrayLike | None) -> dict[str, Any]:
-    """What the linear closures cost here: linear minus exact, or why it is unknown."""
+def _linearisation_error(
+    assembly: Assembly, gravity: ArrayLike | None
+) -> dict[str, Any]:
+    """Linear minus exact solution, or why it is unknown."""
     try:
-        exact = solve_exact(answer.posture, answer.load, answer, gravity=gravity)
+        exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
         return {"status": str(error)}
     return {"status": "ok", **vars(exact.linearisation_error)}
@@ -151,10 +158,10 @@ def exact_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Everything ``assembly exact`` reports, as plain values.
+    """Results of ``assembly exact`` as plain values.
 
     Args:
-        posture: where the robot stands.
+        posture: of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
@@ -165,24 +172,25 @@ def exact_of(
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
     }  # fmt: skip
     try:
-        answer = solve_exact(posture, load, gravity=gravity)
+        assembly = solve_exact(posture, load, gravity=gravity)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {
-        "closure_residual": answer.closure_residual(),
-        "reference_length": answer.linear.linearisation.size,
-        "clearance_excess": answer.clearance_excess(),
-        "stationarity": answer.stationarity,
-        "iterations": answer.iterations,
+        "closure_residual": assembly.closure_residual(),
+        "reference_length": assembly.linear.linearisation.size,
+        "clearance_excess": assembly.clearance_excess(),
+        "stationarity": assembly.stationarity,
+        "iterations": assembly.iterations,
     }
     linear = {
-        "energy": answer.linear.energy, "platform_screw": answer.linear.platform_screw
-    }  # fmt: skip
+        "energy": assembly.linear.energy,
+        "platform_screw": assembly.linear.platform_screw,
+    }
     return results | {
-        **_screws_and_wrenches(answer),
+        **_screws_and_wrenches(assembly),
         "certificate": certificate,
         "linear": linear,
-        "linearisation_error": vars(answer.linearisation_error),
+        "linearisation_error": vars(assembly.linearisation_error),
     }
 
 
@@ -194,15 +202,15 @@ _STATUS = {
 
 
 def failure_status(error: Exception) -> str:
-    """The status of a posture without an answer.
+    """The status of a posture without a solution.
 
     Args:
         error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
 
     Returns:
-        In a few words.
+        The status of the public format.
     """
-    return next(said for kind, said in _STATUS.items() if isinstance(error, kind))
+    return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
 
 
 def exact_text(results: dict[str, Any]) -> str:
@@ -221,140 +229,18 @@ def exact_text(results: dict[str, Any]) -> str:
     ])  # fmt: skip
 
 
-def _linearisation_text(found: dict[str, Any]) -> str:
-    """What the linear closures cost."""
-    if found.get("status", "ok") != "ok":
-        return f"linearisation error: unknown, {found['status']}"
+def _linearisation_text(error: dict[str, Any]) -> str:
+    """The linearisation error for people."""
+    if error.get("status", "ok") != "ok":
+        return f"linearisation error: unknown, {error['status']}"
     rotation, translation = (
-        rounded(scale * float(np.linalg.norm(found[part])))
+        rounded(scale * float(np.linalg.norm(error[part])))
         for part, scale in (("rotation", 1e3), ("translation", 1e6))
     )
     return (
         f"linearisation error: {rotation:.3g} mrad, {translation:.3g} um, energy "
-        f"{rounded(100 * found['relative_energy']):+.3g} %"
+        f"{rounded(100 * error['relative_energy']):+.3g} %"
     )
-
-
-def pose_error_of(
-    posture: Posture,
-    readings: Sequence[str] | None = None,
-    point: ArrayLike = (0.0, 0.0, 0.0),
-    direction: ArrayLike | None = None,
-    load: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    **options: Any,
-) -> dict[str, Any]:
-    """Everything ``assembly error`` reports, as plain values.
-
-    Args:
-        posture: where the robot stands.
-        readings: of problem (27); without any, all that are defined: ``budget`` is not
-            under a load.
-        point: (3,) [m] whose translation is asked for, platform axes.
-        direction: (6,) along which the largest error is asked for too.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        options: of :func:`assembly.linear.pose_error.bound_pose_error`.
-
-    Returns:
-        The keys of the public format; ``status`` as in :func:`solution_of`.
-
-    Raises:
-        BadInput: reading ``budget`` is asked under a load.
-    """
-    loaded = bool(np.any(load) or np.any(gravity))
-    if loaded and "budget" in (readings or ()):
-        raise BadInput(
-            "reading budget: found a load; expected frozen or free (the budget is a "
-            "factor on the energy of closing alone)"
-        )
-    readings = readings or (READINGS[:2] if loaded else READINGS)
-    results: dict[str, Any] = {
-        "robot": posture.robot.name,
-        "status": "ok",
-        "pose": posture.pose(),
-        "load": np.zeros(6) if load is None else np.asarray(load, dtype=float),
-        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
-        "error": None,
-        "point": np.asarray(point, dtype=float),
-    }
-    if direction is not None:
-        results["direction"] = np.asarray(direction, dtype=float)
-    offset = posture.platform[:3, :3] @ results["point"]
-    try:
-        answer = solve_assembly(posture, load, gravity=gravity)
-        table: dict[str, Any] = {}
-        open_ = []
-        for name in readings:
-            try:
-                one = bound_pose_error(answer, name, offset=offset, **options)
-            except FreeMotion as error:  # without their own springs, joints give way
-                nothing = dict.fromkeys(("rotation", "translation"))
-                table[name] = nothing | {"reason": str(error)}
-                continue
-            table[name] = _bounds(one)
-            open_ += [f"{name}: {one.unproved}"] if one.unproved else []
-            if direction is not None:
-                along = _support(answer, name, offset, direction, **options)
-                table[name]["along"] = along
-    except (CannotAssemble, FreeMotion, SolverFailed) as error:
-        return results | {"status": failure_status(error), "reason": str(error)}
-    certificate = {"relative_gap": answer.relative_gap()}
-    return results | _status("; ".join(open_)) | {
-        "energy": answer.energy, "platform_screw": answer.platform_screw,
-        "error": table, "certificate": certificate,
-    }  # fmt: skip
-
-
-def _bounds(one: PoseError) -> dict[str, Any]:
-    """Both brackets of a reading."""
-    return {
-        "rotation": _bracket(one.rotation_error, one.rotation_screw),
-        "translation": _bracket(one.translation_error, one.translation_screw),
-        "cuts": one.cuts,
-    }
-
-
-def _support(
-    answer: Assembly, reading: str, offset: NDArray, direction: ArrayLike,
-    energy_budget: float = 0.05, **_: float,
-) -> dict[str, Any]:  # fmt: skip
-    """Largest error along a direction: certified, attained, and the screw there."""
-    reach = reachable_screws(answer, reading, energy_budget).at_point(offset)
-    found = reach.support(direction)
-    if found.height == np.inf:
-        return _bracket((np.inf, np.inf), reach.centre)
-    attained = float(np.asarray(direction) @ found.screw)
-    return _bracket((attained, found.height), found.screw)
-
-
-def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
-    """Two bounds, and the platform screw that attains the lower."""
-    return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
-
-
-def pose_error_text(results: dict[str, Any]) -> str:
-    """Bounds for people: a line for each reading."""
-    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
-    if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
-    for reading, found in (results["error"] or {}).items():
-        if "reason" in found:
-            lines.append(f"{reading:7s} no answer: {found['reason']}")
-            continue
-        lines.append(
-            f"{reading:7s} rotation {_bounds_text(found['rotation'], 'mrad')}, "
-            f"translation {_bounds_text(found['translation'], 'mm')}"
-        )
-        if "along" in found:
-            unit = "mm" if np.any(results["direction"][3:]) else "mrad"
-            lines.append(f"        along it {_bounds_text(found['along'], unit)}")
-    return "\n".join(lines)
-
-
-def _bounds_text(found: dict[str, Any], unit: str) -> str:
-    """Two bounds, in thousandths of rad or m."""
-    return bracket((found["lower"], found["upper"]), unit)
 
 
 def solution_text(results: dict[str, Any]) -> str:
@@ -390,12 +276,12 @@ def solution_text(results: dict[str, Any]) -> str:
 
 
 def remark_lines(remarks: Sequence[str]) -> list[str]:
-    """What a robot's file leaves to a default, a line each."""
+    """Remarks on defaults of a robot's file, a line each."""
     return [f"note: {remark}" for remark in remarks]
 
 
 def _screw_bound_text(bound: dict[str, Any]) -> str:
-    """How far any platform screw of least energy may be from the one told."""
+    """Largest distance of any platform screw of least energy from the one given."""
     halves = ("rotation", 1e3), ("translation", 1e6)
     (turn, shift), loose = (
         [scale * bound[f"screw_{half}_{kind}"] for half, scale in halves]

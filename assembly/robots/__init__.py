@@ -1,4 +1,4 @@
-"""Robots that come with forcefit; each is a table of numbers in a file of its own."""
+"""Built-in robots; each is a table of numbers in a file of its own."""
 
 import os
 from collections.abc import Callable

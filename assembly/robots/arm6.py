@@ -1,7 +1,8 @@
 """A serial arm of six axes: the PUMA 560.
 
-No closure, so nothing is forced: errors and play add up along the arm, and a load moves
-its flange by J K^-1 J^T of the drives, and the bending of its two long bodies.
+It has no closure, so no internal forces: errors and clearances add up along the arm.  A
+load moves its flange by J K^-1 J^T of the drives, and by the bending of its two long
+bodies.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters
@@ -9,7 +10,7 @@ Sources:
     Denavit-Hartenberg.  Armstrong, Khatib, Burdick (1986), The explicit dynamic model
     and inertial parameters of the PUMA 560 arm, IEEE ICRA: the masses.  Corke (2011),
     Robotics, Vision and Control, chapter 7: the home angles, his "nominal" posture.
-    Drives, sections and play are round numbers.
+    Drives, sections and clearances are round numbers.
 """
 
 import math
@@ -36,8 +37,8 @@ HOME = (0.0, math.pi / 4, math.pi, 0.0, math.pi / 4, 0.0)  # [rad]
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """What the arm is made of; aluminium shells as tubes, preloaded bearings."""
+class Arm6Parameters:
+    """Parameters of the arm; aluminium shells as tubes, preloaded bearings."""
 
     joints: tuple[tuple[float, ...], ...] = JOINTS
     home: tuple[float, ...] = HOME
@@ -46,7 +47,7 @@ class Parameters:
     clearance: Clearance = Clearance(radial=5e-6, axial=5e-6, tilt=5e-5, spin=1e-4)
 
 
-def arm6(parameters: Parameters | None = None) -> Robot:
+def arm6(parameters: Arm6Parameters | None = None) -> Robot:
     """The arm at its home posture.
 
     Args:
@@ -56,7 +57,7 @@ def arm6(parameters: Parameters | None = None) -> Robot:
         7 frames, no closure; platform ``flange``, a joint's coordinate is its
         Denavit-Hartenberg angle.
     """
-    P = parameters or Parameters()
+    P = parameters or Arm6Parameters()
     parent, step = "base", np.eye(4)
     frames: list[Frame] = []
     part: dict[str, Any] = {}

@@ -1,13 +1,13 @@
 """Clavel's Delta, R-(SS)2: each driven arm carries two parallel rods, the platform.
 
-The rods between ball joints spin about themselves as they please, and each spin is
-counted as a freedom: 9 in all, 3 of the platform and 6 of the rods.  As the six rods
-are just enough to hold the platform, geometric errors move it and cost no energy.
+The rods between ball joints can spin about their own axes, and each spin is a degree of
+freedom: 9 in all, 3 of the platform and 6 of the rods.  The six rods constrain the
+platform exactly, so geometric errors move it without elastic energy.
 
 Sources:
     Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):
     the dimensions of ABB's FlexPicker IRB 360-1/1600 and worked examples.  Sections,
-    play and drives are round numbers, typical of carbon fibre rods on ball sockets.
+    clearances and drives are round numbers, typical of carbon fibre rods on balls.
     Clavel (1990), US patent 4976582, for the architecture.
 """
 
@@ -31,7 +31,7 @@ AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] of the legs
 
 
 @dataclass(frozen=True)
-class Parameters:
+class DeltaParameters:
     """Numbers of the robot [m, N m/rad]; carbon fibre tubes."""
 
     base_side: float = 0.567  # of the triangle whose sides the drives halve
@@ -60,7 +60,7 @@ class Parameters:
         return self.platform_side * math.sqrt(3) / 3
 
 
-def delta(parameters: Parameters | None = None) -> Robot:
+def delta(parameters: DeltaParameters | None = None) -> Robot:
     """The robot at its home pose, on its axis.
 
     Args:
@@ -73,7 +73,7 @@ def delta(parameters: Parameters | None = None) -> Robot:
     Raises:
         BadInput: the home pose is out of reach.
     """
-    P = parameters or Parameters()
+    P = parameters or DeltaParameters()
     angle = drive_angle(P, AZIMUTHS[0], np.array([0.0, 0.0, P.home]))
     placed: list[Placed] = []
     for number, azimuth in enumerate(AZIMUTHS, 1):
@@ -84,7 +84,9 @@ def delta(parameters: Parameters | None = None) -> Robot:
     return Robot("delta", tips[0], place_frames(placed), closures, description)
 
 
-def drive_angle(parameters: Parameters, azimuth: float, position: NDArray) -> float:
+def drive_angle(
+    parameters: DeltaParameters, azimuth: float, position: NDArray
+) -> float:
     """Angle of one arm below the base's plane, elbow outward.
 
     Args:
@@ -120,7 +122,7 @@ def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 
 
-def _leg(name: str, azimuth: float, angle: float, P: Parameters) -> list[Placed]:
+def _leg(name: str, azimuth: float, angle: float, P: DeltaParameters) -> list[Placed]:
     """A driven arm and its two rods."""
     out, across = _radial(azimuth)
     foot = P.base_radius * out
@@ -143,9 +145,14 @@ def _leg(name: str, azimuth: float, angle: float, P: Parameters) -> list[Placed]
 
 
 def _rod(
-    name: str, parent: str, near: NDArray, far: NDArray, across: NDArray, P: Parameters
+    name: str,
+    parent: str,
+    near: NDArray,
+    far: NDArray,
+    across: NDArray,
+    P: DeltaParameters,
 ) -> list[Placed]:
-    """A rod between ball joints; the axes next to it are its own, so it spins."""
+    """A rod between ball joints; their axes next to it are its own, so it can spin."""
     along = (far - near) / np.linalg.norm(far - near)
     third = np.cross(along, across)
     high = ball_joint(f"{name}_high", parent, near, across, third, P.ball)

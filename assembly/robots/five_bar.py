@@ -1,9 +1,9 @@
-"""A planar five-bar robot, 5R: two driven arms, two more that meet in a pin.
+"""A planar five-bar robot, 5R: two driven arms and two that meet in a pin.
 
 Sources:
     Round numbers, of the size of DexTAR, whose four arms are equal too: Campos,
     Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot with
-    large workspace, ASME IDETC.  Sections and play are typical.
+    large workspace, ASME IDETC.  Sections and clearances are typical.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 
 
 @dataclass(frozen=True)
-class Parameters:
+class FiveBarParameters:
     """Numbers of the robot [m]; aluminium arms, small ball bearings."""
 
     base: float = 0.120  # between the drives, on the x axis
@@ -30,7 +30,7 @@ class Parameters:
     )
 
 
-def five_bar(parameters: Parameters | None = None) -> Robot:
+def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
     """The robot at its home pose, both elbows outward.
 
     Args:
@@ -43,7 +43,7 @@ def five_bar(parameters: Parameters | None = None) -> Robot:
     Raises:
         BadInput: the home pose is out of reach.
     """
-    P = parameters or Parameters()
+    P = parameters or FiveBarParameters()
     tip = np.array(P.home)
     placed: list[Placed] = []
     for name, side in (("left", 1), ("right", -1)):

@@ -12,7 +12,7 @@ t = 90, 180 and 270 degrees.
 
 Sources:
     Norton, Design of Machinery, chapter 3, Hoeken's linkage: the proportions.  Size,
-    sections and play are round numbers, of the size of a bench-top machine.
+    sections and clearances are round numbers, of the size of a bench-top machine.
 """
 
 import math
@@ -27,7 +27,7 @@ from assembly.robots.planar import direction, in_plane
 
 
 @dataclass(frozen=True)
-class Parameters:
+class FourBarParameters:
     """Numbers of the linkage [m, rad, N m/rad]; aluminium bars, plain bearings."""
 
     crank: float = 0.1
@@ -39,7 +39,7 @@ class Parameters:
     clearance: Clearance = Clearance(radial=20e-6, axial=50e-6, tilt=5e-4)
 
 
-def four_bar(parameters: Parameters | None = None) -> Robot:
+def four_bar(parameters: FourBarParameters | None = None) -> Robot:
     """The linkage at its home angle.
 
     Args:
@@ -49,7 +49,7 @@ def four_bar(parameters: Parameters | None = None) -> Robot:
         8 frames, 1 closure; the platform ``point`` is the tracing point, ``crank`` is
         driven and its coordinate is the angle to the ground link.
     """
-    P = parameters or Parameters()
+    P = parameters or FourBarParameters()
     foot, tip, middle, point = (P.crank * p for p in corners(P.home))
     coupler = math.atan2(*(middle - tip)[::-1])
     rocker = math.atan2(*(middle - foot)[::-1])
@@ -71,7 +71,7 @@ def four_bar(parameters: Parameters | None = None) -> Robot:
 
 
 def corners(angle: float) -> tuple[NDArray, ...]:
-    """Where the linkage stands at a crank angle, in units of the crank.
+    """Positions of the linkage at a crank angle, in units of the crank.
 
     Args:
         angle: [rad] of the crank to the ground link.
@@ -81,7 +81,7 @@ def corners(angle: float) -> tuple[NDArray, ...]:
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # Thales: at a right angle to it, and 5 apart from the crank pin
+    # Thales: at a right angle to it, at a distance of 5 from the crank pin
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

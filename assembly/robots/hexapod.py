@@ -1,14 +1,14 @@
 """A Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
 
-A strut between a cardan and a ball joint carries a force along itself and nothing else,
-whatever its section: the platform's stiffness is the sum over struts of k w w^T, with w
-the unit wrench of the strut's line.  Six struts are just enough, so geometric errors
-move the platform and cost no energy.
+A strut between a cardan and a ball joint carries an axial force only, whatever its
+section: the platform's stiffness is the sum over struts of k w w^T, with w the unit
+wrench of the strut's line.  Six struts constrain the platform exactly, so geometric
+errors move it without elastic energy.
 
 Sources:
     Merlet, Parallel Robots (2nd edition, 2006), the prototype called left hand: the
-    centres of the joints, in two planes.  Working height, sections, play and drives are
-    round numbers, typical of struts of this size.
+    centres of the joints, in two planes.  Working height, sections, clearances and
+    drives are round numbers, typical of struts of this size.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ PLATFORM_POINTS = (
 
 
 @dataclass(frozen=True)
-class Parameters:
+class HexapodParameters:
     """Numbers of the robot [m, N/m, Pa]; steel tubes, screws with preloaded nuts."""
 
     height: float = 0.530
@@ -51,7 +51,7 @@ class Parameters:
     ball: Clearance = Clearance(radial=8e-6, axial=8e-6)
 
 
-def hexapod(parameters: Parameters | None = None) -> Robot:
+def hexapod(parameters: HexapodParameters | None = None) -> Robot:
     """The robot at its home pose, the platform parallel to the base.
 
     Args:
@@ -61,7 +61,7 @@ def hexapod(parameters: Parameters | None = None) -> Robot:
         42 frames, 5 closures; platform ``leg1.tip``.  The coordinate of ``legK.strut``
         is the distance of its joints' centres.
     """
-    P = parameters or Parameters()
+    P = parameters or HexapodParameters()
     placed: list[Placed] = []
     for number, (a, b) in enumerate(zip(*points(), strict=True), 1):
         placed += _leg(f"leg{number}", a, b + [0.0, 0.0, P.height], P)
@@ -76,7 +76,7 @@ def points() -> tuple[NDArray, NDArray]:
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 
 
-def _leg(name: str, a: NDArray, b: NDArray, P: Parameters) -> list[Placed]:
+def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed]:
     """A strut from a to b, where its ball joint holds the platform."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length

@@ -3,8 +3,9 @@
 Two legs on the x axis, leg 2 being leg 1 turned by pi about z0.  Each is a
 parallelogram (proximal module) that carries an elbow body of constant orientation, and
 two parallel links between universal joints (distal module) that carry the platform.
-The figures that fix the axes of the universal joints are not public: this reading has
-the paper's mobility everywhere in the workspace, others tried do not.
+The figures that define the axes of the universal joints are not public.  This
+interpretation has the paper's mobility everywhere in the workspace; others tried do
+not.
 
 Frames carry names; the paper's index is their place in :data:`NAMES`, counted from 1.
 Errors act at the paper's frames :data:`ERROR_FRAMES`.
@@ -59,8 +60,8 @@ _REVOLUTE = ("drive", "elbow", "idler", "idler_end")
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """The paper's nominal numbers [m, rad, Pa, N m/rad, N/m]; symbols as there."""
+class IRSBot2Parameters:
+    """The paper's nominal parameters [m, rad, Pa, N m/rad, N/m], by its symbols."""
 
     a: float = 0.050
     b: float = 0.083
@@ -83,7 +84,7 @@ class Parameters:
 
 
 def irsbot2(
-    parameters: Parameters | None = None, x: float = 0.0, z: float = -0.5
+    parameters: IRSBot2Parameters | None = None, x: float = 0.0, z: float = -0.5
 ) -> Robot:
     """The robot with all its joints at zero in one home pose.
 
@@ -98,7 +99,7 @@ def irsbot2(
     Raises:
         BadInput: the home pose is out of reach.
     """
-    parameters = parameters or Parameters()
+    parameters = parameters or IRSBot2Parameters()
     turned = transform(np.zeros(3), np.diag([-1.0, -1.0, 1.0]))
     frames: list[Frame] = []
     for leg, sign in (("leg1", 1.0), ("leg2", -1.0)):
@@ -117,7 +118,7 @@ def irsbot2(
     return Robot("irsbot2", "leg1.tip", tuple(frames), closures, description)
 
 
-def drive_angle(parameters: Parameters, x: float, z: float) -> float:
+def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
     """Angle of leg 1's moving sides to the x axis, elbow outward.
 
     Args:
@@ -144,12 +145,12 @@ def drive_angle(parameters: Parameters, x: float, z: float) -> float:
     return math.atan2(along[1], along[0]) + math.acos(cosine)
 
 
-def _planar_length(P: Parameters) -> float:
+def _planar_length(P: IRSBot2Parameters) -> float:
     """[m] the distal links seen along y."""
     return math.sqrt(P.L2**2 - (P.g - P.a) ** 2)
 
 
-def _leg(P: Parameters, x: float, z: float) -> dict[str, NDArray]:
+def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
     """Frames of leg 1 seen from the base at a platform position."""
     q = drive_angle(P, x, z)
     arm = np.array([math.cos(q), 0.0, math.sin(q)])
@@ -176,7 +177,7 @@ def _leg(P: Parameters, x: float, z: float) -> dict[str, NDArray]:
 
 
 def _link(
-    P: Parameters, which: str, y: float, near: NDArray, far: NDArray
+    P: IRSBot2Parameters, which: str, y: float, near: NDArray, far: NDArray
 ) -> dict[str, NDArray]:
     """Frames of one distal link and its two universal joints."""
     along = (far - near) / np.linalg.norm(far - near)
@@ -202,7 +203,7 @@ def _axes(x: NDArray, z: NDArray) -> NDArray:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _frames(leg: str, placed: dict[str, NDArray], P: Parameters) -> list[Frame]:
+def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[Frame]:
     """A leg's frames with their joints and links."""
     frames = []
     for name in NAMES:
@@ -220,8 +221,8 @@ def _frames(leg: str, placed: dict[str, NDArray], P: Parameters) -> list[Frame]:
     return frames
 
 
-def _joint(name: str, P: Parameters) -> dict:
-    """What a frame has beside its place."""
+def _joint(name: str, P: IRSBot2Parameters) -> dict:
+    """Joint, clearance and link of a frame."""
     part: dict = {}
     if name in _REVOLUTE or name.endswith(("_first", "_second", "link_a", "link_b")):
         part = {"joint": "revolute", "actuated": name == "drive"}

@@ -1,9 +1,9 @@
 """The Orthoglide: three linear drives at right angles, parallelograms, 3 translations.
 
 Each leg is a slide, a hinge, a parallelogram and a second hinge parallel to the first:
-PRPaR.  It keeps the platform from turning about two axes; three legs do so six times
-where three would do, and each parallelogram is planar, three times more than needed:
-overconstrained twelve times, it must be forced together.
+PRPaR.  It prevents rotation of the platform about two axes: six constraints by three
+legs where three suffice.  Each planar parallelogram adds three redundant constraints.
+So the robot is overconstrained twelve times, and errors cause internal forces.
 
 With the coordinates r of the slides and the position p of the platform, each leg of
 length L keeps (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, p = 0 and
@@ -15,7 +15,7 @@ Sources:
     Automation 19: the architecture and its isotropic point.  Pashkevich, Chablat,
     Wenger (2009), Stiffness analysis of overconstrained parallel manipulators,
     Mechanism and Machine Theory 44: which parts bend.  Dimensions are round numbers, of
-    the size of their prototype; sections, play and drives are typical.
+    the size of their prototype; sections, clearances and drives are typical.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from assembly.robots.placing import Placed, at, drive_stiffness, pin, place_fram
 
 
 @dataclass(frozen=True)
-class Parameters:
+class OrthoglideParameters:
     """Numbers of the robot [m, N/m]; aluminium bars, preloaded ball bearings."""
 
     leg: float = 0.310
@@ -41,7 +41,7 @@ class Parameters:
     clearance: Clearance = Clearance(radial=5e-6, axial=10e-6, tilt=2e-4)
 
 
-def orthoglide(parameters: Parameters | None = None) -> Robot:
+def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
     """The robot at its isotropic point.
 
     Args:
@@ -51,7 +51,7 @@ def orthoglide(parameters: Parameters | None = None) -> Robot:
         30 frames, 5 closures; platform ``x.tip``.  The coordinate of ``x.slide`` is r_x
         above.
     """
-    P = parameters or Parameters()
+    P = parameters or OrthoglideParameters()
     axes = np.eye(3)
     placed: list[Placed] = []
     for k, name in enumerate("xyz"):
@@ -64,7 +64,9 @@ def orthoglide(parameters: Parameters | None = None) -> Robot:
     return Robot("orthoglide", "x.tip", place_frames(placed), closures, description)
 
 
-def _leg(name: str, along: NDArray, hinge: NDArray, P: Parameters) -> list[Placed]:
+def _leg(
+    name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
+) -> list[Placed]:
     """A leg along an axis of the base, its hinges along another."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(

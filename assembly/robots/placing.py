@@ -1,8 +1,8 @@
-"""Frames written down where they stand at home, seen from the base.
+"""Frames given by their home poses, seen from the base.
 
-A robot's table is easiest to check in base axes; a tree of frames wants each one seen
-from its parent, after the parent's joint.  Coincident revolute joints make the joints
-of more than one freedom: a cardan joint of two, a ball joint of three.
+A robot's table is easiest to check in base axes; a tree of frames needs each one seen
+from its parent, after the parent's joint.  Joints with more than one degree of freedom
+are coincident revolute joints: a cardan joint of two, a ball joint of three.
 """
 
 from collections.abc import Iterable
@@ -14,16 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.model.robot import BASE, Clearance, Frame, Link
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-Placed = tuple[Frame, NDArray]  # a frame, and (4, 4) where it stands at home
+Placed = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
 
 
 def place_frames(placed: Iterable[Placed]) -> tuple[Frame, ...]:
-    """Frames with the translation and rotation that put them where they stand.
+    """Frames with the translation and rotation of their home poses.
 
     Args:
         placed: frames, parents first, each with its (4, 4) transform seen from the base
-            at home, before its own joint's motion; every joint stands at its
-            ``position`` there.
+            at home, before its own joint's motion; every joint is at its ``position``
+            there.
 
     Returns:
         The same frames, placed in their parents.
@@ -85,7 +85,7 @@ def cardan_joint(
         origin: (3,) [m] its centre.
         first: (3,) axis fixed to the parent.
         second: (3,) axis fixed to the child, at right angles to the first.
-        clearance: play of the whole joint, placed at its second frame.
+        clearance: of the whole joint, assigned to its second frame.
 
     Returns:
         The two frames.
@@ -103,7 +103,7 @@ def ball_joint(
 ) -> list[Placed]:  # fmt: skip
     """Three revolute joints at one point, their axes at right angles at home.
 
-    It locks up where the second joint has turned by a right angle.
+    It is singular where the second joint has turned by a right angle.
 
     Args:
         name: of the joint; its frames are ``name_1`` to ``name_3``.
@@ -111,7 +111,7 @@ def ball_joint(
         origin: (3,) [m] its centre.
         first: (3,) axis fixed to the parent.
         second: (3,) the axis between; the third is at right angles to both.
-        clearance: play of the whole joint, placed at its last frame.
+        clearance: of the whole joint, assigned to its last frame.
         link: elasticity of the body between the parent and this joint.
 
     Returns:
@@ -127,7 +127,7 @@ def ball_joint(
 
 
 def drive_stiffness(stiffness: float, joint: str = "revolute") -> NDArray:
-    """Joint stiffness of a drive that gives along its own motion only.
+    """Joint stiffness of a drive that is elastic along its own motion only.
 
     Args:
         stiffness: [N m/rad or N/m] of the drive.

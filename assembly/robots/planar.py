@@ -1,4 +1,4 @@
-"""Legs of planar robots: a driven arm, an elbow, and a second arm, all in z = 0."""
+"""Legs of planar robots in z = 0: a driven arm, an elbow and a second arm."""
 
 import math
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from forcefit.inputs.table import BadInput
 
 @dataclass(frozen=True)
 class PlanarLeg:
-    """What the legs of a planar robot are made of.
+    """Parameters of the legs of a planar robot.
 
     Attributes:
         near: [m] length of the driven arm.
         far: [m] length of the second arm.
         link: the section and material of both.
         drive: [N m/rad] stiffness of the drive.
-        clearance: play of every pin.
+        clearance: of every pin.
     """
 
     near: float
@@ -83,7 +83,7 @@ def two_arms(
         foot: (2,) [m] of the drive.
         angle: [rad] of the driven arm at home.
         tip: (2,) [m] end of the second arm at home.
-        leg: what it is made of.
+        leg: its parameters.
 
     Returns:
         Frames ``drive``, ``elbow`` (a pin) and ``arm`` (fixed).

@@ -1,11 +1,11 @@
-"""A planar 3-RRR robot: three legs of two arms carry a triangle.
+"""A planar 3-RRR robot: three legs of two arms, a triangular platform.
 
 Sources:
     Gosselin, Angeles (1988), The optimum kinematic design of a planar
     three-degree-of-freedom parallel manipulator, J. Mechanisms, Transmissions and
     Automation in Design 110: the architecture and its inverse kinematics, three
     independent legs of two arms.  Dimensions are round numbers, of the size of
-    laboratory machines; sections and play are typical.
+    laboratory machines; sections and clearances are typical.
 """
 
 import math
@@ -26,7 +26,7 @@ from assembly.robots.planar import (
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ThreeRRRParameters:
     """Numbers of the robot [m]; aluminium arms, small ball bearings."""
 
     base_radius: float = 0.300
@@ -49,7 +49,7 @@ class Parameters:
         return self.platform_radius * _triangle()
 
 
-def three_rrr(parameters: Parameters | None = None) -> Robot:
+def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
     """The robot at its home pose, the platform parallel to the base.
 
     Args:
@@ -62,7 +62,7 @@ def three_rrr(parameters: Parameters | None = None) -> Robot:
     Raises:
         BadInput: the home pose is out of reach.
     """
-    P = parameters or Parameters()
+    P = parameters or ThreeRRRParameters()
     leg = P.leg
     placed: list[Placed] = []
     pairs = zip(P.feet(), P.corners(), strict=True)

@@ -1,20 +1,160 @@
 """How loops are compiled: once on each machine, by numba, which keeps them on disk.
 
-They have one signature each, so that processes that compile at once write the same.
-Assignments to slices, array expressions and sums bring numba's broadcasting along and
-take several times as long to compile as loops (:mod:`assembly.solvers.vectors`).
+A :func:`kernel` is called from Python; it has one signature, so that processes that
+compile at once write the same.  What a kernel calls is compiled together with it, and
+with every kernel that calls that one.  So only what is as short as a line of numpy is a
+kernel that kernels call; all else is a :func:`part`, compiled once, by itself.
+
+A compiled loop costs some hundredths of a second.  Assignments to slices, array
+expressions and sums bring numba's broadcasting along and take several times as long to
+compile as loops (:mod:`assembly.solvers.vectors`), and so does a long tuple of arrays
+that is handed on where a few of them are needed.
+
 Whoever waits for the first compilation is told so, once, on stderr.
 """
 
+import inspect
 import multiprocessing
 import sys
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from numba import njit
-from numba.core import event
+import numpy as np
+from llvmlite.binding import add_symbol
+from numba import njit, types
+from numba.core import event, funcdesc
+from numba.core.dispatcher import Dispatcher
+from numba.core.typing import Signature
+from numba.extending import lower_builtin, type_callable
+from numpy.typing import NDArray
 
-kernel = partial(njit, cache=True, error_model="numpy", nogil=True)
+# what parts are given: writable arrays in C order
+Vector = Annotated[NDArray[np.float64], types.float64[::1]]
+Matrix = Annotated[NDArray[np.float64], types.float64[:, ::1]]
+Matrices = Annotated[NDArray[np.float64], types.float64[:, :, ::1]]
+Indices = Annotated[NDArray[np.int64], types.int64[::1]]
+IndexRows = Annotated[NDArray[np.int64], types.int64[:, ::1]]
+GivenVector = Annotated[NDArray[np.float64], types.Array(types.float64, 1, "C", True)]
+GivenMatrix = Annotated[NDArray[np.float64], types.Array(types.float64, 2, "C", True)]
+GivenMatrices = Annotated[NDArray[np.float64], types.Array(types.float64, 3, "C", True)]
+GivenIndices = Annotated[NDArray[np.int64], types.Array(types.int64, 1, "C", True)]
+Mask = Annotated[NDArray[np.bool_], types.boolean[::1]]
+
+_OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True}
+_parts: dict[Callable, "_Part"] = {}
+
+
+def kernel(function: Callable | None = None, **options: Any) -> Any:
+    """Compile a function for callers in Python.
+
+    Args:
+        function: to compile, at its first call.
+        options: of numba, such as ``fastmath``.
+
+    Returns:
+        The compiled function.
+    """
+    if function is None:
+        return partial(kernel, **options)
+    compiled = njit(**_OPTIONS, **options)(function)
+    compile_one = compiled.compile
+
+    def compile_with_parts(signature: Any) -> Any:
+        _load_parts(function)
+        return compile_one(signature)
+
+    # what numba calls before it compiles a function or reads it from disk
+    compiled.compile = compile_with_parts
+    return compiled
+
+
+def part(function: Callable | None = None, **options: Any) -> Any:
+    """Compile a function for kernels and other parts, which call it by name.
+
+    Its annotations are its signature; from Python it is called uncompiled.
+
+    Args:
+        function: to compile, before the first kernel that needs it.
+        options: of numba, such as ``fastmath``.
+
+    Returns:
+        The function.
+    """
+    if function is None:
+        return partial(part, **options)
+    own = _parts[function] = _Part(function, options)
+
+    @type_callable(function)
+    def type_part(context: Any) -> Callable:
+        def typer(*arguments: Any) -> Signature:
+            own.load()
+            return own.signature
+
+        typer.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+        return typer
+
+    @lower_builtin(function, types.VarArg(types.Any))
+    def call_part(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.call_internal(builder, own.callee, signature, arguments)
+
+    return function
+
+
+class _Part:
+    """A function, its signature and its address, under a name that stays the same."""
+
+    def __init__(self, function: Callable, options: dict[str, Any]) -> None:
+        self.function, self.options, self.loaded = function, options, False
+
+    def load(self) -> None:
+        """Compile it or read it from disk, after all parts that it calls."""
+        if self.loaded:
+            return
+        function = self.function
+        _load_parts(function)
+        hints = get_type_hints(function, include_extras=True)
+        result = _numba_type(hints.pop("return"))
+        self.signature = result(*map(_numba_type, hints.values()))
+        name = f"{function.__module__}.{function.__qualname__}{self.signature}"
+        self.callee = funcdesc.ExternalFunctionDescriptor(
+            name, result, self.signature.args
+        )
+        compiled = njit(
+            self.signature, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS,
+            **self.options,
+        )(function)  # fmt: skip
+        found = compiled.overloads[self.signature.args]
+        native = found.fndesc.llvm_func_name
+        add_symbol(name, found.library.get_pointer_to_function(native))
+        self.loaded = True
+
+
+def _load_parts(function: Callable) -> None:
+    """Load all parts that a function calls, or that kernels call that it calls."""
+    for name in function.__code__.co_names:
+        callee = function.__globals__.get(name)
+        if isinstance(callee, Dispatcher):
+            _load_parts(callee.py_func)
+        elif isinstance(callee, Callable) and callee in _parts:
+            _parts[callee].load()
+
+
+@cache
+def _numba_type(hint: Any) -> types.Type:
+    """The numba type that an annotation says."""
+    simple = {
+        float: types.float64, int: types.int64, bool: types.boolean,
+        type(None): types.none,
+    }  # fmt: skip
+    if hint in simple:
+        return simple[hint]
+    if get_origin(hint) is Annotated:
+        return get_args(hint)[1]
+    if get_origin(hint) is tuple:
+        return types.BaseTuple.from_types(tuple(map(_numba_type, get_args(hint))))
+    fields = get_type_hints(hint, include_extras=True)
+    return types.NamedTuple(tuple(map(_numba_type, fields.values())), hint)
 
 
 class _Announcement(event.Listener):

@@ -1,10 +1,10 @@
-"""Second-order cone programmes in the clearances, each answer with its certificate.
+"""Second-order cone programmes in the clearances, each solution with its certificate.
 
-Two shapes of problem appear: the least energy of a reduced problem (22), and the
-least factor on the clearances of problem (21).  Both are scaled here to size 1.  The
-first is tried by the compiled method of :mod:`assembly.solvers.interior`, then by
-Clarabel, and each answer is led on by :mod:`assembly.solvers.dual_newton`; the
-certified gap, which needs no trust in any of them, decides which answer is kept.
+There are two problems: the least energy of a reduced problem (22), and the least factor
+on the clearances of problem (21).  Both are scaled here to size 1.  The first is solved
+by the compiled method of :mod:`assembly.solvers.interior`, with Clarabel as its
+fallback; each solution is refined by :mod:`assembly.solvers.dual_newton`.  The
+certified gap, which does not depend on the solvers, decides which solution is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -23,13 +23,13 @@ _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# gap that counts as proved: of the energy, and of what it would be without play
+# gap that counts as proved: of the energy, and of the energy without clearance
 GAP, GAP_WITHOUT_PLAY = 1e-8, 1e-12
-_PART = 0.1  # of it that is asked here: the problem before elimination adds to it
+_SHARE = 0.1  # of it that is asked here: the problem before elimination adds to it
 _STOP = 1e-2  # Newton's method stops at this fraction of it
-_STEPS, _SHARP = 150, 1e6  # its steps, and its first sigma
-_OPEN = 1e-11  # most that a row no spring can take up may stay open
-_LARGEST_FACTOR = 1e8  # on the clearances: that none below it helps is what is proved
+_STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
+_RESIDUAL = 1e-11  # accepted of a row that no spring enters
+_LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to it
 _UNPROVED = "PrimalInfeasible, which its multipliers do not prove"
 
 
@@ -38,7 +38,7 @@ class SolverFailed(RuntimeError):
 
     Attributes:
         problem: which one.
-        status: what the solver said.
+        status: reported by the solver.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -48,15 +48,15 @@ class SolverFailed(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class LeastEnergy:
-    """Answer of :func:`minimise_energy`.
+    """Solution of :func:`minimise_energy`.
 
     Attributes:
         clearances: (nu,) in units of their cones.
         springs: (r,) [sqrt(2 J)] multipliers of the springs, G u + h but for the gap.
-        rigid_multipliers: (p,) [J] of the rows no spring can take up.
+        rigid_multipliers: (p,) [J] of the rows that no spring enters.
         value: [J] of the objective.
         bound: [J] certified lower bound of the objective.
-        feasible: whether any clearances satisfy the rows no spring can take up.
+        feasible: whether any clearances satisfy the rows that no spring enters.
     """
 
     clearances: NDArray
@@ -89,11 +89,11 @@ def minimise_energy(
         The minimiser with a certified lower bound.
 
     Raises:
-        SolverFailed: Clarabel gave no usable answer.
+        SolverFailed: Clarabel gave no usable solution.
     """
     if not (h.any() or d.any() or k.any()):  # nothing to close, nothing to gain
-        nothing = np.zeros(len(h)), np.zeros(len(k))
-        return LeastEnergy(np.zeros(len(d)), *nothing, 0.0, 0.0)
+        zeros = np.zeros(len(h)), np.zeros(len(k))
+        return LeastEnergy(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
         energy = float(h @ h) / 2
         return LeastEnergy(np.zeros(0), h, np.zeros(len(k)), energy, energy)
@@ -102,18 +102,22 @@ def minimise_energy(
     rows = np.linalg.norm(H, axis=1)
     scaled = (G / size, h / size, d / size**2, H / rows[:, None], k / rows, group)
     best, status = None, ""
-    for solve in _ROADS:
+    for solve in _SOLVERS:
         u, rigid, status = solve(*scaled)
         if status == "PrimalInfeasible":
             return LeastEnergy(
-                np.zeros_like(d), np.zeros_like(h), np.zeros_like(k), np.inf, np.inf,
-                False,
-            )  # fmt: skip
+                clearances=np.zeros_like(d),
+                springs=np.zeros_like(h),
+                rigid_multipliers=np.zeros_like(k),
+                value=np.inf,
+                bound=np.inf,
+                feasible=False,
+            )
         if u is None or rigid is None:
             continue
-        for answer in _certified(*scaled, into_cones(u, group), rigid):
-            if best is None or answer.gap < best.gap:
-                best = answer
+        for candidate in _certified(*scaled, into_cones(u, group), rigid):
+            if best is None or candidate.gap < best.gap:
+                best = candidate
             if _proved(best, scaled[1]):
                 break
         if best is not None and _proved(best, scaled[1]):
@@ -122,29 +126,32 @@ def minimise_energy(
         raise SolverFailed("least energy", status)
     joule = size**2
     return LeastEnergy(
-        best.clearances, best.springs * size, best.rigid_multipliers / rows * joule,
-        best.value * joule, best.bound * joule,
-    )  # fmt: skip
+        clearances=best.clearances,
+        springs=best.springs * size,
+        rigid_multipliers=best.rigid_multipliers / rows * joule,
+        value=best.value * joule,
+        bound=best.bound * joule,
+    )
 
 
-def _proved(answer: LeastEnergy, h: NDArray) -> bool:
-    """Whether the certificate of a scaled problem's answer is close enough."""
-    allowed = GAP * abs(answer.value) + GAP_WITHOUT_PLAY * float(h @ h) / 2
-    return answer.gap <= _PART * allowed
+def _proved(least: LeastEnergy, h: NDArray) -> bool:
+    """Whether the certified gap of a scaled problem is small enough."""
+    allowed = GAP * abs(least.value) + GAP_WITHOUT_PLAY * float(h @ h) / 2
+    return least.gap <= _SHARE * allowed
 
 
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray | None, str]:
-    """The interior-point method of this package; its answer must still satisfy H."""
-    from assembly.solvers.cone_solvers import cone_solvers, interior_point
+    """The interior-point method of this package; its solution must satisfy H."""
+    from assembly.solvers.cone_solvers import interior_point
 
     u, n, _ = interior_point(
-        cone_solvers(), np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
+        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
         _starts(group), 1e-12,
     )  # fmt: skip
     finite = np.isfinite(u).all() and np.isfinite(n).all()
-    if not finite or np.abs(H @ u - k).max(initial=0.0) > _OPEN:
+    if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
         return None, None, "no feasible point found"
     return u, -n, "Solved"
 
@@ -160,12 +167,12 @@ def _by_clarabel(
 ) -> tuple[NDArray | None, NDArray | None, str]:  # fmt: skip
     """The same by Clarabel, with v = G u + h as variables of their own."""
     r, nu = G.shape
-    limits, radii = _unit_cones(group, np.ones(nu))
+    cones, radii = _unit_cones(group, np.ones(nu))
     A = vstack(
         [
             hstack([csc_matrix(G), -diags_array(np.ones(r))]),
             hstack([csc_matrix(H), csc_matrix((len(k), r))]),
-            hstack([limits, csc_matrix((limits.shape[0], r))]),
+            hstack([cones, csc_matrix((cones.shape[0], r))]),
         ],
         format="csc",
     )
@@ -181,7 +188,7 @@ def _by_clarabel(
     return (None if x is None else x[:nu]), rigid, status
 
 
-_ROADS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = (
+_SOLVERS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = (
     _compiled,
     *(partial(_by_clarabel, value) for value in _REGULARISATIONS),
 )
@@ -191,8 +198,8 @@ def _certified(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
     u: NDArray, rigid: NDArray,
 ) -> Iterator[LeastEnergy]:  # fmt: skip
-    """An answer with the bound its own springs prove; the same led on by Newton."""
-    from assembly.solvers.cone_solvers import cone_solvers, newton
+    """A solution with the bound of its own springs; the same refined by Newton."""
+    from assembly.solvers.cone_solvers import newton
 
     problem = (G, h, d, H, k, group)
     yield _certify(*problem, u, G @ u + h, rigid)
@@ -202,12 +209,12 @@ def _certified(
     right, size = np.concatenate([h, -k]), float(h @ h) / 2
     u, y = u.copy(), np.concatenate([h, -rigid])
     newton(
-        cone_solvers(), Gt, right, d, len(h), _starts(group), _STOP * GAP,
-        _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _SHARP, u, y,
+        Gt, right, d, len(h), _starts(group), _STOP * GAP,
+        _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _FIRST_SIGMA, u, y,
     )  # fmt: skip
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():
-        if np.abs(H @ u - k).max(initial=0.0) <= _OPEN:
+        if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:
             yield _certify(*problem, u, y[: len(h)], -y[len(h) :])
 
 
@@ -215,9 +222,9 @@ def _certify(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
     u: NDArray, springs: NDArray, rigid: NDArray,
 ) -> LeastEnergy:  # fmt: skip
-    """An answer with its value and the bound that its multipliers prove."""
-    spring = G @ u + h
-    value = float(spring @ spring) / 2 - float(d @ u)
+    """A solution with its value and the bound that its multipliers prove."""
+    strain = G @ u + h
+    value = float(strain @ strain) / 2 - float(d @ u)
     problem = (G, h, d, H, k, group)
     bound = energy_bound(*problem, springs, rigid)
     if not d.any():
@@ -252,9 +259,9 @@ def energy_bound(
     Returns:
         [J] the bound; close to the minimum when the guess is close.
     """
-    pull = G.T @ spring - d - H.T @ rigid
-    reach = float(cone_sizes(pull, group).sum())
-    return float(spring @ h - spring @ spring / 2 + rigid @ k) - reach
+    gradient = G.T @ spring - d - H.T @ rigid
+    gain = float(cone_sizes(gradient, group).sum())
+    return float(spring @ h - spring @ spring / 2 + rigid @ k) - gain
 
 
 def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
@@ -277,16 +284,16 @@ def least_factor(
         t, None if no factor helps; the u (nu,); the multipliers (m,) that prove it.
 
     Raises:
-        SolverFailed: Clarabel gave no usable answer.
+        SolverFailed: Clarabel gave no usable solution.
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
     # with every cone scaled, t is proportional to the right side: solve for size 1
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
-    limits, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
+    unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
     equal = hstack([csc_matrix(B / rows[:, None]), csc_matrix((m, 1))])
-    cones = hstack([limits, csc_matrix(factors[:, None])])
+    cones = hstack([unit_cones, csc_matrix(factors[:, None])])
     positive = csc_matrix(([-1.0], ([0], [nu])), shape=(1, nu + 1))  # t >= 0
     A = vstack([equal, positive, cones], format="csc")
     b = np.concatenate([right / rows / size, [0.0], radii])
@@ -341,10 +348,10 @@ def _clarabel(
     cones = [clarabel.ZeroConeT(equal)] if equal else []
     cones += [clarabel.NonnegativeConeT(positive)] if positive else []
     cones += [clarabel.SecondOrderConeT(int(n) + 1) for n in np.bincount(group)]
-    answer = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
-    status = str(answer.status)
-    x, z = np.array(answer.x), np.array(answer.z)
-    # what is not fully solved may still be good: its certificate will tell
+    solution = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
+    status = str(solution.status)
+    x, z = np.array(solution.x), np.array(solution.z)
+    # a solution that is not accurate may still be good: its certificate decides
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -357,6 +364,6 @@ def _proves_no_point(
     """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k."""
     # n.H u is at most the sum of radius_k |(H^T n)_k|: n.k above it is a proof, once
     # it is above the rounding of its own terms too
-    reach = float(cone_sizes(H.T @ n, group) @ radius)
+    most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
-    return bool(float(n @ k) > reach + rounding)
+    return bool(float(n @ k) > most + rounding)

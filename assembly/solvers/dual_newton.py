@@ -19,9 +19,16 @@ Sources:
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import (
+    GivenIndices,
+    GivenMatrix,
+    GivenVector,
+    Indices,
+    Matrix,
+    Vector,
+    part,
+)
 from assembly.solvers.interior import LANES, add, dot, layers_of
 
 FAST = {"contract", "reassoc"}
@@ -31,13 +38,12 @@ _SETTLED = 0.1  # part of the gap that may be the inner problem's
 _OPEN = 1e-13  # most that a row without springs may stay open
 
 
+@part(fastmath=FAST)
 def dual_newton(
-    Gt: NDArray, h: NDArray, d: NDArray, springs: int, starts: NDArray,
-    relative: float, absolute: float, steps: int, sharp: float, u: NDArray, y: NDArray,
+    Gt: GivenMatrix, h: GivenVector, d: GivenVector, springs: int, starts: GivenIndices,
+    relative: float, absolute: float, steps: int, sharp: float, u: Vector, y: Vector,
 ) -> int:  # fmt: skip
     """Maximise the dual; ``u`` and ``y`` leave holding the answer.
-
-    Compiled in :mod:`assembly.solvers.cone_solvers`.
 
     Args:
         Gt: (nu, r) columns of G, of order 1, and of H.
@@ -118,10 +124,10 @@ def dual_newton(
     return taken
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _slopes(
-    M: NDArray, h: NDArray, push: NDArray, springs: int, layers: NDArray, old: NDArray,
-    sigma: float, u: NDArray, y: NDArray, g: NDArray, z: NDArray, B: NDArray,
+    M: Matrix, h: GivenVector, push: Vector, springs: int, layers: Indices, old: Vector,
+    sigma: float, u: Vector, y: Vector, g: Vector, z: Vector, B: Matrix,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """What the smooth dual is at y, and how it goes on.
 
@@ -192,8 +198,8 @@ def _slopes(
     return smooth, 0.5 * residual, kink, 0.5 * primal
 
 
-@kernel(fastmath=FAST)
-def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
+@part(fastmath=FAST)
+def _curvature(B: Matrix, springs: int, S: Matrix) -> None:
     """Lower half of S = B B^T + diag(1 .. 1, 0 .. 0)."""
     for i in range(len(S)):
         row = B[i]
@@ -203,8 +209,8 @@ def _curvature(B: NDArray, springs: int, S: NDArray) -> None:
             S[i, i] += 1.0
 
 
-@kernel(fastmath=FAST)
-def _solve(S: NDArray, g: NDArray, x: NDArray) -> bool:
+@part(fastmath=FAST)
+def _solve(S: Matrix, g: Vector, x: Vector) -> bool:
     """S x = g by Cholesky, in the lower half of S."""
     r = len(g)
     for i in range(r):

@@ -21,12 +21,23 @@ Sources:
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import (
+    GivenVector,
+    Indices,
+    Matrix,
+    Vector,
+    kernel,
+    part,
+)
 from assembly.solvers.majorant import eigenvectors, majorant_bound
-from assembly.solvers.polytope import Polytope, cut, farthest_corner, start_box
+from assembly.solvers.polytope import (
+    Polytope,
+    cut,
+    empty_polytope,
+    farthest_corner,
+    start_box,
+)
 from assembly.solvers.support import Body, screw_at, support, symmetric, within
 from assembly.solvers.vectors import copy, divide, fill, inner
 
@@ -57,17 +68,34 @@ class Search(NamedTuple):
 
     part: int
     tolerance: float
-    bounds: NDArray
-    best: NDArray
-    direction: NDArray
-    axes: NDArray
-    heights: NDArray
-    cuts: NDArray
-    counts: NDArray
+    bounds: Vector
+    best: Vector
+    direction: Vector
+    axes: Matrix
+    heights: Matrix
+    cuts: Matrix
+    counts: Indices
     outer: Polytope
 
 
 @kernel
+def begin_search(body: Body, part: int, tolerance: float) -> Search:
+    """:func:`begin` for callers that are not compiled themselves."""
+    return begin(body, part, tolerance, empty_polytope())
+
+
+@kernel
+def search_on(
+    body: Body, search: Search, height: float, screw: Vector, pulls: Vector
+) -> int:
+    """Take in what :func:`learn` is given, unless empty, and :func:`advance`."""
+    if len(pulls):
+        learn(body, search, height, screw, pulls)
+        choose(search)
+    return advance(body, search)
+
+
+@part
 def begin(body: Body, part: int, tolerance: float, outer: Polytope) -> Search:
     """A search that has not looked anywhere yet.
 
@@ -99,7 +127,7 @@ def begin(body: Body, part: int, tolerance: float, outer: Polytope) -> Search:
     return search
 
 
-@kernel
+@part
 def _first_direction(body: Body, search: Search) -> None:
     """Where the body would reach farthest if no closure held it."""
     p, nv = body.rows.shape
@@ -142,12 +170,11 @@ def _first_direction(body: Body, search: Search) -> None:
                 search.direction[a] = sign * d[a]
 
 
-@kernel
-def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
+@part
+def advance(body: Body, search: Search) -> int:
     """Look on until the bounds are as close as asked.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         body: what is searched.
         search: leaves holding the bounds.
 
@@ -161,7 +188,7 @@ def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
         if search.counts[1] >= _MOST_SUPPORTS:
             return GAVE_UP
         height, v, pulls, n = support(
-            solvers, body, search.part, search.direction, _SHARE * search.tolerance
+            body, search.part, search.direction, _SHARE * search.tolerance
         )
         screw = screw_at(body, v)
         reached = 0.0
@@ -176,9 +203,9 @@ def advance(solvers: ConeSolvers, body: Body, search: Search) -> int:
         choose(search)
 
 
-@kernel
+@part
 def learn(
-    body: Body, search: Search, height: float, screw: NDArray, pulls: NDArray
+    body: Body, search: Search, height: float, screw: GivenVector, pulls: GivenVector
 ) -> None:
     """Take in a support in ``search.direction``.
 
@@ -201,8 +228,8 @@ def learn(
     search.bounds[1] = max(search.bounds[1], search.bounds[0])
 
 
-@kernel
-def _improve(search: Search, screw: NDArray) -> None:
+@part
+def _improve(search: Search, screw: GivenVector) -> None:
     """Keep a screw that is farther than the best."""
     size = 0.0
     for a in range(3):
@@ -215,8 +242,8 @@ def _improve(search: Search, screw: NDArray) -> None:
         copy(screw, search.best)
 
 
-@kernel
-def _add_plane(search: Search, direction: NDArray, height: float) -> None:
+@part
+def _add_plane(search: Search, direction: Vector, height: float) -> None:
     """A new plane: of the box, or kept for it, or cut at once."""
     stage = search.counts[0]
     if stage == _CUTTING:
@@ -232,8 +259,8 @@ def _add_plane(search: Search, direction: NDArray, height: float) -> None:
         search.counts[2] += 1
 
 
-@kernel
-def _set_side(search: Search, direction: NDArray, height: float) -> None:
+@part
+def _set_side(search: Search, direction: Vector, height: float) -> None:
     """A side of the box, if the direction is one of its axes or the opposite."""
     for axis in range(3):
         along, against = True, True
@@ -246,8 +273,8 @@ def _set_side(search: Search, direction: NDArray, height: float) -> None:
             search.heights[0, axis] = -height
 
 
-@kernel
-def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> None:
+@part
+def _learn_opposite(body: Body, search: Search, v: Vector, pulls: Vector) -> None:
     """What a symmetric body's support says of the other side: v turned round."""
     start = body.start
     screw = screw_at(body, within(body, divide(v, -1.0)))
@@ -267,7 +294,7 @@ def _learn_opposite(body: Body, search: Search, v: NDArray, pulls: NDArray) -> N
     _add_plane(search, divide(search.direction, -1.0), max(height, reached))
 
 
-@kernel
+@part
 def choose(search: Search) -> None:
     """The next direction, and the stage that looks in it."""
     counts, direction = search.counts, search.direction
@@ -298,15 +325,15 @@ def choose(search: Search) -> None:
         _towards(search, corner)
 
 
-@kernel
-def _towards(search: Search, point: NDArray) -> None:
+@part
+def _towards(search: Search, point: Vector) -> None:
     """Look towards a point."""
     size = np.sqrt(inner(point, point))
     for a in range(3):
         search.direction[a] = point[a] / size
 
 
-@kernel
+@part
 def _start_boxing(search: Search) -> None:
     """A box along the best point's direction, its planes not known yet."""
     search.counts[0] = _BOXING

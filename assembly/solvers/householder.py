@@ -9,17 +9,16 @@ Sources:
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import Indices, Matrix, Vector, part
 from assembly.solvers.interior import LANES
 
 _CLEAR = 10.0  # a pivot within this factor of the threshold decides nothing
 
 
-@kernel(fastmath={"contract", "reassoc"})
+@part(fastmath={"contract", "reassoc"})
 def triangulate(
-    F: NDArray, turns: NDArray, diagonal: NDArray, order: NDArray, relative: float,
+    F: Matrix, turns: Vector, diagonal: Vector, order: Indices, relative: float,
     floor: float, clean: float,
 ) -> int:  # fmt: skip
     """Turn the rows of F into a lower triangle, the largest remaining row first.
@@ -89,8 +88,8 @@ def triangulate(
     return p
 
 
-@kernel(fastmath={"contract", "reassoc"})
-def turn_all(F: NDArray, turns: NDArray, rank: int, X: NDArray) -> None:
+@part(fastmath={"contract", "reassoc"})
+def turn_all(F: Matrix, turns: Vector, rank: int, X: Matrix) -> None:
     """From the triangle's coordinates back: every column x of X becomes Q x."""
     m, count = X.shape
     dots = np.empty(count)
@@ -110,8 +109,8 @@ def turn_all(F: NDArray, turns: NDArray, rank: int, X: NDArray) -> None:
                 row[i] -= weight * dots[i]
 
 
-@kernel(fastmath={"contract", "reassoc"})
-def turn(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
+@part(fastmath={"contract", "reassoc"})
+def turn(F: Matrix, turns: Vector, rank: int, x: Vector) -> None:
     """From the triangle's coordinates back: x becomes Q x."""
     for step in range(rank - 1, -1, -1):
         own = F[step]
@@ -123,8 +122,8 @@ def turn(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
             x[a] -= along * own[a]
 
 
-@kernel(fastmath={"contract", "reassoc"})
-def turn_back(F: NDArray, turns: NDArray, rank: int, x: NDArray) -> None:
+@part(fastmath={"contract", "reassoc"})
+def turn_back(F: Matrix, turns: Vector, rank: int, x: Vector) -> None:
     """Into the triangle's coordinates: x becomes Q^T x."""
     for step in range(rank):
         own = F[step]

@@ -20,7 +20,16 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import (
+    GivenIndices,
+    GivenMatrix,
+    GivenVector,
+    Indices,
+    Matrix,
+    Vector,
+    kernel,
+    part,
+)
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the way to the nearest cone's boundary
@@ -31,13 +40,12 @@ LANES = 16
 FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
+@part(fastmath=FAST)
 def interior_point(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, starts: NDArray,
-    tolerance: float, relative: float,
-) -> tuple[NDArray, NDArray, int]:  # fmt: skip
+    G: GivenMatrix, h: GivenVector, d: GivenVector, H: GivenMatrix, k: GivenVector,
+    starts: GivenIndices, tolerance: float, relative: float,
+) -> tuple[Vector, Vector, int]:  # fmt: skip
     """Minimise; all arguments of order 1 (scale before).
-
-    Compiled in :mod:`assembly.solvers.cone_solvers`.
 
     Args:
         G: (r, nu).
@@ -144,8 +152,8 @@ def interior_point(
     return answer, y[r:].copy(), taken
 
 
-@kernel
-def layers_of(starts: NDArray) -> tuple[NDArray, NDArray]:
+@part
+def layers_of(starts: GivenIndices) -> tuple[Indices, Indices]:
     """Columns sorted into layers, the largest cones first.
 
     Args:
@@ -223,11 +231,11 @@ def _sum(layers: NDArray, a: NDArray, b: NDArray, total: NDArray) -> None:
             total[c] += x[c] * y[c]
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _scalings(
-    layers: NDArray, u: NDArray, z0: NDArray, z1: NDArray, eta: NDArray, w0: NDArray,
-    w1: NDArray, l0: NDArray, l1: NDArray, across: NDArray, along: NDArray,
-    sums: NDArray,
+    layers: Indices, u: Vector, z0: Vector, z1: Vector, eta: Vector, w0: Vector,
+    w1: Vector, l0: Vector, l1: Vector, across: Vector, along: Vector,
+    sums: Matrix,
 ) -> bool:  # fmt: skip
     """Nesterov-Todd points of all cones, W = eta (w), and the scaled point l = W z.
 
@@ -281,10 +289,10 @@ def _scalings(
     return True
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _fill_system(
-    layers: NDArray, M: NDArray, w1: NDArray, eta: NDArray, along: NDArray,
-    across: NDArray, sums: NDArray, B: NDArray, S: NDArray, r: int,
+    layers: Indices, M: Matrix, w1: Vector, eta: Vector, along: Vector,
+    across: Vector, sums: Matrix, B: Matrix, S: Matrix, r: int,
 ) -> None:  # fmt: skip
     """B = M D^-1/2, and S's lower half."""
     part, root, inverse = sums[0], sums[1], sums[5]
@@ -307,8 +315,8 @@ def _fill_system(
         S[i, i] += 1.0
 
 
-@kernel(fastmath=FAST)
-def _cholesky(S: NDArray) -> bool:
+@part(fastmath=FAST)
+def _cholesky(S: Matrix) -> bool:
     """Factor the lower half in place; rows lost to rounding get a huge pivot.
 
     The diagonal leaves holding its inverse.
@@ -335,10 +343,10 @@ def _cholesky(S: NDArray) -> bool:
     return True
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _square_scaled(
-    layers: NDArray, w1: NDArray, across: NDArray, along: NDArray, sums: NDArray,
-    x: NDArray, out: NDArray,
+    layers: Indices, w1: Vector, across: Vector, along: Vector, sums: Matrix,
+    x: Vector, out: Vector,
 ) -> None:  # fmt: skip
     """D^-1 x."""
     part, inverse = sums[0], sums[5]
@@ -353,12 +361,12 @@ def _square_scaled(
             found[c] = across[c] * (own[c] - lengthwise) + along[c] * lengthwise
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _direction(
-    layers: NDArray, M: NDArray, S: NDArray, eta: NDArray, w0: NDArray, w1: NDArray,
-    across: NDArray, along: NDArray, t0: NDArray, t1: NDArray, r0: NDArray, u: NDArray,
-    z1: NDArray, left: NDArray, r: int, sums: NDArray, e: NDArray,
-    f: NDArray, right: NDArray, du: NDArray, dz0: NDArray, dz1: NDArray,
+    layers: Indices, M: Matrix, S: Matrix, eta: Vector, w0: Vector, w1: Vector,
+    across: Vector, along: Vector, t0: Vector, t1: Vector, r0: Vector, u: Vector,
+    z1: Vector, left: Vector, r: int, sums: Matrix, e: Vector,
+    f: Vector, right: Vector, du: Vector, dz0: Vector, dz1: Vector,
 ) -> None:  # fmt: skip
     """Step for the scaled right sides t, with M's rows eliminated.
 
@@ -405,11 +413,11 @@ def _direction(
         dz0[c] = r0[c] - part[c] - other[c]
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _corrected(
-    layers: NDArray, eta: NDArray, w0: NDArray, w1: NDArray, l0: NDArray, l1: NDArray,
-    du: NDArray, dz0: NDArray, dz1: NDArray, target: float, sums: NDArray,
-    t0: NDArray, t1: NDArray, r0: NDArray,
+    layers: Indices, eta: Vector, w0: Vector, w1: Vector, l0: Vector, l1: Vector,
+    du: Vector, dz0: Vector, dz1: Vector, target: float, sums: Matrix,
+    t0: Vector, t1: Vector, r0: Vector,
 ) -> None:  # fmt: skip
     """Solve l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t."""
     ds, dz, ll, lt = sums[0], sums[1], sums[2], sums[3]
@@ -446,10 +454,10 @@ def _corrected(
             t[c] = (t[c] - t0[c] * scaled[c]) * ll[c]
 
 
-@kernel(fastmath=FAST)
+@part(fastmath=FAST)
 def _longest(
-    layers: NDArray, u: NDArray, du: NDArray, z0: NDArray, z1: NDArray, dz0: NDArray,
-    dz1: NDArray, sums: NDArray,
+    layers: Indices, u: Vector, du: Vector, z0: Vector, z1: Vector, dz0: Vector,
+    dz1: Vector, sums: Matrix,
 ) -> float:  # fmt: skip
     """Longest step that keeps every s and z in its cone."""
     aa, ab, bb = sums[0], sums[1], sums[2]

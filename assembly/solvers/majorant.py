@@ -18,17 +18,16 @@ Sources:
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import GivenVector, Indices, Matrix, Vector, part
 
 _LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
 _SWEEPS, _STEPS = 12, 60
 
 
-@kernel(fastmath={"contract", "reassoc"})
+@part(fastmath={"contract", "reassoc"})
 def majorant_bound(
-    centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray, w: NDArray
+    centre: Vector, X: Matrix, H: Matrix, start: Vector, starts: Indices, w: GivenVector
 ) -> float:
     """Upper bound of |centre + X (v - start)| over unit cones with H (v - start) = 0.
 
@@ -76,9 +75,9 @@ def majorant_bound(
     return constant + largest_on_sphere(Q, linear)
 
 
-@kernel(fastmath={"contract", "reassoc"})
+@part(fastmath={"contract", "reassoc"})
 def _follow_rows(
-    H: NDArray, X: NDArray, start: NDArray, sizes: NDArray, A: NDArray, fixed: NDArray
+    H: Matrix, X: Matrix, start: Vector, sizes: Vector, A: Matrix, fixed: Vector
 ) -> bool:
     """Subtract from A and fixed what the best n answers; whether that succeeded."""
     p, nv = H.shape
@@ -121,8 +120,8 @@ def _follow_rows(
     return True
 
 
-@kernel
-def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
+@part
+def largest_on_sphere(Q: Matrix, g: Vector) -> float:
     """Largest value of d.Q d/2 + g.d over unit vectors d.
 
     Args:
@@ -162,8 +161,8 @@ def largest_on_sphere(Q: NDArray, g: NDArray) -> float:
     return total
 
 
-@kernel
-def eigenvectors(Q: NDArray) -> tuple[NDArray, NDArray]:
+@part
+def eigenvectors(Q: Matrix) -> tuple[Vector, Matrix]:
     """Eigenvalues (3,) of a symmetric matrix, and vectors as columns (3, 3)."""
     D, V, values = Q.copy(), np.zeros((3, 3)), np.empty(3)
     for i in range(3):

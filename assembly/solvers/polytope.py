@@ -9,9 +9,8 @@ corners lie together and nothing else changes.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import IndexRows, Indices, Matrix, Vector, part
 
 _MOST = 4096  # corners; 400 planes make 800
 
@@ -25,12 +24,12 @@ class Polytope(NamedTuple):
         used: (2,) corners, and planes so far.
     """
 
-    corners: NDArray
-    planes: NDArray
-    used: NDArray
+    corners: Matrix
+    planes: IndexRows
+    used: Indices
 
 
-@kernel
+@part
 def empty_polytope() -> Polytope:
     """Room for a body."""
     return Polytope(
@@ -38,8 +37,8 @@ def empty_polytope() -> Polytope:
     )
 
 
-@kernel
-def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> None:
+@part
+def start_box(body: Polytope, axes: Matrix, low: Vector, high: Vector) -> None:
     """Make the body a box.
 
     Args:
@@ -60,8 +59,8 @@ def start_box(body: Polytope, axes: NDArray, low: NDArray, high: NDArray) -> Non
     body.used[0], body.used[1] = 8, 6
 
 
-@kernel
-def cut(body: Polytope, normal: NDArray, height: float) -> bool:
+@part
+def cut(body: Polytope, normal: Vector, height: float) -> bool:
     """Keep the points x with normal . x <= height.
 
     Args:
@@ -118,8 +117,8 @@ def cut(body: Polytope, normal: NDArray, height: float) -> bool:
     return True
 
 
-@kernel
-def farthest_corner(body: Polytope) -> NDArray:
+@part
+def farthest_corner(body: Polytope) -> Vector:
     """(3,) the corner farthest from the origin."""
     best, at = -1.0, 0
     for i in range(body.used[0]):

@@ -12,10 +12,9 @@ and its point is drawn into the body: height and point never depend on the solve
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
-from assembly.solvers.cone_solvers import ConeSolvers
+from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
+from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import divide, inner
 
 _SYMMETRIC = 1e-14  # H start counts as zero
@@ -33,21 +32,32 @@ class Body(NamedTuple):
         starts: (cones + 1,) first column of each cone, and nv.
     """
 
-    centre: NDArray
-    map: NDArray
-    rows: NDArray
-    start: NDArray
-    starts: NDArray
+    centre: Vector
+    map: Matrix
+    rows: Matrix
+    start: Vector
+    starts: Indices
 
 
 @kernel
+def pulls_along(body: Body, part: int, direction: Vector, tolerance: float) -> Vector:
+    """The pulls of :func:`support`, for callers that are not compiled themselves."""
+    return support(body, part, direction, tolerance)[2]
+
+
+@kernel
+def screw_near(body: Body, v: Vector) -> Vector:
+    """:func:`screw_at` of what is :func:`within`, for callers that are not compiled."""
+    return screw_at(body, within(body, v))
+
+
+@part
 def support(
-    solvers: ConeSolvers, body: Body, part: int, direction: NDArray, tolerance: float
-) -> tuple[float, NDArray, NDArray, NDArray]:
+    body: Body, part: int, direction: Vector, tolerance: float
+) -> tuple[float, Vector, Vector, Vector]:
     """Largest component of the body's screws along a direction.
 
     Args:
-        solvers: of :func:`assembly.solvers.cone_solvers.cone_solvers`.
         body: what is searched.
         part: first of the three components.
         direction: (3,) unit vector.
@@ -76,7 +86,7 @@ def support(
         for i in range(p):
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
-        v, n, _ = solvers.interior_point(
+        v, n, _ = interior_point(
             np.zeros((0, nv)), np.zeros(0), divide(pulls, size), body.rows, right,
             body.starts, tolerance / size, 0.0,
         )  # fmt: skip
@@ -97,8 +107,8 @@ def support(
     return height, within(body, v) if p else v, pulls, n
 
 
-@kernel
-def within(body: Body, v: NDArray) -> NDArray:
+@part
+def within(body: Body, v: Vector) -> Vector:
     """A nearby v that satisfies rows and cones to rounding."""
     step = np.empty(len(v))
     for j in range(len(v)):
@@ -123,8 +133,8 @@ def within(body: Body, v: NDArray) -> NDArray:
     return step
 
 
-@kernel
-def screw_at(body: Body, v: NDArray) -> NDArray:
+@part
+def screw_at(body: Body, v: Vector) -> Vector:
     """(6,) platform screw at v."""
     screw = body.centre.copy()
     for j in range(len(v)):
@@ -134,7 +144,7 @@ def screw_at(body: Body, v: NDArray) -> NDArray:
     return screw
 
 
-@kernel
+@part
 def symmetric(body: Body) -> bool:
     """Whether v -> -v leaves the rows satisfied."""
     for i in range(len(body.rows)):

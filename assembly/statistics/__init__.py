@@ -1,4 +1,4 @@
-"""What errors drawn at random do, and how loose tolerances may be.
+"""Monte Carlo statistics of geometric errors, and tolerance allocation.
 
 Begin at ``monte_carlo.py``; ``allocation.py`` for tolerances.
 """

@@ -1,11 +1,11 @@
-"""The loosest tolerances with which a robot still goes together, for the least cost.
+"""Tolerance allocation: tolerances of least cost within limits.
 
 Tolerances t_g, one for each class of errors, cost ``c_g / t_g`` (or ``-c_g log t_g``).
-Margin and energy are convex limits: :mod:`assembly.statistics.cutting_planes` finds
-the least cost and proves it where none may fail.  A yield, and limits of wrenches,
-stress and pose errors, are not: :mod:`assembly.statistics.least_cost` goes on from
-there to a least cost nearby.  Last, all tolerances are scaled alike until draws that
-shaped nothing, or the worst corners, just meet every limit, and fresh ones verify them.
+Limits of margin and energy are convex: :mod:`assembly.statistics.cutting_planes` finds
+the least cost and proves it for a yield of 1.  A yield below 1, and limits of wrenches,
+stress and pose errors, are not: :mod:`assembly.statistics.least_cost` continues from
+there to a local minimum.  Last, all tolerances are scaled uniformly until independent
+draws, or the worst corners, just meet every limit, and fresh draws verify them.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,11 @@ from assembly.statistics.cutting_planes import cut_planes
 from assembly.statistics.least_cost import least_cost
 from assembly.statistics.replay import Replay
 from assembly.statistics.requirement import SCALING, TRAINING, Plan, Requirement
-from assembly.statistics.scaling import draw_samples, fit, with_worst_corners
+from assembly.statistics.scaling import (
+    draw_samples,
+    scale_uniformly,
+    with_worst_corners,
+)
 from assembly.statistics.verification import prove_worst, verify
 from forcefit.inputs.display import html_table, short_repr
 
@@ -28,35 +32,35 @@ if TYPE_CHECKING:
     import xarray
 
 
-_MORE_TO_SCALE = 4  # times the draws that shape the tolerances: one number costs little
+_SCALING_DRAWS = 4  # times the training draws: only one factor is to be found
 
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances, what they cost, and what is known of them.
+    """Tolerances, their cost, and proven bounds of both.
 
     Attributes:
-        plan: what was asked.
+        plan: costs and limits.
         tolerances: (G,) [rad or m].
         price: their cost.
-        alike: (G,) [rad or m] those whose proportions the convex limits (or, without
-            any, the energy) decide, scaled alike to meet all limits.
-        price_alike: their cost; no less than ``price``.
-        price_bound: no tolerances that always meet the convex limits cost less; NaN
-            for a yield below 1, or where a limit is not convex.
+        uniformly_scaled: (G,) [rad or m] those with the proportions of the convex
+            programme, scaled uniformly to meet all limits.
+        price_uniformly_scaled: their cost; no less than ``price``.
+        price_bound: lower bound of the cost of tolerances that always meet the convex
+            limits; NaN for a yield below 1, or where a limit is not convex.
         cuts: planes in the convex programme.
         worst: by limit and for yield 1: the worst corner found and the proven upper
             bound, over all postures; NaN where nothing is proven.
-        proven_scale: factor on the tolerances at which the proof meets the limits too;
-            1 or less, NaN where nothing is proven.
-        verification: of fresh draws: yields with their intervals.
+        proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
+            meet the limits too; NaN where nothing is proven.
+        verification: by fresh draws: yields with their intervals.
     """
 
     plan: Plan
     tolerances: NDArray
     price: float
-    alike: NDArray
-    price_alike: float
+    uniformly_scaled: NDArray
+    price_uniformly_scaled: float
     price_bound: float
     cuts: int
     worst: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -83,10 +87,10 @@ def allocate(
 
     Args:
         postures: of one robot, the workspace.
-        plan: what is asked.
-        fresh: draws, none of which was used before, to verify with; 0 for none.
-        progress: called with what is done, how far, and of how much.
-        replay: keeps what is computed, to go on from after a kill.
+        plan: costs and limits.
+        fresh: independent draws for the verification; 0 for none.
+        progress: called with the name of a step, its progress and its total.
+        replay: stored results, from which a killed computation resumes.
 
     Returns:
         The tolerances.
@@ -96,52 +100,73 @@ def allocate(
             tightest tolerances violate a limit.
     """
     replay = replay or Replay()
-    work = Requirement(postures, plan, replay)
-    work.check_perfect_parts()
-    driver = work
-    if not work.convex:
-        # nothing convex is limited: the energy gives a shape to start from
-        typical = _typical_energy(work)
-        driver = Requirement(
+    requirement = Requirement(postures, plan, replay)
+    requirement.check_perfect_parts()
+    convex_requirement = requirement
+    if not requirement.convex:
+        # no convex limit: start from the proportions that a limit of energy gives
+        typical = _typical_energy(requirement)
+        convex_requirement = Requirement(
             postures, replace(plan, limits={"energy": typical}), replay
         )
-    driver.check_taken_up()
-    shape, bound, cuts = cut_planes(driver, progress)
-    t, alike = _fit_all(work, shape, progress)
-    check: dict[str, Any] = {}
+    convex_requirement.check_taken_up()
+    proportions, price_bound, cuts = cut_planes(convex_requirement, progress)
+    tolerances, uniformly_scaled = _scaled_tolerances(
+        requirement, proportions, progress
+    )
+    verification: dict[str, Any] = {}
     if fresh:
-        t, check = verify(work, t, fresh, progress)
-    answer = Allocation(
-        plan, t, plan.price(t), alike, plan.price(alike),
-        bound if work.is_convex else np.nan, cuts, verification=check,
-    )  # fmt: skip
+        tolerances, verification = verify(requirement, tolerances, fresh, progress)
+    allocation = Allocation(
+        plan,
+        tolerances,
+        plan.price(tolerances),
+        uniformly_scaled,
+        plan.price(uniformly_scaled),
+        price_bound if requirement.is_convex else np.nan,
+        cuts,
+        verification=verification,
+    )
     if plan.asked_yield == 1.0:
-        worst, proven = prove_worst(work, t, progress)
-        answer = replace(answer, worst=worst, proven_scale=proven)
-    return answer
+        worst_cases, proven_scale = prove_worst(requirement, tolerances, progress)
+        allocation = replace(allocation, worst=worst_cases, proven_scale=proven_scale)
+    return allocation
 
 
-def _fit_all(
-    work: Requirement, shape: NDArray, progress: Callable[[str, int, int], None]
+def _scaled_tolerances(
+    requirement: Requirement,
+    proportions: NDArray,
+    progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """The cheapest tolerances found, and the shape scaled alike."""
-    samples = draw_samples(work, TRAINING)
-    if work.is_convex:
-        alike = fit(work, with_worst_corners(work, samples, shape), shape)
-        return alike, alike
-    t, samples = least_cost(work, samples, shape, progress)
-    if work.plan.asked_yield == 1.0:
-        for one in (shape, t):
-            samples = with_worst_corners(work, samples, fit(work, samples, one))
+    """The cheapest tolerances found, and the given proportions scaled uniformly."""
+    samples = draw_samples(requirement, TRAINING)
+    if requirement.is_convex:
+        uniformly_scaled = scale_uniformly(
+            requirement,
+            with_worst_corners(requirement, samples, proportions),
+            proportions,
+        )
+        return uniformly_scaled, uniformly_scaled
+    tolerances, samples = least_cost(requirement, samples, proportions, progress)
+    if requirement.plan.asked_yield == 1.0:
+        for one in (proportions, tolerances):
+            samples = with_worst_corners(
+                requirement, samples, scale_uniformly(requirement, samples, one)
+            )
     else:
-        samples = draw_samples(work, SCALING, _MORE_TO_SCALE)
-    t, alike = fit(work, samples, t), fit(work, samples, shape)
-    return min((t, alike), key=work.plan.price), alike
+        samples = draw_samples(requirement, SCALING, _SCALING_DRAWS)
+    tolerances, uniformly_scaled = (
+        scale_uniformly(requirement, samples, tolerances),
+        scale_uniformly(requirement, samples, proportions),
+    )
+    return min(
+        (tolerances, uniformly_scaled), key=requirement.plan.price
+    ), uniformly_scaled
 
 
-def _typical_energy(work: Requirement) -> float:
-    """[J] of half the draws at the loosest tolerances, at the first posture."""
-    plan = work.plan
+def _typical_energy(requirement: Requirement) -> float:
+    """[J] median of draws at the loosest tolerances, at the first posture."""
+    plan = requirement.plan
     values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
-    rows = work.experiments[0].answer(values, range(len(values)))
+    rows = requirement.experiments[0].evaluate(values, range(len(values)))
     return max(float(np.median(rows["energy"])), 1e-12)

@@ -1,4 +1,4 @@
-"""Flights of a billiard ball through the set where play may sit; compiled.
+"""The billiard walk through the set of clearance positions; compiled.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -10,28 +10,28 @@ from numpy.typing import NDArray
 from assembly.solvers.compiled import kernel
 
 FLIGHT = 2.0  # mean time; Dikin's ellipsoid is crossed in about one
-MIRRORS = 20  # of a flight at most, for each dimension
-_OUT = 0.9
+REFLECTIONS = 20  # of a trajectory at most, for each dimension
+_FRACTION = 0.9  # of the way to the boundary
 
 
 @kernel
-def begin_apart(
+def start_chains(
     M: NDArray, starts: NDArray, u: NDArray, rng: np.random.Generator, walks: NDArray
 ) -> None:
-    """Begin walks most of the way to the boundary in random directions.
+    """Starts of the chains: close to the boundary in random directions.
 
     Args:
         M: (nu, n) axes of Dikin's ellipsoid.
         starts: (cones + 1,) first column of each cone, and nu.
         u: (nu,) its centre.
         rng: of random numbers.
-        walks: (chains, nu) to fill.
+        walks: (chains, nu) overwritten.
     """
     for chain in range(len(walks)):
-        way = _direction(M, rng)
-        reach, _ = _until(starts, u, way, np.inf)
+        direction = _direction(M, rng)
+        reach, _ = _distance_to_bound(starts, u, direction, np.inf)
         for c in range(len(u)):
-            walks[chain, c] = u[c] + _OUT * reach * way[c]
+            walks[chain, c] = u[c] + _FRACTION * reach * direction[c]
 
 
 @kernel
@@ -39,21 +39,21 @@ def walk(
     M: NDArray, gram: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     every: int, rng: np.random.Generator, trace: NDArray,
 ) -> None:  # fmt: skip
-    """Walk on; u moves, and its platform screw is kept every so many flights.
+    """Continue a chain; its platform screw is kept every so many trajectories.
 
     Args:
         M: (nu, n) axes of Dikin's ellipsoid.
         gram: (nu, nu) M M^T.
         starts: (cones + 1,) first column of each cone, and nu.
-        to_screw: (6, nu) [rad, m] what u does to the platform.
-        u: (nu,) where the walk is, overwritten.
-        every: how many flights.
+        to_screw: (6, nu) [rad, m] from u to the platform's screw.
+        u: (nu,) the chain's point, overwritten.
+        every: number of trajectories between two screws.
         rng: of random numbers.
         trace: (kept, 6) [rad, m] overwritten with the screws.
     """
     for k in range(len(trace)):
         for _ in range(every):
-            _fly(M, gram, starts, u, rng)
+            _move(M, gram, starts, u, rng)
         for a in range(6):
             trace[k, a] = 0.0
             for c in range(len(u)):
@@ -61,18 +61,18 @@ def walk(
 
 
 @kernel
-def _fly(
+def _move(
     M: NDArray, gram: NDArray, starts: NDArray, u: NDArray, rng: np.random.Generator
 ) -> None:
-    """A straight flight in a random direction, mirrored wherever it meets a bound.
+    """A trajectory in a random direction, reflected at every bound it meets.
 
-    The ellipsoid is a ball to it: u = M y, mirrored at normals M_k^T u_k of y; M M^T is
-    all that needs.
+    In coordinates y, u = M y, the ellipsoid is a ball; the reflection at the normals
+    M_k^T u_k of y needs M M^T only.
     """
     w, left = _direction(M, rng), FLIGHT * rng.standard_exponential()
     v = u.copy()
-    for _ in range(MIRRORS * (M.shape[1] + 1)):
-        reach, wall = _until(starts, v, w, left)
+    for _ in range(REFLECTIONS * (M.shape[1] + 1)):
+        reach, wall = _distance_to_bound(starts, v, w, left)
         for c in range(len(v)):
             v[c] += reach * w[c]
         if wall < 0:
@@ -90,12 +90,12 @@ def _fly(
             turn = 2.0 * across / size * v[a]
             for c in range(len(w)):
                 w[c] -= turn * gram[a, c]
-    # too many mirrors, as in a corner: it stays, so that the way back is as likely
+    # too many reflections, as in a corner: u is kept, which preserves reversibility
 
 
 @kernel
 def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
-    """(nu,) random, of Dikin's ellipsoid."""
+    """(nu,) random direction, normal with the covariance of Dikin's ellipsoid."""
     nu, n = M.shape
     w = np.zeros(nu)
     for i in range(n):
@@ -106,8 +106,10 @@ def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
 
 
 @kernel
-def _until(starts: NDArray, v: NDArray, w: NDArray, left: float) -> tuple[float, int]:
-    """How far along w from v until a bound is met, and whose; -1 if none before."""
+def _distance_to_bound(
+    starts: NDArray, v: NDArray, w: NDArray, left: float
+) -> tuple[float, int]:
+    """Distance along w from v to the nearest bound, and its cone; -1 if none."""
     reach, wall = left, -1
     for k in range(len(starts) - 1):
         ww, vw, vv = 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Cheapest tolerances within convex limits: a convex programme by cutting planes.
+"""Tolerances of least cost within convex limits, by cutting planes.
 
 Two requirements are convex in the tolerances t:
 
@@ -8,9 +8,9 @@ Two requirements are convex in the tolerances t:
 - *with a yield*: the mean of the worst (1 - yield) of many fixed draws s (the
   conditional value at risk), which is more than the yield asks.
 
-Solve, find where the requirement is violated most, add the plane that its slopes give,
-repeat.  Every plane holds for all tolerances that meet the requirement, so the
-programme's cost bounds theirs from below.
+Each iteration solves the programme, finds the largest violation of the requirement, and
+adds the plane of its slopes.  Every plane holds for all tolerances that meet the
+requirement, so the programme's cost is a lower bound of theirs.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -26,35 +26,35 @@ from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # of a limit: by how much the programme may still violate it
+_TOLERANCE = 1e-3  # of a limit: largest violation at the end
 _MOST_CUTS = 200
 
 
 def cut_planes(
-    work: Requirement, progress: Callable[[str, int, int], None]
+    requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
     """Cheapest tolerances that meet the convex limits of a requirement.
 
     Args:
-        work: what is required.
-        progress: called with what is done, how far, and of how much.
+        requirement: limits at all postures.
+        progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, a lower bound of their cost, and how many planes.
+        (G,) [rad or m] tolerances, a lower bound of their cost, number of planes.
 
     Raises:
         BadInput: even perfect parts, or the tightest tolerances, exceed a limit.
     """
-    plan = work.plan
+    plan = requirement.plan
     planes: list[NDArray] = []
     t = np.array(plan.most, dtype=float)
     bound = -np.inf
     for step in range(_MOST_CUTS):
         progress("cutting planes", step, _MOST_CUTS)
-        found = list(_violated(work, t))
-        if not found:
+        violated = list(_violated(requirement, t))
+        if not violated:
             break
-        planes += found
+        planes += violated
         t = cheapest_within(plan, planes, plan.least, plan.most)
         bound = plan.price(t)
     progress("cutting planes", _MOST_CUTS, _MOST_CUTS)
@@ -81,7 +81,7 @@ def cheapest_within(
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled: each alone would use up its plane at 1
+    # scaled: each alone would reach its plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -90,26 +90,26 @@ def cheapest_within(
         goal = cp.Minimize((costs / costs.sum()) @ cp.inv_pos(x))
     else:
         goal = cp.Minimize(-(plan.costs / plan.costs.sum()) @ cp.log(x))
-    held = [(A * scale) @ x <= 1.0, x <= most / scale]
+    constraints = [(A * scale) @ x <= 1.0, x <= most / scale]
     if least.any():
-        held.append(x >= least / scale)
-    problem = cp.Problem(goal, held)
+        constraints.append(x >= least / scale)
+    problem = cp.Problem(goal, constraints)
     problem.solve(solver="CLARABEL")
     if x.value is None:
         raise BadInput("tolerances: even the tightest ones allowed violate a limit")
     return np.clip(x.value * scale, least, most)
 
 
-def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
-    """Planes ``a.t <= 1`` that the tolerances violate."""
-    plan = work.plan
+def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
+    """Planes ``a.t <= 1`` that cut off the tolerances t."""
+    plan = requirement.plan
     spread = plan.spread(t)
-    for key, ready in work.convex.items():
+    for key, prepared in requirement.convex.items():
         limit = plan.limits[key]
         if plan.asked_yield == 1.0:
             corners = random_corners(CORNERS, len(spread), plan.seed)
-            for i in range(len(ready)):
-                worst = work.worst_corner(key, i, t, corners)
+            for i in range(len(prepared)):
+                worst = requirement.worst_corner(key, i, t, corners)
                 slopes = plan.gather(worst.slopes * worst.signs)
                 if worst.value > limit * (1 + _TOLERANCE):
                     yield _plane(slopes, worst.value, t, limit)
@@ -117,10 +117,13 @@ def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
         draws = plan.draws_of(TRAINING, plan.draws)
         values = np.full(len(draws), -np.inf)
         slopes = np.zeros_like(draws)
-        for i in range(len(ready)):
-            here, there = work.respond(key, i, draws * spread)
-            higher = here > values
-            values[higher], slopes[higher] = here[higher], (there * draws)[higher]
+        for i in range(len(prepared)):
+            responses, response_slopes = requirement.respond(key, i, draws * spread)
+            higher = responses > values
+            values[higher], slopes[higher] = (
+                responses[higher],
+                (response_slopes * draws)[higher],
+            )
         tail = np.argsort(values)[-max(1, round((1 - plan.asked_yield) * len(draws))) :]
         if values[tail].mean() > limit * (1 + _TOLERANCE):
             mean = plan.gather(slopes[tail].mean(axis=0))
@@ -128,7 +131,7 @@ def _violated(work: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """The plane through a value and its slopes that must stay below a limit."""
+    """The plane ``a.t' <= 1`` of a linearised quantity and its limit."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(f"even perfect parts exceed a limit of {limit:g}")

@@ -1,8 +1,8 @@
-"""What a sample of draws says, each number with its confidence interval.
+"""Estimates from a sample of draws, each with its confidence interval.
 
-Intervals of probabilities are Clopper's and Pearson's, exact for any number of draws;
-those of quantiles are order statistics, which ask nothing of the distribution; those
-of means and of the most probable value come from the central limit and the bootstrap.
+Intervals of probabilities are Clopper's and Pearson's, exact for any number of draws.
+Those of quantiles are order statistics, valid for any distribution.  Those of means
+come from the central limit theorem, of the most probable value from the bootstrap.
 """
 
 from typing import Literal
@@ -20,7 +20,7 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     Args:
         successes: of ``count`` independent trials.
         count: > 0.
-        level: of confidence; the interval holds the truth at least so often.
+        level: of confidence; the coverage is at least this.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -35,16 +35,16 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
 def bracketed(
     holds: int, fails: int, count: int, level: float = 0.95
 ) -> dict[str, float]:
-    """Probability that something holds, where some trials are not decided.
+    """Probability of success, where some trials are undecided.
 
     Args:
-        holds: of ``count`` independent trials, those in which it surely does.
-        fails: those in which it surely does not.
+        holds: certain successes of ``count`` independent trials.
+        fails: certain failures.
         count: > 0.
-        level: of confidence, whatever the others would say.
+        level: of confidence, for any outcome of the undecided trials.
 
     Returns:
-        ``probability`` of those in which it surely holds, ``lower``, ``upper``,
+        ``probability`` of a certain success, ``lower``, ``upper``, number of
         ``undecided`` trials.
     """
     surely = proportion(holds, count, level)
@@ -61,15 +61,15 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
         level: of confidence.
 
     Returns:
-        ``value``, ``lower``, ``upper``; infinite where the sample is too small, or is
-        so itself.
+        ``value``, ``lower``, ``upper``; infinite where the sample is too small, or has
+        infinite values.
     """
     x = np.sort(np.asarray(values, dtype=float))
     count = len(x)
-    # between an infinite value and another there is no middle
+    # no interpolation between infinite values
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # at most low - 1 values below it has probability < (1 - level)/2, and so on
+    # P(fewer than low values below the quantile) < (1 - level)/2; above likewise
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),
@@ -100,14 +100,14 @@ def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
 def most_probable(
     values: ArrayLike, level: float = 0.95, *, positive: bool = False, seed: int = 1
 ) -> dict[str, float]:
-    """Where the density of a sample is highest, with a bootstrap interval.
+    """Mode of a sample's density, with a bootstrap interval.
 
-    The density is a Gaussian kernel's of Silverman's width, on 1024 bins.
+    The density is estimated with a Gaussian kernel of Silverman's width, on 1024 bins.
 
     Args:
         values: (k,) a sample.
         level: of confidence.
-        positive: sizes: the kernel is reflected at zero, below which nothing is.
+        positive: of sizes: the kernel is reflected at zero.
         seed: of the bootstrap.
 
     Returns:
@@ -119,9 +119,9 @@ def most_probable(
     x = np.asarray(values, dtype=float)
     spread = float(np.quantile(x, 0.75) - np.quantile(x, 0.25)) / 1.349
     scale = min(float(x.std()), spread) or float(x.std())
-    if scale <= 1e-12 * np.abs(x).max():  # all the same, but for rounding
+    if scale <= 1e-12 * np.abs(x).max():  # all equal up to rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # a long tail must not widen the bins: the density is not highest so far out
+    # a long tail must not widen the bins: the mode is not there
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))

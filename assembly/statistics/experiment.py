@@ -1,4 +1,4 @@
-"""What is drawn at a posture, and what is asked of each draw."""
+"""A Monte Carlo experiment: distributions at a posture, quantities of each draw."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,39 +11,44 @@ from assembly.batch.many_draws import OnePosture, prepare_energies
 from assembly.batch.many_margins import PostureMargins, prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.reduction import FreeMotion
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
-from assembly.statistics.play import PLAY, PLAY_STREAM, settle_play
+from assembly.statistics.clearance_positions import (
+    CLEARANCE_MODELS,
+    CLEARANCE_STREAM,
+    position_clearances,
+)
 from assembly.statistics.quantities import POSE_ERRORS
-from assembly.statistics.worst_play import PRECISION, bound_play
+from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 
-_SHARP = 1e-3  # of a limit: how far apart the bounds may be that it judges
-_READINGS = {"margin": "rigid", "margin_free": "free"}
+_PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What is drawn, and what is asked of each draw.
+    """Distributions of the errors at a posture, and the quantities of each draw.
 
     Attributes:
-        posture: where the robot stands; drawn errors take the place of its own.
+        posture: of the robot; drawn errors replace its own.
         sources: of the errors.
         seed: of all draws.
-        play: one of :data:`assembly.statistics.play.PLAY`, where play sits.
-        margins: whether the zone margins are asked for.
-        stress: whether the links' stress is.
+        clearance_model: one of
+            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+        margins: whether the zone margins are computed.
+        stress: whether the stress of the links is computed.
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        precision: [rad, m] of the largest pose errors with the worst play: upper minus
-            lower bound; inf for one that is not asked for.
+        precision: [rad, m] of the largest pose errors of the worst clearance model:
+            upper minus lower bound; inf for one that is not needed.
     """
 
     posture: Posture
     sources: ErrorSources
     seed: int = 1
-    play: str = "worst"
+    clearance_model: str = "worst"
     margins: bool = True
     stress: bool = True
     load: tuple[float, ...] | None = None
@@ -53,12 +58,15 @@ class Experiment:
     __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
-        if self.play not in PLAY:
-            raise ValueError(f"play is {self.play!r}, expected one of {tuple(PLAY)}")
+        if self.clearance_model not in CLEARANCE_MODELS:
+            raise ValueError(
+                f"play is {self.clearance_model!r}, expected one of "
+                f"{tuple(CLEARANCE_MODELS)}"
+            )
 
     @cached_property
     def energies(self) -> OnePosture:
-        """The posture made ready for (22).
+        """The posture prepared for (22).
 
         Raises:
             BadInput: the load drives a motion that nothing resists.
@@ -70,37 +78,37 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """And for (21), by quantity."""
+        """The posture prepared for (21), by quantity."""
         if not self.margins:
             return {}
-        return {k: prepare_margins(self.posture, r) for k, r in _READINGS.items()}
+        return {k: prepare_margins(self.posture, r) for k, r in MARGIN_READINGS.items()}
 
     @cached_property
     def links(self) -> tuple[str, ...]:
-        """Frames of the links whose stress is known and asked for."""
+        """Frames of the links whose stress is computed."""
         if not self.stress:
             return ()
         return tuple(link.frame for link in stressed_links(self.posture.robot))
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """A draw as a row of numbers."""
+        """Type of a record: the quantities of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
         }  # fmt: skip
-        if self.play == "worst":
+        if self.clearance_model == "worst":
             shapes |= {f"{name}_lower": () for name in POSE_ERRORS}
         shapes |= dict.fromkeys(self.zones, ())
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
-        flags = ["play_mixed"] if self.play == "uniform" else []
+        flags = ["play_mixed"] if self.clearance_model == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
-        """Refuse limits on what is not computed here.
+        """Refuse limits on quantities that are not computed.
 
         Raises:
-            BadInput: margins were left out, or no link's stress is known.
+            BadInput: margins were left out, or no link's stress can be computed.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:
@@ -112,43 +120,47 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Rows of the draws ``first`` .. ``first + count - 1``."""
+        """Records of the draws ``first`` .. ``first + count - 1``."""
         values = self.sources.draw(first, count, self.seed)
-        return self.answer(values, range(first, first + count))
+        return self.evaluate(values, range(first, first + count))
 
-    def answer(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Rows of given values of the sources.
+    def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
+        """Records of given values of the sources.
 
         Args:
             values: (k, m) [rad or m].
-            draws: (k,) numbers of the random numbers that settle the play.
+            draws: (k,) numbers of the random streams of the clearance positions.
 
         Returns:
-            (k,) of :attr:`record_type`; NaN and status 1 where there is no answer.
-            With the worst play, rotation and translation are upper bounds of the
-            largest, and the platform's screw is where the solution leaves it.
+            (k,) of :attr:`record_type`; NaN and status 1 where there is no solution.
+            With the worst clearance model, rotation and translation are upper bounds of
+            the largest, and the platform's screw is that of the solution of (22).
         """
         errors = self.sources.errors(values)
-        found = self.energies.solve(errors)
+        solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
-        rows["energy"] = found.energy
-        rows["duality_gap"] = np.maximum(0.0, found.energy - found.bound)
-        rows["status"] = ~np.isfinite(found.energy)
-        screws = found.platform_screw
-        if self.play == "worst":
-            bounds, _ = bound_play(self.energies, found, errors, self.precision)
+        rows["energy"] = solved.energy
+        rows["duality_gap"] = np.maximum(0.0, solved.energy - solved.bound)
+        rows["status"] = ~np.isfinite(solved.energy)
+        screws = solved.platform_screw
+        if self.clearance_model == "worst":
+            bounds, _ = bound_worst_errors(
+                self.energies, solved, errors, self.precision
+            )
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
             numbers = np.asarray(draws).tolist()
-            rngs = [draw_generator(self.seed, d, PLAY_STREAM) for d in numbers]
-            screws, mixed = settle_play(self.energies, found, self.play, rngs)
+            rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
+            screws, mixed = position_clearances(
+                self.energies, solved, self.clearance_model, rngs
+            )
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
-            if self.play == "uniform":
+            if self.clearance_model == "uniform":
                 rows["play_mixed"] = mixed
         rows["platform_screw"] = screws
-        wrenches = self.energies.wrenches(found.multipliers)
+        wrenches = self.energies.wrenches(solved.multipliers)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
             sizes = np.sqrt((wrenches[..., part] ** 2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
@@ -160,9 +172,9 @@ class Experiment:
 
 
 def precision_for(
-    limits: Mapping[str, float], share: float = _SHARP
+    limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """How sharp bounds of pose errors must be for limits to be judged by them.
+    """Precision of pose errors that suffices to check limits on them.
 
     Args:
         limits: by quantity.

@@ -1,13 +1,13 @@
-"""Which errors matter: the share of a result's variance that each source explains.
+"""Variance-based importance of the errors: Sobol's indices.
 
-The first index is the share a source explains alone, the total one what would be left
-without all others.  Sobol's indices by Saltelli's design take (groups + 2) times the
-draws; where a result is linear in the errors they are known in closed form,
-``a_i^2 var_i / sum_j a_j^2 var_j``, and both are the same.
+The first-order index of a source is the share of a result's variance that it explains
+alone, the total index the share that involves it.  By Saltelli's design they take
+(groups + 2) times the draws.  Where a result is linear in the errors they have a closed
+form, ``a_i^2 var_i / sum_j a_j^2 var_j``, and both are equal.
 
-A draw without an answer leaves out what it would be compared with, and is counted.
-Errors of the draws that are left are no longer independent, so where more than a few
-are left out there are no indices, and a reason.
+A draw without a solution is discarded with the draws it would be compared with, and
+counted.  The errors of the remaining draws are no longer independent, so where more
+than a few are discarded no indices are given, but a reason.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from assembly.model.error_distributions import ErrorSources
 
 STREAMS = (2, 3)  # of random numbers, see assembly.model.error_distributions
-MOST_FAILED = 0.05  # of the draws compared: more, and errors depend on each other
+MOST_FAILED = 0.05  # of the draws compared; with more the errors are dependent
 _RESAMPLES = 200
 
 
@@ -36,8 +36,8 @@ class Importance:
         first: (s, d, 3) share explained alone: value, lower, upper.
         total: (s, d, 3) share that involves the group: likewise.
         variance: (s,) of the results.
-        failed: (s, d) share of the base draws left out, for one of the three draws
-            compared has no answer; the indices are NaN beyond :data:`MOST_FAILED`.
+        failed: (s, d) share of the base draws discarded, as one of the three draws
+            compared has no solution; the indices are NaN beyond :data:`MOST_FAILED`.
     """
 
     groups: tuple[str, ...]
@@ -48,12 +48,12 @@ class Importance:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
-    """Saltelli's rows: A, B, and A with the columns of each group from B.
+class SaltelliDesign:
+    """Saltelli's design: A, B, and A with the columns of each group from B.
 
     Attributes:
         A: (k, m) independent draws of the numbers.
-        B: (k, m) others.
+        B: (k, m) further ones.
         groups: name and columns of each of d groups.
     """
 
@@ -84,7 +84,7 @@ def sobol_importance(
     """Sobol's indices of any function of independent numbers.
 
     Args:
-        evaluate: (k, m) numbers to (k, s) results, NaN without an answer.
+        evaluate: (k, m) numbers to (k, s) results, NaN without a solution.
         sample: stream and count to (count, m) independent draws of the numbers.
         groups: name and columns of each group of numbers.
         count: base draws; (groups + 2) times as many are evaluated.
@@ -94,20 +94,22 @@ def sobol_importance(
         The indices; NaN for a result that does not vary.
     """
     A, B = (sample(stream, count) for stream in STREAMS)
-    design = Design(A, B, groups)
+    design = SaltelliDesign(A, B, groups)
     return sobol_indices(design, evaluate(design.rows(0, len(design))), level)
 
 
-def sobol_indices(design: Design, results: NDArray, level: float = 0.95) -> Importance:
+def sobol_indices(
+    design: SaltelliDesign, results: NDArray, level: float = 0.95
+) -> Importance:
     """Sobol's indices from the results of a design.
 
     Args:
         design: of k base draws and d groups.
-        results: (k (d + 2), s) in the order of its rows; not finite without an answer.
+        results: (k (d + 2), s) in the order of its rows; not finite without a solution.
         level: of confidence of the bootstrap intervals.
 
     Returns:
-        The indices; NaN for a result that does not vary, or lacks too many answers.
+        The indices; NaN for a result that is constant, or that fails in too many draws.
     """
     d, s, count = len(design.groups), results.shape[1], len(design.A)
     f = results.reshape(d + 2, count, s)
@@ -135,16 +137,16 @@ def sobol_indices(design: Design, results: NDArray, level: float = 0.95) -> Impo
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """(3,) first and (3,) total index from results (3, k) of A, B and mixed."""
+    """(3,) first and (3,) total index from results (3, k) of A, B and A with B's."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
     tail = [(1 - level) / 2, (1 + level) / 2]
-    found = []
+    indices = []
     for product in (alone, left):
         shares = (weights @ product) / variance
-        found.append(np.array([shares[0], *np.quantile(shares[1:], tail)]))
-    return found[0], found[1]
+        indices.append(np.array([shares[0], *np.quantile(shares[1:], tail)]))
+    return indices[0], indices[1]
 
 
 def linear_importance(
@@ -158,7 +160,7 @@ def linear_importance(
         groups: name and columns of each group.
 
     Returns:
-        (s, d) shares of the variance, first and total alike.
+        (s, d) shares of the variance; first-order and total indices are equal.
     """
     parts = slopes**2 * sources.variance
     shares = np.stack([parts[:, columns].sum(axis=1) for _, columns in groups], axis=1)

@@ -1,14 +1,14 @@
 """The importance of errors as a data set, plain values and a table for people.
 
-Beside the shares of the variance stand two sizes.  A group's *part* is the root of the
-variance of the platform's screw that involves it: how far its errors move the platform
-where they are as large as they are said to be.  Over the deviation of these errors it
-is their *gain*: micrometres of the platform for each micrometre of error.  Both are of
-the platform's vector, so a platform that follows an error has a gain of 1.
+Two sizes are given beside the shares of the variance.  A group's *part* is the standard
+deviation of the platform's screw that involves the group.  Divided by the standard
+deviation of the group's errors it is their *gain*: micrometres of the platform for each
+micrometre of error.  Both are of the platform's vector, so a platform that follows an
+error has a gain of 1.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import (
     MOST_FAILED,
     STREAMS,
-    Design,
+    SaltelliDesign,
     sobol_indices,
     source_groups,
 )
@@ -38,61 +38,77 @@ _MEANINGS = {
 }
 
 
-def importance_design(experiment: Experiment, count: int, by: str) -> Design:
-    """What is drawn to find the importance of an experiment's errors.
+@dataclass(frozen=True)
+class ImportanceOptions:
+    """How the importance of errors is computed.
+
+    Attributes:
+        draws: base draws; (groups + 2) times as many are solved.
+        by: see :func:`assembly.statistics.importance.source_groups`.
+        level: of confidence of the intervals.
+    """
+
+    draws: int
+    by: str = "kind"
+    level: float = 0.95
+
+
+def importance_design(
+    experiment: Experiment, asked: ImportanceOptions
+) -> SaltelliDesign:
+    """The design for the importance of an experiment's errors.
 
     Args:
-        experiment: what is drawn and asked.
-        count: base draws; (groups + 2) times as many are solved.
-        by: see :func:`assembly.statistics.importance.source_groups`.
+        experiment: distributions and quantities.
+        asked: base draws and groups.
 
     Returns:
         The design.
     """
     sources = experiment.sources
-    A, B = (sources.draw(0, count, experiment.seed, stream) for stream in STREAMS)
-    return Design(A, B, source_groups(sources, by))
+    A, B = (sources.draw(0, asked.draws, experiment.seed, k) for k in STREAMS)
+    return SaltelliDesign(A, B, source_groups(sources, asked.by))
 
 
 def importance_rows(
-    experiment: Experiment, design: Design, first: int, count: int
+    experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Answers to some rows of a design.
+    """Records of some rows of a design.
 
-    Random play is not the errors' doing, and would drown what is: it is then left
-    where the solution leaves it.
+    Random clearance positions would add variance that is not due to the errors: they
+    are then those of the solution of (22).
 
     Args:
-        experiment: what is asked.
-        design: what is drawn.
-        first: row of it.
-        count: how many.
+        experiment: the quantities.
+        design: the draws.
+        first: row of the design.
+        count: number of rows.
 
     Returns:
         (count,) of the experiment's record type.
     """
-    asked = replace(experiment, play=importance_play(experiment))
-    found = asked.answer(design.rows(first, count), range(count))
+    asked = replace(experiment, clearance_model=importance_clearance_model(experiment))
+    evaluated = asked.evaluate(design.rows(first, count), range(count))
     rows = np.zeros(count, dtype=experiment.record_type)
-    for name in found.dtype.names or ():
-        rows[name] = found[name]
+    for name in evaluated.dtype.names or ():
+        rows[name] = evaluated[name]
     return rows
 
 
-def importance_play(experiment: Experiment) -> str:
-    """What the importance of an experiment's errors assumes of play."""
-    return "worst" if experiment.play == "worst" else "least"
+def importance_clearance_model(experiment: Experiment) -> str:
+    """Clearance model of the importance of an experiment's errors."""
+    return "worst" if experiment.clearance_model == "worst" else "least"
 
 
 def importance_dataset(
-    experiment: Experiment, design: Design, rows: NDArray, level: float = 0.95
+    experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Which sources the results of an experiment owe their variance to.
+    """Importance of the sources for the results of an experiment.
 
     Args:
-        experiment: what is drawn and asked.
-        design: what was drawn.
-        rows: of the experiment's record type, its answers to all rows of the design.
+        experiment: distributions and quantities.
+        design: of the draws.
+        rows: of the experiment's record type, of all rows of the design.
         level: of confidence of the intervals.
 
     Returns:
@@ -107,15 +123,15 @@ def importance_dataset(
         names.remove("stress")
     columns = [rows[n].max(axis=1) if rows[n].ndim == 2 else rows[n] for n in names]
     results = np.column_stack([*columns, rows["platform_screw"]])
-    found = sobol_indices(design, results, level)
-    part, gain = _parts(found.total[-6:, :, 0] * found.variance[-6:, None],
+    importance = sobol_indices(design, results, level)
+    part, gain = _parts(importance.total[-6:, :, 0] * importance.variance[-6:, None],
                         experiment.sources, design)  # fmt: skip
     indices, moves = ("quantity", "group", "estimate"), ("component", "group")
     kept = slice(0, len(names))
     values = {
-        "first_index": (indices, found.first[kept], "1"),
-        "total_index": (indices, found.total[kept], "1"),
-        "failed_share": (("quantity", "group"), found.failed[kept], "1"),
+        "first_index": (indices, importance.first[kept], "1"),
+        "total_index": (indices, importance.total[kept], "1"),
+        "failed_share": (("quantity", "group"), importance.failed[kept], "1"),
         "part": (moves, part, "rad, m"),
         "gain": (moves, gain, "rad or m for each rad or m"),
     }
@@ -124,24 +140,24 @@ def importance_dataset(
         for key, (dims, value, unit) in values.items()
     }
     labels = {
-        "quantity": names, "group": list(found.groups),
+        "quantity": names, "group": list(importance.groups),
         "estimate": ["value", "lower", "upper"],
         "component": ["rotation", "translation"],
         "error_unit": ("group", _units(experiment.sources, design)),
     }  # fmt: skip
     said = {
         "importance_draws": len(design.A),
-        "importance_play": importance_play(experiment),
+        "importance_clearance_model": importance_clearance_model(experiment),
     }
     return xarray.Dataset(data, labels, said)
 
 
 def _parts(
-    variances: NDArray, sources: ErrorSources, design: Design
+    variances: NDArray, sources: ErrorSources, design: SaltelliDesign
 ) -> tuple[NDArray, NDArray]:
-    """(2, d) parts and gains from the variance (6, d) of the screw that groups make."""
+    """(2, d) parts and gains from the variance (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
-    # a component that does not vary has no index, and no part in the platform's motion
+    # a component that does not vary has no index, and adds nothing to the part
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
@@ -150,40 +166,40 @@ def _parts(
     return part, np.where(alike, part / np.sqrt(spread), np.nan)
 
 
-def _units(sources: ErrorSources, design: Design) -> list[str]:
+def _units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
     """Units of the errors of each group."""
     angles = [sources.component[columns] < 3 for _, columns in design.groups]
     return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """What :func:`importance_dataset` says, as plain values.
+    """The data of :func:`importance_dataset` as plain values.
 
     Args:
         data: with it, or merged with the draws.
 
     Returns:
         Base draws, the indices of each quantity, and by group part and gain; the share
-        of draws left out and, where that is too much for indices, a reason.
+        of draws discarded and, where there are no indices, a reason.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
     for q in map(str, data["quantity"].values):
-        one = data.sel(quantity=q)
-        most = float(one["failed_share"].max())
-        said: dict[str, Any] = {"largest_share_left_out": most}
+        of_quantity = data.sel(quantity=q)
+        most = float(of_quantity["failed_share"].max())
+        results: dict[str, Any] = {"largest_share_left_out": most}
         if most > MOST_FAILED:
-            said["reason"] = (
+            results["reason"] = (
                 f"no indices where more than {MOST_FAILED:.0%} of the draws have no "
                 f"answer: up to {most:.1%} were left out, and the errors of the others "
                 "are not independent"
             )
-        elif np.isnan(one["total_index"]).all():
-            said["reason"] = "it does not vary"
+        elif np.isnan(of_quantity["total_index"]).all():
+            results["reason"] = "it does not vary"
         for key in ("first_index", "total_index"):
-            said[key] = dict(zip(groups, one[key].values, strict=True))
-        quantities[q] = said
-    moved = {
+            results[key] = dict(zip(groups, of_quantity[key].values, strict=True))
+        quantities[q] = results
+    platform = {
         group: {
             "error_unit": str(data["error_unit"].values[g]),
             **{
@@ -195,19 +211,19 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
     }  # fmt: skip
     return {
         "base_draws": int(data.attrs["importance_draws"]),
-        "play": str(data.attrs["importance_play"]), "quantities": quantities,
-        "platform": moved,
+        "play": str(data.attrs["importance_clearance_model"]), "quantities": quantities,
+        "platform": platform,
     }  # fmt: skip
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """The same as a table: errors that move the platform most come first."""
-    said = report["quantities"]
+    """The same as a table for people, the largest parts first."""
+    quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, play "
         f"{report['play']} in the shares, least in what moves the platform:"
     ]
-    for name, one in said.items():
+    for name, one in quantities.items():
         if "reason" in one:
             lines.append(f"{name}: {one['reason']}")
         elif one["largest_share_left_out"] > 0:
@@ -215,14 +231,16 @@ def importance_text(report: Mapping[str, Any]) -> str:
                 f"{name}: up to {one['largest_share_left_out']:.1%} of the draws have "
                 "no answer and are left out"
             )
-    total = said["translation"]["total_index"]
-    moved = report["platform"]
-    order = sorted(moved, key=lambda g: -np.nan_to_num(moved[g]["translation_part"]))
+    total = quantities["translation"]["total_index"]
+    platform = report["platform"]
+    order = sorted(
+        platform, key=lambda g: -np.nan_to_num(platform[g]["translation_part"])
+    )
     width = max(map(len, ("error", *order[:_ROWS])))
     head = f"{'error':{width}}  platform [um]  for each um  for each mrad"
     lines.append(f"{head}  [mrad]  share of translation's variance")
     for group in order[:_ROWS]:
-        one = moved[group]
+        one = platform[group]
         gain = {
             "m": (f"{one['translation_gain']:11.3g}", " " * 13),
             "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),

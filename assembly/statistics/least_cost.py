@@ -1,16 +1,15 @@
-"""Cheaper tolerances where limits are not convex: a sequence of convex programmes.
+"""Tolerances of locally least cost for nonconvex limits: sequential programming.
 
-Wrenches, stress and pose errors of the least energy are no convex functions of the
-errors, nor is a yield one of the tolerances.  But what the worst samples ask has slopes
-with every error, so with every tolerance: a programme with these planes, within a
-factor of the tolerances there are, gives others; these are scaled alike until the
-samples just fit again, and kept if they are cheaper.  If not, the next step is half as
-long, until nothing is gained.  So the cost never rises, and ends where the
-slopes balance the costs: at least cost in a neighbourhood, not proved for all others.
+Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
+in the tolerances.  But the worst samples have slopes with every error, so with every
+tolerance.  A convex programme with these planes, within a trust region around the
+current tolerances, gives a trial point.  It is scaled uniformly until the samples just
+fit again, and accepted if it is cheaper; if not, the trust region is reduced.  The cost
+never increases, and ends at a local minimum, which is not proved to be global.
 
-With a yield, the plane is the mean over the samples at the edge of failing: the slope
-of the quantile.  Where none may fail each of the worst has its own plane, and the worst
-corners of the tolerances are looked for again at every step.
+With a yield, the plane is the mean over the samples closest to a limit: the slope of
+the quantile.  For a yield of 1 each of the worst samples has its own plane, and the
+worst corners of the tolerances are searched again at every step.
 
 Sources:
     Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), for
@@ -24,90 +23,101 @@ from numpy.typing import NDArray
 
 from assembly.statistics.cutting_planes import cheapest_within
 from assembly.statistics.requirement import Plan, Requirement
-from assembly.statistics.scaling import Samples, fit, with_worst_corners
+from assembly.statistics.scaling import Samples, scale_uniformly, with_worst_corners
 
-_COARSE = 1e-3  # of the limits, for comparing costs on the way
-_GAIN = 1e-4  # relative, of the cost: less is none
-_FURTHEST, _NEAREST = 2.0, 1.01  # factor on tolerances within which planes are believed
+_COARSE = 1e-3  # of the limits: precision of intermediate costs
+_GAIN = 1e-4  # relative, of the cost: smallest reduction of a step
+_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # of the trust region, factors
 _MOST_STEPS = 60
-_PLANES = 200  # the worst samples where none may fail
-_NEARLY = 0.8  # of a limit: what may come to decide
+_PLANES = 200  # worst samples, for a yield of 1
+_NEARLY_ACTIVE = 0.8  # of a limit
 
 
 def least_cost(
-    work: Requirement, samples: Samples, t: NDArray,
+    requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Tolerances that cost no more than given proportions scaled alike.
+    """Tolerances that cost no more than given proportions scaled uniformly.
 
     Args:
-        work: what is required.
+        requirement: limits at all postures.
         samples: of the errors, that must fit.
         t: (G,) [rad or m] proportions to start from.
-        progress: called with what is done, how far, and of how much.
+        progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m], and the samples with all worst corners met on the way.
+        (G,) [rad or m], and the samples with all worst corners of the iterations.
 
     Raises:
         BadInput: the samples fit at no scale.
     """
-    plan, reach = work.plan, _FURTHEST
-    t = fit(work, samples, t, _COARSE)
+    plan, radius = requirement.plan, _LARGEST_RADIUS
+    t = scale_uniformly(requirement, samples, t, _COARSE)
     for step in range(_MOST_STEPS):
         progress("least cost", step, _MOST_STEPS)
         if plan.asked_yield == 1.0:
             before = len(samples.values)
-            samples = with_worst_corners(work, samples, t)
-            t = fit(work, samples, t, _COARSE) if len(samples.values) > before else t
-        planes = _planes(work, samples, t)
-        least = np.maximum(plan.least, t / reach)
-        most = np.minimum(plan.most, t * reach)
-        trial = fit(work, samples, cheapest_within(plan, planes, least, most), _COARSE)
+            samples = with_worst_corners(requirement, samples, t)
+            t = (
+                scale_uniformly(requirement, samples, t, _COARSE)
+                if len(samples.values) > before
+                else t
+            )
+        planes = _planes(requirement, samples, t)
+        least = np.maximum(plan.least, t / radius)
+        most = np.minimum(plan.most, t * radius)
+        trial = scale_uniformly(
+            requirement, samples, cheapest_within(plan, planes, least, most), _COARSE
+        )
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # half as far, in logarithms, as the step that gained nothing
-        reach = np.exp(np.abs(np.log(trial / t)).max() / 2)
-        if reach < _NEAREST:
+        # half the rejected step, in logarithms
+        radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
+        if radius < _SMALLEST_RADIUS:
             break
     progress("least cost", _MOST_STEPS, _MOST_STEPS)
     return t, samples
 
 
 def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
-    """How much cheaper, relative to what all tolerances cost."""
+    """Reduction of the cost, relative to the cost of all tolerances."""
     size = plan.price(before) if plan.cost == "reciprocal" else plan.costs.sum()
     return (plan.price(before) - plan.price(after)) / size
 
 
-def _planes(work: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """(G,) each: a.t' <= 1 keeps the samples within the limits near t."""
-    values = samples.values * work.plan.spread(t)
-    shares = work.shares(values)[1]
-    if work.plan.asked_yield == 1.0:
-        order = np.argsort(shares, axis=None)[::-1][:_PLANES]
-        places, draws = np.unravel_index(order, shares.shape)
-        kept = shares[places, draws] > _NEARLY
-        kept[0] = True
-        places, draws = places[kept], draws[kept]
+def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
+    """(G,) each: linearised at t, a.t' <= 1 keeps the samples within the limits."""
+    values = samples.values * requirement.plan.spread(t)
+    utilisations = requirement.utilisations(values)[1]
+    if requirement.plan.asked_yield == 1.0:
+        order = np.argsort(utilisations, axis=None)[::-1][:_PLANES]
+        cases, draws = np.unravel_index(order, utilisations.shape)
+        critical = utilisations[cases, draws] > _NEARLY_ACTIVE
+        critical[0] = True
+        cases, draws = cases[critical], draws[critical]
     else:
-        worst = shares.max(axis=0)
+        worst = utilisations.max(axis=0)
         count = min(64, max(16, len(worst) // 20))
         draws = np.argsort(np.abs(np.log(np.maximum(worst, 1e-300))))[:count]
-        places = shares[:, draws].argmax(axis=0)
-    slopes = np.zeros((len(draws), len(work.plan.names)))
-    for place in np.unique(places):
-        rows = np.flatnonzero(places == place)
-        own = work.share_slopes(int(place), values[draws[rows]]) * values[draws[rows]]
-        slopes[rows] = [work.plan.gather(one) for one in own]
-    size = shares[places, draws]
-    relative = slopes / t  # slopes of the share with every tolerance
-    if work.plan.asked_yield < 1.0:
-        # a draw that uses up nothing of a limit says nothing of its slopes
-        used = size > 0
-        relative = (relative[used] / size[used, None]).sum(axis=0, keepdims=True)
-        relative /= max(1, len(size))
-        size = np.ones(1)
-    right = 1.0 - size + relative @ t
-    return [a / b for a, b in zip(relative, right, strict=True) if b > 0]
+        cases = utilisations[:, draws].argmax(axis=0)
+    slopes = np.zeros((len(draws), len(requirement.plan.names)))
+    for case in np.unique(cases):
+        rows = np.flatnonzero(cases == case)
+        slopes_of_case = (
+            requirement.utilisation_slopes(int(case), values[draws[rows]])
+            * values[draws[rows]]
+        )
+        slopes[rows] = [requirement.plan.gather(one) for one in slopes_of_case]
+    utilisation = utilisations[cases, draws]
+    relative_slopes = slopes / t  # of the utilisation with every tolerance
+    if requirement.plan.asked_yield < 1.0:
+        # a draw with zero utilisation has no relative slopes
+        nonzero = utilisation > 0
+        relative_slopes = (relative_slopes[nonzero] / utilisation[nonzero, None]).sum(
+            axis=0, keepdims=True
+        )
+        relative_slopes /= max(1, len(utilisation))
+        utilisation = np.ones(1)
+    right_sides = 1.0 - utilisation + relative_slopes @ t
+    return [a / b for a, b in zip(relative_slopes, right_sides, strict=True) if b > 0]

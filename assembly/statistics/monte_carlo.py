@@ -1,9 +1,9 @@
-"""Monte Carlo at one posture: errors drawn, problems (21), (22) and (27) for each.
+"""Monte Carlo simulation at one posture: problems (21), (22) and (27) for each draw.
 
-A block of draws is solved at a time, in any order and by any number of threads; each
-draw depends on its own number and the seed alone.  With a file, finished blocks go to a
-journal beside it from the first on: a run that was killed goes on where it stopped.
-The rows of a design that tells the importance of errors are blocks like any others.
+Draws are solved in blocks, in any order and by any number of threads; each draw depends
+on its number and the seed only.  With a file, finished blocks are written to a journal
+beside it: a run that was killed resumes there.  The rows of the design for the
+importance of errors are further blocks.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from assembly.kinematics.posture import POSE
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
+    ImportanceOptions,
     importance_dataset,
     importance_design,
     importance_rows,
 )
-from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     import xarray
 
 BLOCK = 1024  # draws solved and journalled together
-_WAITING = 4  # blocks begun ahead of each thread
+_QUEUED = 4  # blocks submitted ahead for each thread
 
 
 def run_draws(
@@ -46,21 +47,18 @@ def run_draws(
     path: Path | str | None = None,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    importance: tuple[int, str] | None = None,
-    level: float = 0.95,
+    importance: ImportanceOptions | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
     """Solve draws 0 .. count - 1.
 
     Args:
-        experiment: what is drawn and asked.
-        count: how many draws.
+        experiment: distributions and quantities.
+        count: number of draws.
         path: NetCDF file to write; its journal is used and then removed.
         workers: threads.
         progress: called with the draws done and their number.
-        importance: base draws for the importance of errors, and what to group them by,
-            see :func:`assembly.statistics.importance.source_groups`; not asked if None.
-        level: of confidence of the importance's intervals.
+        importance: of errors; not computed if None.
         held: keeps the journal until it is closed, as in
             :func:`assembly.sweeps.sweep.run_sweep`.
 
@@ -68,22 +66,22 @@ def run_draws(
         Data set over ``draw``, with the importance if asked; the file holds the same.
 
     Raises:
-        BadInput: the journal is another run's or held by one, or a file cannot be
+        BadInput: the journal is another run's or locked by one, or a file cannot be
             written.
     """
     with ExitStack() as own:
         return _run_draws(
-            experiment, count, path, workers, progress, importance, level, held or own
+            experiment, count, path, workers, progress, importance, held or own
         )
 
 
 def _run_draws(
     experiment: Experiment, count: int, path: Path | str | None, workers: int,
-    progress: Callable[[int, int], None], importance: tuple[int, str] | None,
-    level: float, held: ExitStack,
+    progress: Callable[[int, int], None], importance: ImportanceOptions | None,
+    held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
     """The same; ``held`` keeps the journal."""
-    design = None if importance is None else importance_design(experiment, *importance)
+    design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
     # blocks of draws, then of the design: first row and number of rows of each
     spans = [(i, min(BLOCK, count - i)) for i in range(0, count, BLOCK)]
@@ -99,8 +97,10 @@ def _run_draws(
     kept: dict[int, NDArray] = {}
     journal = None
     if path is not None:
+        # not the level: it does not change the draws
+        rows_of_design = importance and (importance.draws, importance.by)
         identity = provenance(experiment) | {
-            "draws": count, "block": BLOCK, "importance": str(importance),
+            "draws": count, "block": BLOCK, "importance": str(rows_of_design),
         }  # fmt: skip
         journal = held.enter_context(
             open_journal(journal_path(path), identity, experiment.record_type)
@@ -119,8 +119,9 @@ def _run_draws(
     data = draws_dataset(experiment, np.concatenate([kept[b] for b in range(drawn)]))
     if design is not None:
         rows = np.concatenate([kept[b] for b in range(drawn, len(spans))])
-        shares = importance_dataset(experiment, design, rows, level)
-        data = data.merge(shares, combine_attrs="no_conflicts")
+        assert importance is not None
+        indices = importance_dataset(experiment, design, rows, importance.level)
+        data = data.merge(indices, combine_attrs="no_conflicts")
     if path is not None and journal is not None:
         save_dataset(data, path)
         journal.remove_after(held)
@@ -130,10 +131,10 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Blocks as they are finished; a few are begun ahead, so memory stays bounded."""
+    """Blocks as they are finished; a few are queued ahead, so memory stays bounded."""
     if not blocks:
         return
-    # made ready once, before the threads ask for it
+    # the first one fills the caches that the threads share
     yield blocks[0], solve(blocks[0])
     waiting = iter(blocks[1:])
     with ThreadPoolExecutor(workers) as pool:
@@ -142,7 +143,7 @@ def _solved(
             while True:
                 for block in waiting:
                     begun.add(pool.submit(lambda b: (b, solve(b)), block))
-                    if len(begun) >= _WAITING * workers:
+                    if len(begun) >= _QUEUED * workers:
                         break
                 if not begun:
                     return
@@ -155,7 +156,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int]:
-    """What must be the same for two runs to give the same draws."""
+    """Values that must be equal for two runs to give the same draws."""
     posture, sources = experiment.posture, experiment.sources
     numbers = [
         sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
@@ -167,7 +168,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "robot_sha256": robot_hash(posture.robot),
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
-        "play": experiment.play,
+        "play": experiment.clearance_model,
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
         "stress": int(experiment.stress),
@@ -179,28 +180,29 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
 
 
 def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
-    """The draws as a data set with units and where they came from.
+    """The draws as a data set with units and provenance.
 
     Args:
-        experiment: whose draws.
+        experiment: of the draws.
         rows: (k,) of its record type.
 
     Returns:
-        Data set over ``draw``; the pose errors say what is assumed of play.
+        Data set over ``draw``; the pose errors' meanings name the clearance model.
     """
     import xarray
 
     dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link")}
-    said = MEANINGS | {
-        k: f"{MEANINGS[k]}; {PLAY[experiment.play]}" for k in POSE_ERRORS
+    meanings = MEANINGS | {
+        k: f"{MEANINGS[k]}; {CLEARANCE_MODELS[experiment.clearance_model]}"
+        for k in POSE_ERRORS
     }
-    if experiment.play == "worst":
-        said |= {k: f"upper bound of the {said[k]}" for k in POSE_ERRORS}
-        said["platform_screw"] += f"; {PLAY['least']}"
+    if experiment.clearance_model == "worst":
+        meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
+        meanings["platform_screw"] += f"; {CLEARANCE_MODELS['least']}"
     variables = {
         name: (
             dims.get(name, ("draw",)), rows[name],
-            {"units": UNITS.get(name, "1"), "long_name": said[name]},
+            {"units": UNITS.get(name, "1"), "long_name": meanings[name]},
         )
         for name in rows.dtype.names or ()
     }  # fmt: skip

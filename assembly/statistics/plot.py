@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.estimates import most_probable, quantile
-from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import POSE_ERRORS
 from forcefit.inputs.errors import plot_label
 
@@ -30,7 +30,7 @@ _NAMES = {
 
 
 def figure_of_draws(data: "xarray.Dataset", kind: str | None) -> "Figure | None":
-    """The figure a data set is for, if it is one of this module's.
+    """The figure of a data set of draws or tolerances.
 
     Args:
         data: as saved by ``statistics`` or ``tolerances``, or any other.
@@ -40,12 +40,12 @@ def figure_of_draws(data: "xarray.Dataset", kind: str | None) -> "Figure | None"
         The figure; None for another kind of data set.
 
     Raises:
-        ValueError: the data set has not what the kind needs.
+        ValueError: the data set lacks the variables of the kind.
     """
     if kind is None:
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
-        found = [name for key, name in own.items() if key in (*data, *data.attrs)]
-        kind = found[0] if found else None
+        kinds = [name for key, name in own.items() if key in (*data, *data.attrs)]
+        kind = kinds[0] if kinds else None
     drawings = {
         "histogram": histogram_figure, "tornado": tornado_figure,
         "allocation": allocation_figure,
@@ -79,15 +79,16 @@ def histogram_figure(data: "xarray.Dataset") -> "Figure":
             panel.set_title(f"play {data.attrs['play']}", fontsize=9)
         if name in _MARGINS:
             half = quantile(np.nan_to_num(data[name].values, nan=np.inf), 0.5)["value"]
-            said = f"median of all {data.sizes['draw']} draws: {half:.3g}"
-            panel.set_title(said, fontsize=9)
+            title = f"median of all {data.sizes['draw']} draws: {half:.3g}"
+            panel.set_title(title, fontsize=9)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     figure.suptitle(
         f"{plot_label(str(data.attrs.get('robot', '')))}: "
         f"of the {solved.sizes['draw']} of {data.sizes['draw']} draws that assemble, "
         f"seed {data.attrs.get('seed', '')}"
-        f"\npose errors: play {data.attrs['play']}: {PLAY[data.attrs['play']]}"
+        f"\npose errors: play {data.attrs['play']}: "
+        f"{CLEARANCE_MODELS[data.attrs['play']]}"
     )
     return figure
 
@@ -102,21 +103,23 @@ def _histogram(panel: Any, name: str, values: Any) -> None:
         panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center")
         return
     panel.hist(x, bins=60, color="lightsteelblue")
-    for label, colour, found in (
+    for label, colour, estimate in (
         ("median", "navy", quantile(x, 0.5)),
         ("95 %", "firebrick", quantile(x, 0.95)),
         ("most probable", "darkgreen", most_probable(x, positive=True)),
     ):
         panel.axvline(
-            found["value"], color=colour, label=f"{label} {found['value']:.3g}"
+            estimate["value"], color=colour, label=f"{label} {estimate['value']:.3g}"
         )
-        if np.isfinite([found["lower"], found["upper"]]).all():
-            panel.axvspan(found["lower"], found["upper"], color=colour, alpha=0.25)
+        if np.isfinite([estimate["lower"], estimate["upper"]]).all():
+            panel.axvspan(
+                estimate["lower"], estimate["upper"], color=colour, alpha=0.25
+            )
     panel.legend(fontsize=8)
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Bars of importance, the largest on top, with their intervals.
+    """Tornado plot of the importance, the largest on top, with intervals.
 
     Args:
         data: with ``first_index`` and ``total_index``.
@@ -153,7 +156,9 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
         panel.set_yticks(np.arange(bars), groups, fontsize=8)
         panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
         if name in POSE_ERRORS:
-            panel.set_title(f"play {data.attrs['importance_play']}", fontsize=9)
+            panel.set_title(
+                f"play {data.attrs['importance_clearance_model']}", fontsize=9
+            )
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:
         panel.set_axis_off()
@@ -161,14 +166,14 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Bars of the tolerances, angles and lengths apart, with what they may be at most.
+    """Bar chart of the tolerances, angles and lengths apart, with their upper bounds.
 
     Args:
         data: of :func:`assembly.statistics.tolerances.tolerance_dataset`.
 
     Returns:
-        A figure: wide bars cost least, narrow ones are the convex programme's, scaled
-        alike, where these are others.  Above it the price and the verification.
+        A figure: wide bars are of least cost; narrow ones, where different, those of
+        the convex programme, scaled uniformly.  The title has cost and verification.
 
     Raises:
         ValueError: the data set has no tolerances.
@@ -189,10 +194,15 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
         value = scale * data["tolerance"].values[rows]
         most = scale * data["loosest_allowed"].values[rows]
         panel.barh(np.arange(len(rows)), value, color="steelblue", label="least cost")
-        alike = scale * data["scaled_alike"].values[rows]
-        if not np.allclose(alike, value, rtol=1e-6):
-            panel.barh(np.arange(len(rows)) + 0.3, alike, 0.15, color="darkorange",
-                       label="scaled alike")  # fmt: skip
+        uniformly_scaled = scale * data["scaled_alike"].values[rows]
+        if not np.allclose(uniformly_scaled, value, rtol=1e-6):
+            panel.barh(
+                np.arange(len(rows)) + 0.3,
+                uniformly_scaled,
+                0.15,
+                color="darkorange",
+                label="scaled alike",
+            )
         panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
         classes = [plot_label(str(name)) for name in data["class"].values[rows]]
         panel.set_yticks(np.arange(len(rows)), classes, fontsize=8)
@@ -204,6 +214,6 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
             panel.annotate(f" {one:.3g}", (one, i), va="center", fontsize=8)
         if not len(rows):
             panel.set_axis_off()
-    said = plot_label(str(data.attrs.get("said", ""))).replace("; ", "\n")
-    figure.suptitle(said, fontsize=9)
+    title = plot_label(str(data.attrs.get("said", ""))).replace("; ", "\n")
+    figure.suptitle(title, fontsize=9)
     return figure

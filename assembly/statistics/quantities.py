@@ -1,4 +1,4 @@
-"""What is computed of each draw: names, units, meanings, and limits on them."""
+"""The quantities of each draw: names, units, meanings, and limits on them."""
 
 import numpy as np
 
@@ -48,9 +48,9 @@ def parse_limit(text: str) -> tuple[str, float]:
         BadInput: not of that form.
     """
     name, _, number = (piece.strip() for piece in text.partition("="))
-    valid = limit_names()
-    if name not in valid:
-        raise BadInput(f'--limit: unknown quantity "{name[:60]}"{nearest(name, valid)}')
+    names = limit_names()
+    if name not in names:
+        raise BadInput(f'--limit: unknown quantity "{name[:60]}"{nearest(name, names)}')
     try:
         value = float(number)
     except ValueError:

@@ -1,9 +1,8 @@
-"""Costly results in the order they are asked for, kept in a journal.
+"""Expensive results of a deterministic computation, stored in a journal in order.
 
-A computation that takes its steps from earlier results, the same each time, goes on
-after a kill by asking again: what stands in the journal is not computed anew.  Each
-result is kept with a digest of what it was asked for; where that differs, as after a
-change of the program, it is computed again.
+A computation that was killed resumes by running again: results that are in the journal
+are read instead of computed.  Each is stored with a digest of its arguments and is
+computed again where the digest differs, as after a change of the program.
 """
 
 import io
@@ -29,8 +28,8 @@ class Replay:
     """Results so far.
 
     Attributes:
-        journal: of records :data:`RECORD`; None to keep nothing.
-        asked: how many results were asked for.
+        journal: of records :data:`RECORD`; None to store nothing.
+        asked: number of results asked for.
     """
 
     journal: Journal | None = None
@@ -42,11 +41,11 @@ class Replay:
         """The next result.
 
         Args:
-            compute: finds it.
+            compute: computes it.
             given: numbers and words on which it depends.
 
         Returns:
-            What ``compute`` returns, as arrays.
+            The results of ``compute``, as arrays.
         """
         if self.journal is None:
             return tuple(np.asarray(a) for a in compute())
@@ -55,33 +54,33 @@ class Replay:
         for one in map(np.asarray, given):
             digest.update(f"{one.dtype} {one.shape} ".encode() + one.tobytes())
         if number in self.journal.places:
-            kept = self.journal.read(number)[0].tobytes()
-            if kept[:_DIGEST] == digest.digest():
-                with np.load(io.BytesIO(kept[_DIGEST:])) as arrays:
+            stored = self.journal.read(number)[0].tobytes()
+            if stored[:_DIGEST] == digest.digest():
+                with np.load(io.BytesIO(stored[_DIGEST:])) as arrays:
                     return tuple(arrays[f"arr_{i}"] for i in range(len(arrays)))
-        found = tuple(np.asarray(a) for a in compute())
+        results = tuple(np.asarray(a) for a in compute())
         content = io.BytesIO()
-        np.savez(content, *found)
+        np.savez(content, *results)
         record = np.frombuffer(digest.digest() + content.getvalue(), dtype=RECORD)
         self.journal.add(number, record, {})
-        return found
+        return results
 
 
 @contextmanager
 def journalled(
     path: Path | None, whose: dict[str, Any]
 ) -> Generator[Replay, None, None]:
-    """Results kept beside a file until it is written.
+    """Results stored beside a file until it is written.
 
     Args:
-        path: of the file; None to keep nothing.
-        whose: what must be the same for two computations to share results.
+        path: of the file; None to store nothing.
+        whose: values that must be equal for two computations to share results.
 
     Yields:
-        Where results are kept; the journal goes when the block ends without an error.
+        The stored results; the journal is removed when the block ends without an error.
 
     Raises:
-        BadInput: the journal is of something else, or cannot be written.
+        BadInput: the journal is another computation's, or cannot be written.
     """
     if path is None:
         yield Replay()

@@ -1,4 +1,4 @@
-"""What tolerances must meet: limits at every posture, always or with a yield."""
+"""Requirements on tolerances: limits at every posture, always or with a yield."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
@@ -20,14 +21,14 @@ from forcefit.inputs.table import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-_SHARP = 1e-4  # of a limit on a pose error: how far its bounds may be apart
-_CHUNK = 512  # draws solved and kept together
+_PRECISION = 1e-4  # of a limit on a pose error: upper minus lower bound
+_BATCH = 512  # draws solved and stored together
 TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is asked of the tolerances.
+    """Costs and limits of tolerances.
 
     Attributes:
         sources: m errors within tolerances of 1 [rad or m].
@@ -43,8 +44,8 @@ class Plan:
             limit at every posture.
         draws: training draws at every posture.
         seed: of all draws.
-        play: what is assumed of it where a pose error is limited, one of
-            :data:`assembly.statistics.play.PLAY`.
+        clearance_model: for limits of pose errors, one of
+            :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
     """
 
     sources: ErrorSources
@@ -58,11 +59,11 @@ class Plan:
     asked_yield: float = 1.0
     draws: int = 1000
     seed: int = 1
-    play: str = "worst"
+    clearance_model: str = "worst"
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited, so that it matters where play sits."""
+        """Whether a pose error is limited, so that the clearance model matters."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -76,7 +77,7 @@ class Plan:
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
-        """What tolerances cost."""
+        """Cost of tolerances."""
         if self.cost == "reciprocal":
             return float((self.costs / tolerances).sum())
         return float(-(self.costs * np.log(tolerances)).sum())
@@ -88,12 +89,12 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Requirement:
-    """A plan at postures of one robot, made ready for what is limited.
+    """A plan at postures of one robot, prepared for the limited quantities.
 
     Attributes:
         postures: the workspace.
-        plan: what is asked.
-        replay: keeps what was computed.
+        plan: costs and limits.
+        replay: stored results.
     """
 
     postures: Sequence[Posture]
@@ -104,138 +105,157 @@ class Requirement:
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """Everything but the margins, at each posture."""
+        """All quantities except the margins, at each posture."""
         plan = self.plan
         rotation, translation = (
-            _SHARP * plan.limits.get(key, np.inf) for key in POSE_ERRORS
+            _PRECISION * plan.limits.get(key, np.inf) for key in POSE_ERRORS
         )
-        found = [
+        experiments = [
             Experiment(
                 p, plan.sources, margins=False, stress="stress" in plan.limits,
-                play=plan.play if plan.limits_pose else "least",
+                clearance_model=plan.clearance_model if plan.limits_pose else "least",
                 precision=(rotation, translation),
             )
             for p in self.postures
         ]  # fmt: skip
         for key in self.plan.limits:
             if not key.startswith("margin"):
-                found[0].check_limits([key])
-        return found
+                experiments[0].check_limits([key])
+        return experiments
 
     @cached_property
-    def ready(self) -> dict[str, list]:
-        """By limit, the postures prepared for it."""
-        readings = {"margin": "rigid", "margin_free": "free"}
+    def prepared(self) -> dict[str, list]:
+        """By limit, the prepared postures."""
         return {
-            key: [prepare_margins(p, readings[key]) for p in self.postures]
-            if key in readings else [e.energies for e in self.experiments]
+            key: [prepare_margins(p, MARGIN_READINGS[key]) for p in self.postures]
+            if key in MARGIN_READINGS else [e.energies for e in self.experiments]
             for key in self.plan.limits
         }  # fmt: skip
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Those of the limits that are convex in the errors."""
-        return {key: self.ready[key] for key in CONVEX if key in self.ready}
+        """The prepared postures of limits that are convex in the errors."""
+        return {key: self.prepared[key] for key in CONVEX if key in self.prepared}
 
     @property
     def is_convex(self) -> bool:
-        """Whether all limits are convex in the tolerances: none may ever be failed."""
-        return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.ready)
+        """Whether all limits are convex in the tolerances; only for a yield of 1."""
+        return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.prepared)
 
     @property
-    def places(self) -> list[tuple[str, int]]:
-        """Limit and posture of every row of :meth:`shares`."""
+    def cases(self) -> list[tuple[str, int]]:
+        """Limit and posture of every row of :meth:`utilisations`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
-    def shares(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Every limited quantity over its limit, for given errors.
+    def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
+        """Utilisation of the limits: every limited quantity over its limit.
 
         Args:
-            values: (k, m) [rad or m].
+            values: (k, m) [rad or m] errors.
 
         Returns:
-            (limits x postures, k) lower and upper bounds, see :attr:`places`; they
-            differ for pose errors with the worst play only, inf without an answer.
+            (limits x postures, k) lower and upper bounds, see :attr:`cases`.  They
+            differ for pose errors of the worst clearance model only; inf without a
+            solution.
         """
-        chunks = [self._some_shares(values, i) for i in range(0, len(values), _CHUNK)]
+        chunks = [
+            self._batch_utilisations(values, i) for i in range(0, len(values), _BATCH)
+        ]
         lower, upper = (np.concatenate(c, axis=1) for c in zip(*chunks, strict=True))
         return lower, upper
 
-    def _some_shares(self, values: NDArray, first: int) -> tuple[NDArray, NDArray]:
-        """A chunk of them, posture by posture."""
-        some = values[first : first + _CHUNK]
+    def _batch_utilisations(
+        self, values: NDArray, first: int
+    ) -> tuple[NDArray, NDArray]:
+        """Those of a batch, posture by posture."""
+        some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
         limits = np.array([[self.plan.limits[key]] for key in keys])
-        both = [
+        bounds = [
             self.replay.recall(partial(self._quantities, i, some, rows), some, rows, i)
             for i in range(len(self.postures))
         ]
-        # (bounds, limits, postures, k) with the postures of a limit side by side
-        shares = np.stack([np.array(b) / limits for b in both], axis=2)
-        shares = np.where(np.isnan(shares), np.inf, shares)
-        lower, upper = shares.reshape(2, -1, len(some))
+        # (bounds, limits, postures, k): the postures of a limit follow one another
+        utilisations = np.stack([np.array(b) / limits for b in bounds], axis=2)
+        utilisations = np.where(np.isnan(utilisations), np.inf, utilisations)
+        lower, upper = utilisations.reshape(2, -1, len(some))
         return lower, upper
 
     def _quantities(
         self, i: int, values: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """(limits, k) lower and upper bounds of what is limited, at posture i."""
+        """(limits, k) lower and upper bounds of limited quantities, at posture i."""
         keys = list(self.plan.limits)
-        drawn = None
+        rows_of_draws = None
         if any(not key.startswith("margin") for key in keys):
-            drawn = self.experiments[i].answer(values, rows)
+            rows_of_draws = self.experiments[i].evaluate(values, rows)
         bounds = np.empty((2, len(keys), len(values)))
         for k, key in enumerate(keys):
-            if drawn is None or key.startswith("margin"):
-                bounds[:, k] = respond(self.ready[key][i], self.plan.sources, values)[0]
+            if rows_of_draws is None or key.startswith("margin"):
+                bounds[:, k] = respond(
+                    self.prepared[key][i], self.plan.sources, values
+                )[0]
                 continue
-            found = drawn[key].max(axis=1) if key == "stress" else drawn[key]
+            values_of_key = (
+                rows_of_draws[key].max(axis=1)
+                if key == "stress"
+                else rows_of_draws[key]
+            )
             lower = f"{key}_lower"
-            known = drawn.dtype.names or ()
-            bounds[:, k] = drawn[lower] if lower in known else found, found
+            names = rows_of_draws.dtype.names or ()
+            bounds[:, k] = (
+                rows_of_draws[lower] if lower in names else values_of_key,
+                values_of_key,
+            )
         return bounds[0], bounds[1]
 
-    def share_slopes(self, place: int, values: NDArray) -> NDArray:
-        """(k, m) slopes of a row of :meth:`shares` with each error."""
-        key, i = self.places[place]
+    def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
+        """(k, m) slopes of a row of :meth:`utilisations` with each error."""
+        key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
         """A limited quantity at posture i and its slopes with each error."""
         size, slopes = self.replay.recall(
             lambda: respond(
-                self.ready[key][i], self.plan.sources, values, key, self.plan.play
+                self.prepared[key][i],
+                self.plan.sources,
+                values,
+                key,
+                self.plan.clearance_model,
             ),
-            values, key, i,
-        )  # fmt: skip
+            values,
+            key,
+            i,
+        )
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """The worst corner of tolerances (G,) that is found at posture i."""
+        """The worst corner of tolerances (G,) found at posture i."""
         spread = self.plan.spread(t)
 
-        def climb() -> tuple:
-            found = worst_corner(
-                self.ready[key][i], self.plan.sources, spread, corners, key,
-                self.plan.play,
+        def search() -> tuple:
+            corner = worst_corner(
+                self.prepared[key][i], self.plan.sources, spread, corners, key,
+                self.plan.clearance_model,
             )  # fmt: skip
-            return found.value, found.signs, found.slopes
+            return corner.value, corner.signs, corner.slopes
 
-        value, signs, slopes = self.replay.recall(climb, spread, corners, key, i)
+        value, signs, slopes = self.replay.recall(search, spread, corners, key, i)
         return Corner(float(value), signs, slopes)
 
     def check_perfect_parts(self) -> None:
-        """Refuse limits on pose errors that play alone exceeds, without any error.
+        """Refuse limits on pose errors that clearances alone exceed, without errors.
 
         Raises:
-            BadInput: there is one; it says how far the worst play reaches.
+            BadInput: there is one; it gives the largest pose error.
         """
-        if self.plan.play != "worst" or not self.plan.limits_pose:
+        if self.plan.clearance_model != "worst" or not self.plan.limits_pose:
             return
-        lower, _ = self.shares(np.zeros((1, len(self.plan.sources))))
+        lower, _ = self.utilisations(np.zeros((1, len(self.plan.sources))))
         worst = int(lower[:, 0].argmax())
-        key, i = self.places[worst]
+        key, i = self.cases[worst]
         if lower[worst, 0] > 1.0 and key in POSE_ERRORS:
             limit, unit = self.plan.limits[key], UNITS[key]
             at = self.postures[i].pose().items()
@@ -247,20 +267,22 @@ class Requirement:
             )
 
     def check_taken_up(self) -> None:
-        """Refuse errors that neither play nor springs take up anywhere.
+        """Refuse errors that neither clearances nor springs take up at some posture.
 
         Raises:
             BadInput: there is one; it is named.
         """
         sources = self.plan.sources
         columns = 6 * sources.frame + sources.component
-        for key, ready in self.convex.items():
-            for one in ready:
-                left = np.abs(one.unanswered[:, columns]).max(axis=0, initial=0.0)
-                if left.max(initial=0.0) > 1e-9:
-                    name = sources.labels[int(left.argmax())]
+        for key, prepared in self.convex.items():
+            for posture in prepared:
+                residual = np.abs(posture.infeasible[:, columns]).max(
+                    axis=0, initial=0.0
+                )
+                if residual.max(initial=0.0) > 1e-9:
+                    name = sources.labels[int(residual.argmax())]
                     raise BadInput(
-                        f"limit {key}: no play or spring takes up an error {name}; "
-                        "leave it out, or limit the energy of a robot that "
-                        "gives way there"
+                        f"limit {key}: no clearance or spring takes up an error "
+                        f"{name}; leave it out, or limit the energy of a robot that is "
+                        "elastic there"
                     )

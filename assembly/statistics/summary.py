@@ -1,8 +1,8 @@
-"""What the draws of an experiment say, each number with what it is based on.
+"""Summary of the draws of an experiment: yields, quantiles, most probable values.
 
 Yields count all draws.  Energies, wrenches and pose errors exist only for the draws
-that assemble, so each of them says of how many; margins exist for all, and are given
-for all as well.  What is assumed of play stands beside every pose error.
+that assemble, whose number is given with each.  Margins exist for all draws, and are
+summarised for all as well.  Every pose error is given with its clearance model.
 """
 
 from collections.abc import Mapping
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.estimates import (
     bracketed,
     mean,
@@ -20,7 +21,6 @@ from assembly.statistics.estimates import (
     quantile,
 )
 from assembly.statistics.importance_table import importance_report, importance_text
-from assembly.statistics.play import PLAY
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from forcefit.inputs.table import BadInput
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # of the largest value: nothing
+_ROUNDING = 1e-18  # of the largest value: less is zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 _WORDS = {
     "forced": "goes together, by force if need be",
@@ -43,7 +43,7 @@ def summarise(
     strength: float | None = None,
     level: float = 0.95,
 ) -> dict[str, Any]:
-    """What the draws of :func:`assembly.statistics.monte_carlo.run_draws` say.
+    """Summary of the draws of :func:`assembly.statistics.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
@@ -68,7 +68,7 @@ def summarise(
     solved = data["status"].values == 0
     report: dict[str, Any] = {
         "draws": count, "assembled": int(solved.sum()), "confidence": level,
-        "play": play, "play_means": PLAY[play],
+        "play": play, "play_means": CLEARANCE_MODELS[play],
         "assembles": {"forced": proportion(int(solved.sum()), count, level)},
         "duality_gap": float(np.nanmax(data["duality_gap"].values, initial=0.0)),
     }  # fmt: skip
@@ -105,7 +105,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """How often each limit, and any of them, is exceeded; a bracket decides or not."""
+    """How often each limit, and any of them, is exceeded; undecided draws apart."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -124,13 +124,13 @@ def _yields(
         }  # fmt: skip
         if key in POSE_ERRORS:
             exceeds[key]["play"] = data.attrs["play"]
-    said: dict[str, Any] = {"exceeds": exceeds}
+    report: dict[str, Any] = {"exceeds": exceeds}
     if limits:
-        found = bracketed(int(met.sum()), int(failed.sum()), count, level)
-        said["within_limits"] = found
+        within = bracketed(int(met.sum()), int(failed.sum()), count, level)
+        report["within_limits"] = within
         if set(POSE_ERRORS) & set(limits):
-            found["play"] = data.attrs["play"]
-    return said
+            within["play"] = data.attrs["play"]
+    return report
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
@@ -142,30 +142,30 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Mean, quantiles and most probable value of sizes, 0 if that is half of them."""
+    """Mean, quantiles and most probable value of sizes; 0 if most of them are zero."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
-    said: dict[str, Any] = {
+    description: dict[str, Any] = {
         "unit": UNITS[key], "of": len(every), "assembled": int(solved.sum()),
         "draws": len(finite),
     }  # fmt: skip
     if key in POSE_ERRORS:
-        said["play"] = str(data.attrs["play"])
+        description["play"] = str(data.attrs["play"])
     if key in _MARGINS:
         every = np.where(np.isnan(every), np.inf, every)
-        said["all_draws"] = {
+        description["all_draws"] = {
             "infinite": proportion(int(np.isinf(every).sum()), len(every), level),
             "quantiles": {str(q): quantile(every, q, level) for q in QUANTILES},
         }
     if len(finite) < 2:
-        return said
-    # what fits by play alone stores nothing: a point of its own, up to rounding
+        return description
+    # draws inside a zone store no energy: a point mass at zero, up to rounding
     zero = finite <= _ROUNDING * finite.max()
     often = dict.fromkeys(("value", "lower", "upper"), 0.0)
     if zero.sum() <= len(finite) / 2:
         often = most_probable(finite[~zero], level, positive=True)
-    return said | {
+    return description | {
         "zero": proportion(int(zero.sum()), len(finite), level),
         "mean": mean(finite, level),
         "quantiles": {str(q): quantile(finite, q, level) for q in QUANTILES},
@@ -174,7 +174,7 @@ def _described(
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """What :func:`summarise` says, for people."""
+    """The results of :func:`summarise` for people."""
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
@@ -186,43 +186,43 @@ def summary_text(summary: Mapping[str, Any]) -> str:
             "when its walk ends: their pose errors are too narrow"
         )
     lines += [f"{_WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
-    for key, found in summary["exceeds"].items():
-        limit = _named(found["limit"], found["unit"])
-        lines.append(f"{_titled(key, found)} above {limit}: {_share(found)}")
+    for key, results in summary["exceeds"].items():
+        limit = _named(results["limit"], results["unit"])
+        lines.append(f"{_titled(key, results)} above {limit}: {_share(results)}")
     if "within_limits" in summary:
-        found = summary["within_limits"]
-        lines.append(f"{_titled('yield', found)}, all limits met: {_share(found)}")
+        results = summary["within_limits"]
+        lines.append(f"{_titled('yield', results)}, all limits met: {_share(results)}")
     lines.append(f"of the {assembled} of {draws} draws that assemble:")
     if not assembled:
         lines[-1] += " nothing to say"
-    for key, found in summary["quantities"].items():
-        if "mean" in found:
-            often = _named(found["most_probable"]["value"], found["unit"])
+    for key, results in summary["quantities"].items():
+        if "mean" in results:
+            often = _named(results["most_probable"]["value"], results["unit"])
             lines.append(
-                f"  {_titled(key, found)}: most probable {often}, "
-                f"{_quantiles_text(found['quantiles'])}"
+                f"  {_titled(key, results)}: most probable {often}, "
+                f"{_quantiles_text(results['quantiles'])}"
             )
     lines += [
         f"{key} of all {draws} draws: "
-        f"{_quantiles_text(found['all_draws']['quantiles'])}"
-        for key, found in summary["quantities"].items() if "all_draws" in found
+        f"{_quantiles_text(results['all_draws']['quantiles'])}"
+        for key, results in summary["quantities"].items() if "all_draws" in results
     ]  # fmt: skip
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
     return "\n".join(lines)
 
 
-def _titled(name: str, found: Mapping[str, Any]) -> str:
-    """A name with what is assumed of play, where that matters."""
-    return f"{name} [play {found['play']}]" if "play" in found else name
+def _titled(name: str, results: Mapping[str, Any]) -> str:
+    """A name with its clearance model, if it has one."""
+    return f"{name} [play {results['play']}]" if "play" in results else name
 
 
-def _share(found: Mapping[str, float]) -> str:
-    """A probability with its interval, and what it leaves open."""
-    low, high = found["lower"], found["upper"]
-    said = f"{found['probability']:.5g} ({low:.5g} to {high:.5g})"
-    left = found.get("undecided", 0)
-    return said + (f", {left} draws undecided" if left else "")
+def _share(interval: Mapping[str, float]) -> str:
+    """A probability with its interval, and the number of undecided draws."""
+    low, high = interval["lower"], interval["upper"]
+    text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
+    undecided = interval.get("undecided", 0)
+    return text + (f", {undecided} draws undecided" if undecided else "")
 
 
 def _named(value: float, unit: str) -> str:
@@ -230,9 +230,9 @@ def _named(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
-def _quantiles_text(found: Mapping[str, Mapping[str, float]]) -> str:
+def _quantiles_text(quantiles: Mapping[str, Mapping[str, float]]) -> str:
     """Median and the value that 95 % stay below."""
-    half, high = found["0.5"], found["0.95"]
+    half, high = quantiles["0.5"], quantiles["0.95"]
     return (
         f"median {half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), "
         f"95 % below {high['value']:.4g} ({high['lower']:.4g} to {high['upper']:.4g})"

@@ -1,4 +1,4 @@
-"""Tolerance files: which errors there are, what tightness costs, what must hold.
+"""Tolerance files: classes of errors, their costs, and the limits to be met.
 
 See ``docs/tolerances.md``.
 """
@@ -15,7 +15,7 @@ from assembly.statistics.requirement import COSTS, Plan
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.screws import SCREW
 
-_LOOSEST = (0.1, 0.01)  # [rad, m] beyond which no small screw is small
+_LOOSEST = (0.1, 0.01)  # [rad, m] largest small screws
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
@@ -33,8 +33,8 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     """
     root = read_toml(path)
     cost = _choice(root, "cost", COSTS)
-    law = _choice(root, "distribution", ("uniform", "truncated"))
-    asked = root.number("yield", "1", 1.0, above=0.0, largest=1.0)
+    distribution = _choice(root, "distribution", ("uniform", "truncated"))
+    asked_yield = root.number("yield", "1", 1.0, above=0.0, largest=1.0)
     deviations = root.number("deviations", "1", 3.0, above=0.0)
     draws = root.number("draws", "1", 1000.0, least=1.0, largest=1e7)
     seed = root.number("seed", "1", 1.0, least=0.0, largest=1e15)
@@ -69,14 +69,20 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     frame, component = np.array(list(rows)).T
     count = len(rows)
     sources = ErrorSources(
-        robot, frame, component, np.full(count, KINDS.index(law)), np.zeros(count),
-        np.full(count, 1.0 / deviations if law == "truncated" else 1.0),
-        np.zeros(count), np.full(count, deviations), np.ones(count, dtype=bool),
-    )  # fmt: skip
+        robot,
+        frame,
+        component,
+        np.full(count, KINDS.index(distribution)),
+        np.zeros(count),
+        np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
+        np.zeros(count),
+        np.full(count, deviations),
+        np.ones(count, dtype=bool),
+    )
     return Plan(
         sources, np.array(list(rows.values())), tuple(names), np.array(costs),
         np.array(least), np.array(most), limits or {"margin_free": 1.0}, cost,
-        float(asked), int(draws), int(seed),
+        float(asked_yield), int(draws), int(seed),
     )  # fmt: skip
 
 
@@ -91,12 +97,12 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 def _limits(table: Table) -> dict[str, float]:
     """Limits by quantity."""
     valid = limit_names()
-    found = {}
+    limits = {}
     for key in list(table.content):
         if key not in valid:
             raise table.bad("", f"unknown key {quoted(key)}{nearest(key, valid)}")
-        found[key] = table.number(key, UNITS[key], above=0.0)
-    return found
+        limits[key] = table.number(key, UNITS[key], above=0.0)
+    return limits
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:

@@ -1,4 +1,4 @@
-"""Tolerances over a workspace: how much tighter errors must be, and how loose they may.
+"""Tolerances over a workspace: an assessment of present errors, and an allocation.
 
 The part between the command and :mod:`assembly.statistics.allocation`: postures of a
 grid, the errors a robot has now, results as plain values and as a data set.
@@ -14,10 +14,11 @@ import numpy as np
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture, place_many
 from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.allocation import Allocation
-from assembly.statistics.play import PLAY
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
 from assembly.sweeps.identity import program_hash, robot_hash
@@ -52,7 +53,7 @@ def grid_postures(robot: Robot, grid: str) -> list[Posture]:
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """What must be the same for two allocations to share what they computed."""
+    """Values that must be equal for two allocations to share stored results."""
     arrays = [p.transforms for p in postures]
     for one in (plan, plan.sources):
         arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
@@ -60,19 +61,24 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
     return {
         "robot_sha256": robot_hash(plan.sources.robot),
         "plan_and_postures_sha256": digest.hexdigest(),
-        "limits": str(dict(plan.limits)), "cost": plan.cost, "play": plan.play,
-        "yield": plan.asked_yield, "draws": plan.draws, "seed": plan.seed,
-        "fresh": fresh, "program": f"forcefit {version('forcefit')}",
+        "limits": str(dict(plan.limits)),
+        "cost": plan.cost,
+        "play": plan.clearance_model,
+        "yield": plan.asked_yield,
+        "draws": plan.draws,
+        "seed": plan.seed,
+        "fresh": fresh,
+        "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
-    }  # fmt: skip
+    }
 
 
 def present_errors(
     postures: Sequence[Posture],
-    compliant: str = "free",
+    compliant: Compliant = "free",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """How far the robot's own errors are from going together everywhere.
+    """Assess the robot's own errors: largest margin over the postures, and its causes.
 
     Args:
         postures: of a robot with errors.
@@ -85,8 +91,10 @@ def present_errors(
     """
     margins = []
     for i, posture in enumerate(postures):
-        found = prepare_margins(posture, compliant).solve(posture.robot.errors[None])
-        margins.append(found)
+        margins_there = prepare_margins(posture, compliant).solve(
+            posture.robot.errors[None]
+        )
+        margins.append(margins_there)
         progress(i + 1, len(postures))
     values = np.array([m.margin[0] for m in margins])
     worst = int(np.nanargmax(values))
@@ -94,8 +102,8 @@ def present_errors(
     robot = posture.robot
     slopes = margins[worst].slopes[0]
     try:
-        answer = solve_assembly(posture)
-        energy, energies = answer.energy, energy_slopes(answer)
+        assembly = solve_assembly(posture)
+        energy, energies = assembly.energy, energy_slopes(assembly)
     except (CannotAssemble, SolverFailed):
         energy, energies = float("nan"), np.full_like(slopes, np.nan)
     present = np.argwhere(robot.errors != 0.0)
@@ -122,85 +130,101 @@ def present_errors(
     }  # fmt: skip
 
 
-def present_text(found: dict[str, Any]) -> str:
-    """What :func:`present_errors` says, for people: five errors that matter."""
-    where = ", ".join(f"{k} = {v:.4g}" for k, v in found["at"].items() if abs(v) > 1e-9)
+def present_text(results: dict[str, Any]) -> str:
+    """The results of :func:`present_errors` for people: the five largest errors."""
+    where = ", ".join(
+        f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
+    )
     lines = [
-        f"{found['postures']} postures, {found['assemblable_share']:.1%} go together; "
-        f"largest margin {found['largest_margin']:.4g} at {where or 'the origin'}",
-        f"everywhere with all errors times {found['factor_on_errors']:.4g}",
+        f"{results['postures']} postures, {results['assemblable_share']:.1%} go "
+        f"together; largest margin {results['largest_margin']:.4g} "
+        f"at {where or 'the origin'}",
+        f"everywhere with all errors times {results['factor_on_errors']:.4g}",
     ]
-    for one in found["slopes"][:5]:
+    for error in results["slopes"][:5]:
         lines.append(
-            f"  {one['error']} = {one['value']:.3g} makes {one['share_of_margin']:.1%} "
-            "of that margin"
+            f"  {error['error']} = {error['value']:.3g} makes "
+            f"{error['share_of_margin']:.1%} of that margin"
         )
     return "\n".join(lines)
 
 
-def allocation_of(answer: Allocation) -> dict[str, Any]:
+def allocation_of(allocation: Allocation) -> dict[str, Any]:
     """An allocation as plain values."""
-    plan = answer.plan
+    plan = allocation.plan
     classes = [
         {
-            "name": name, "tolerance": answer.tolerances[g], "unit": _unit(answer, g),
-            "scaled_alike": answer.alike[g],
-            "cost": plan.costs[g], "loosest_allowed": plan.most[g],
-            "at_loosest": bool(answer.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
+            "name": name,
+            "tolerance": allocation.tolerances[g],
+            "unit": _unit(allocation, g),
+            "scaled_alike": allocation.uniformly_scaled[g],
+            "cost": plan.costs[g],
+            "loosest_allowed": plan.most[g],
+            "at_loosest": bool(allocation.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
         }
         for g, name in enumerate(plan.names)
-    ]  # fmt: skip
+    ]
     return {
-        "limits": dict(plan.limits), "yield": plan.asked_yield, "cost": plan.cost,
-        "tolerances": classes, "price": answer.price, "price_alike": answer.price_alike,
-        "price_bound": answer.price_bound, "cuts": answer.cuts,
-        "worst": {k: {"found": a, "proven": b} for k, (a, b) in answer.worst.items()},
-        "proven_scale": answer.proven_scale, "verification": answer.verification,
-        "play": plan.play if plan.limits_pose else None,
-    }  # fmt: skip
+        "limits": dict(plan.limits),
+        "yield": plan.asked_yield,
+        "cost": plan.cost,
+        "tolerances": classes,
+        "price": allocation.price,
+        "price_alike": allocation.price_uniformly_scaled,
+        "price_bound": allocation.price_bound,
+        "cuts": allocation.cuts,
+        "worst": {
+            k: {"found": a, "proven": b} for k, (a, b) in allocation.worst.items()
+        },
+        "proven_scale": allocation.proven_scale,
+        "verification": allocation.verification,
+        "play": plan.clearance_model if plan.limits_pose else None,
+    }
 
 
-def _unit(answer: Allocation, group: int) -> str:
+def _unit(allocation: Allocation, group: int) -> str:
     """Unit of a class of tolerances."""
-    first = int(np.flatnonzero(answer.plan.group == group)[0])
-    return "rad" if answer.plan.sources.component[first] < 3 else "m"
+    first = int(np.flatnonzero(allocation.plan.group == group)[0])
+    return "rad" if allocation.plan.sources.component[first] < 3 else "m"
 
 
-def allocation_text(found: dict[str, Any]) -> str:
+def allocation_text(results: dict[str, Any]) -> str:
     """An allocation for people."""
     scales = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}
     lines = []
-    for one in found["tolerances"]:
+    for one in results["tolerances"]:
         scale, unit = scales[one["unit"]]
-        said = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
-        lines.append(said + (" (the loosest allowed)" if one["at_loosest"] else ""))
-    if found["play"]:
-        lines.append(f"pose errors: play {found['play']}: {PLAY[found['play']]}")
-    lines.append(_price_text(found))
-    for key, worst in found["worst"].items():
+        line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
+        lines.append(line + (" (the loosest allowed)" if one["at_loosest"] else ""))
+    if results["play"]:
+        lines.append(
+            f"pose errors: play {results['play']}: {CLEARANCE_MODELS[results['play']]}"
+        )
+    lines.append(_price_text(results))
+    for key, worst in results["worst"].items():
         proven = (
             f"at most {worst['proven']:.4g} proven" if np.isfinite(worst["proven"])
             else "nothing proven"
         )  # fmt: skip
         lines.append(
             f"worst {key}: {worst['found']:.4g} found, {proven}, "
-            f"limit {found['limits'][key]:g}"
+            f"limit {results['limits'][key]:g}"
         )
-    if np.isfinite(found["proven_scale"]):
-        lines.append(f"proven when scaled by {found['proven_scale']:.4f}")
-    check = found["verification"]
+    if np.isfinite(results["proven_scale"]):
+        lines.append(f"proven when scaled by {results['proven_scale']:.4f}")
+    check = results["verification"]
     if check:
         one = check["yield"]
         lines.append(
             f"{check['draws']} fresh draws at all postures: yield "
             f"{one['probability']:.4f} ({one['lower']:.4f} to {one['upper']:.4f}), "
-            f"asked {found['yield']:g}: {check['verdict']}{_looks_text(check)}"
+            f"asked {results['yield']:g}: {check['verdict']}{_looks_text(check)}"
         )
     return "\n".join(lines)
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """How often was looked, and what its intervals are worth for that."""
+    """Number of looks, and the confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -210,42 +234,58 @@ def _looks_text(check: dict[str, Any]) -> str:
     )
 
 
-def _price_text(found: dict[str, Any]) -> str:
-    """What the tolerances cost, and what that is known to be worth."""
-    price, alike, bound = (found[k] for k in ("price", "price_alike", "price_bound"))
-    said = f"price {price:.5g}"
+def _price_text(results: dict[str, Any]) -> str:
+    """Cost of the tolerances, and its lower bound or its reduction."""
+    price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
+    text = f"price {price:.5g}"
     if np.isfinite(bound):
-        return f"{said}, no tolerances cost less than {bound:.5g}"
+        return f"{text}, no tolerances cost less than {bound:.5g}"
     if alike > price:
-        said += f", {alike:.5g} with those of the convex programme scaled alike"
-        if found["cost"] == "reciprocal":
-            said += f": {1 - price / alike:.1%} less"
-    return said
+        text += f", {alike:.5g} with those of the convex programme scaled alike"
+        if results["cost"] == "reciprocal":
+            text += f": {1 - price / alike:.1%} less"
+    return text
 
 
-def tolerance_dataset(answer: Allocation) -> "xarray.Dataset":
+def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
     """An allocation as a data set over ``class``."""
     import xarray
 
-    plan, found = answer.plan, allocation_of(answer)
-    said = allocation_text(found | {"tolerances": []}).replace("\n", "; ")
-    units = np.array([c["unit"] for c in found["tolerances"]])
+    plan, results = allocation.plan, allocation_of(allocation)
+    text = allocation_text(results | {"tolerances": []}).replace("\n", "; ")
+    units = np.array([c["unit"] for c in results["tolerances"]])
     data = {
-        "tolerance": ("class", answer.tolerances, {"units": "rad or m, see unit"}),
-        "scaled_alike": ("class", answer.alike, {"units": "rad or m, see unit"}),
+        "tolerance": ("class", allocation.tolerances, {"units": "rad or m, see unit"}),
+        "scaled_alike": (
+            "class",
+            allocation.uniformly_scaled,
+            {"units": "rad or m, see unit"},
+        ),
         "loosest_allowed": ("class", plan.most, {"units": "rad or m, see unit"}),
         "cost": ("class", plan.costs, {"units": "1"}),
         "unit": ("class", units),
     }
     robot = plan.sources.robot
     limits = {f"limit.{key}": value for key, value in plan.limits.items()}
-    check = answer.verification
-    return xarray.Dataset(data, {"class": list(plan.names)}, {
-        "robot": robot.name, "robot_sha256": robot_hash(robot),
-        "program": f"forcefit {version('forcefit')}", "seed": plan.seed,
-        "yield": plan.asked_yield, "cost_law": plan.cost, "price": answer.price,
-        "price_alike": answer.price_alike, "price_bound": answer.price_bound,
-        "said": said, "play": found["play"] or "",
-        "verified_yield": check["yield"]["probability"] if check else float("nan"),
-        **limits,
-    })  # fmt: skip
+    verification = allocation.verification
+    return xarray.Dataset(
+        data,
+        {"class": list(plan.names)},
+        {
+            "robot": robot.name,
+            "robot_sha256": robot_hash(robot),
+            "program": f"forcefit {version('forcefit')}",
+            "seed": plan.seed,
+            "yield": plan.asked_yield,
+            "cost_law": plan.cost,
+            "price": allocation.price,
+            "price_alike": allocation.price_uniformly_scaled,
+            "price_bound": allocation.price_bound,
+            "said": text,
+            "play": results["play"] or "",
+            "verified_yield": verification["yield"]["probability"]
+            if verification
+            else float("nan"),
+            **limits,
+        },
+    )

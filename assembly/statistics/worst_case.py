@@ -1,11 +1,11 @@
-"""The worst that errors within tolerances can do, bracketed.
+"""Worst case of errors within tolerances: lower and upper bounds.
 
-Margin and energy are convex in the errors, so the worst lies where every error is at
-one end of its tolerance.  Going from such a corner to the one its slopes point to never
-lowers either: from many corners this gives a lower bound, as it does of a wrench, a
-stress or a pose error, whose worst may lie elsewhere.  An upper bound comes from
-play that answers every error in proportion, ``u = sum_i V_i s_i`` for errors
-``t_i s_i``, abs(s_i) <= 1: one cone programme, whose V proves the bound by itself.
+Margin and energy are convex in the errors, so their worst case is a corner, where every
+error is at one end of its tolerance.  Going from a corner to the one its slopes point
+to never lowers either.  Started from many corners this gives a lower bound; likewise of
+a wrench, a stress or a pose error, whose worst case need not be a corner.  An upper
+bound comes from clearances affine in the errors, ``u = sum_i V_i s_i`` for errors
+``t_i s_i``, abs(s_i) <= 1: one cone programme, whose V certifies the bound by itself.
 
 Sources:
     Ben-Tal, El Ghaoui, Nemirovski (2009), Robust Optimization, ch. 14 (affinely
@@ -23,15 +23,15 @@ from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.responses import respond
 
 CORNERS = 24  # to start from
-_STEPS = 12  # from corner to corner; most searches end after three
+_ITERATIONS = 12  # from corner to corner; most searches end after three
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """The worst corner of the tolerances that was found.
+    """The worst corner of the tolerances that a search found.
 
     Attributes:
-        value: the quantity there: a lower bound of the worst.
+        value: the quantity there: a lower bound of the worst case.
         signs: (m,) of the errors, -1 or 1.
         slopes: (m,) [its unit per rad or m] of the value with each error.
     """
@@ -42,32 +42,34 @@ class Corner:
 
 
 def worst_corner(
-    ready: PostureMargins | OnePosture, sources: ErrorSources, tolerances: NDArray,
-    corners: NDArray, key: str = "energy", play: str = "worst",
+    prepared: PostureMargins | OnePosture, sources: ErrorSources, tolerances: NDArray,
+    corners: NDArray, key: str = "energy", clearance_model: str = "worst",
 ) -> Corner:  # fmt: skip
-    """Climb from corner to corner; the best end of all.
+    """Local search from corner to corner; the worst of all searches.
 
     Args:
-        ready: a posture prepared for margins, or for energies and all others.
-        sources: m of them; only their places count.
+        prepared: a posture prepared for margins, or for energies and all others.
+        sources: m of them; their distributions do not matter.
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
-        key: which quantity, see :func:`assembly.statistics.responses.respond`.
-        play: see there.
+        key: the quantity, see :func:`assembly.statistics.responses.respond`.
+        clearance_model: see there.
 
     Returns:
-        The worst corner found.
+        The worst corner.
     """
     signs = corners.copy()
-    if isinstance(ready, OnePosture):
-        # where play takes up all of an error the energy has no slope to follow
+    if isinstance(prepared, OnePosture):
+        # where clearances take up an error completely the energy has zero slope
         signs = np.vstack([
             signs,
-            _worst_without_play(ready, sources, tolerances, signs),
+            _worst_without_clearance(prepared, sources, tolerances, signs),
         ])
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
-    for _ in range(_STEPS):
-        values, slopes = respond(ready, sources, signs * tolerances, key, play)
+    for _ in range(_ITERATIONS):
+        values, slopes = respond(
+            prepared, sources, signs * tolerances, key, clearance_model
+        )
         i = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[i] > best.value:
             best = Corner(float(values[i]), signs[i].copy(), slopes[i].copy())
@@ -79,13 +81,13 @@ def worst_corner(
     return best
 
 
-def _worst_without_play(
-    ready: OnePosture, sources: ErrorSources, tolerances: NDArray, corners: NDArray
+def _worst_without_clearance(
+    prepared: OnePosture, sources: ErrorSources, tolerances: NDArray, corners: NDArray
 ) -> NDArray:
-    """(k, m) signs where the search ends if no clearance gives way: (h s)^2 / 2."""
-    h = ready.misfit[:, 6 * sources.frame + sources.component] * tolerances
+    """(k, m) worst corners of the robot without clearances: energy (h s)^2 / 2."""
+    h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
-    for _ in range(_STEPS):
+    for _ in range(_ITERATIONS):
         slopes = signs @ (h.T @ h)
         signs = np.where(slopes == 0.0, signs, np.sign(slopes))
     return np.unique(signs, axis=0)
@@ -99,7 +101,7 @@ def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Upper bound of the worst margin over all errors within tolerances.
+    """Upper bound of the largest margin over all errors within tolerances.
 
     Args:
         zone: a posture prepared for margins, every clearance scaled by the margin.
@@ -110,70 +112,72 @@ def bound_margin(
         The bound; inf where some error is taken up by no clearance.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(zone.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
     if not len(zone.B):
         return 0.0
     asked = zone.K[:, columns] * tolerances
-    V = _proportional_play(zone.B, asked, zone.starts, None, None)
+    V = _affine_clearances(zone.B, asked, zone.starts, None, None)
     V += zone.B.T @ (asked - zone.B @ V)
     return float(_reach(V, zone.starts).max())
 
 
-def bound_energy(one: OnePosture, sources: ErrorSources, tolerances: NDArray) -> float:
+def bound_energy(
+    prepared: OnePosture, sources: ErrorSources, tolerances: NDArray
+) -> float:
     """Upper bound of the largest energy over all errors within tolerances.
 
     Args:
-        one: a posture prepared for energies.
+        prepared: a posture prepared for energies.
         sources: m of them.
         tolerances: (m,) [rad or m] half widths.
 
     Returns:
-        [J] the bound: springs that give way to every error in proportion need no more;
-        the sizes of what they give way are added up, so it may be several times the
-        worst.  inf where some error is taken up by no spring.
+        [J] the bound: that of clearances and springs affine in the errors.  The sizes
+        of their deflections are added up, so it may be several times the worst case.
+        inf where some error is taken up by no spring.
     """
     columns = 6 * sources.frame + sources.component
-    if np.abs(one.unanswered[:, columns] * tolerances).max(initial=0.0) > 1e-12:
+    if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
         return np.inf
-    h = one.misfit[:, columns] * tolerances
-    V = np.zeros((one.G.shape[1], len(tolerances)))
-    if one.G.size:
+    h = prepared.misfit[:, columns] * tolerances
+    V = np.zeros((prepared.G.shape[1], len(tolerances)))
+    if prepared.G.size:
         none = np.zeros((0, V.shape[0])), np.zeros((0, V.shape[1]))
-        V = _proportional_play(*none, one.starts, one.G, h)
-        V = V / max(1.0, float(_reach(V, one.starts).max()))
-    return float(np.linalg.norm(one.G @ V + h, axis=0).sum() ** 2 / 2)
+        V = _affine_clearances(*none, prepared.starts, prepared.G, h)
+        V = V / max(1.0, float(_reach(V, prepared.starts).max()))
+    return float(np.linalg.norm(prepared.G @ V + h, axis=0).sum() ** 2 / 2)
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """(cones,) most that play proportional to the errors asks of each cone."""
+    """(cones,) largest sizes of affine clearances in each cone."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
-def _proportional_play(
+def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """(nu, m) V with B V = asked that asks least of the cones, or of the springs."""
+    """(nu, m) V with B V = asked of least size in the cones, or least spring energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]
     size = np.linalg.norm(asked) or 1.0
-    V, most = cp.Variable((nu, m)), cp.Variable()
+    V, largest = cp.Variable((nu, m)), cp.Variable()
     single = starts[:-1][np.diff(starts) == 1]
     double = starts[:-1][np.diff(starts) == 2]
-    limit = most if G is None else 1.0
-    held = []
+    limit = largest if G is None else 1.0
+    constraints = []
     if len(single):
-        held.append(cp.sum(cp.abs(V[single, :]), axis=1) <= limit)
+        constraints.append(cp.sum(cp.abs(V[single, :]), axis=1) <= limit)
     if len(double):
         pairs = cp.vstack([cp.vec(V[double + i, :], order="C") for i in (0, 1)])
         sizes = cp.reshape(cp.norm(pairs, 2, axis=0), (len(double), m), order="C")
-        held.append(cp.sum(sizes, axis=1) <= limit)
+        constraints.append(cp.sum(sizes, axis=1) <= limit)
     if G is None or h is None:
-        held.append(B @ V == asked / size)
-        goal = cp.Minimize(most)
+        constraints.append(B @ V == asked / size)
+        goal = cp.Minimize(largest)
     else:
         size, scale = 1.0, np.linalg.norm(h) or 1.0
         goal = cp.Minimize(cp.sum(cp.norm((G @ V + h) / scale, 2, axis=0)))
-    cp.Problem(goal, held).solve(solver="CLARABEL")
+    cp.Problem(goal, constraints).solve(solver="CLARABEL")
     return V.value * size

@@ -1,10 +1,10 @@
-"""Blocks of a sweep on many processes: Dask distributed, here or on a cluster.
+"""Solution of a sweep in parallel: Dask distributed, local or on a cluster.
 
-The client keeps a few tasks in flight for each worker and journals what comes back,
-so neither it nor a worker ever holds more than a few blocks.  A task is as many blocks
-as take about half a second.  A worker that dies takes nothing with it: Dask gives its
-tasks to others.  How blocks are spread changes no number: each process computes on one
-thread, and points do not depend on their neighbours.
+The client keeps a few tasks in flight for each worker and writes their results to the
+journal, so that neither it nor a worker ever holds more than a few blocks.  A task has
+as many blocks as take about half a second.  The tasks of a worker that dies are given
+to others by Dask.  The distribution of blocks changes no number: each process computes
+on one thread, and points do not depend on their neighbours.
 """
 
 import logging
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from assembly.sweeps.identity import program_hash, question_hash
 from assembly.sweeps.plan import Sweep
-from assembly.sweeps.points import Found, Points, solve_points
+from assembly.sweeps.points import Points, SolvedPoints, solve_points
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import Solver
 from forcefit.inputs.table import BadInput
@@ -54,29 +54,31 @@ def cluster_solver(
         The solver; the cluster is asked for, or started, when it begins.
     """
 
-    def solve(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
+    def solve(
+        sweep: Sweep, blocks: Iterable[int]
+    ) -> Iterator[tuple[int, SolvedPoints]]:
         from distributed import Client, LocalCluster
 
-        # what matters of it is said by the sweep, in one message
+        # the sweep itself reports failures, in one message
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
-                yield from _connected_spread(client, sweep, iter(blocks), report)
+                yield from _distribute_connected(client, sweep, iter(blocks), report)
             return
         with _without_interrupts():
-            here = LocalCluster(
+            local = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True,
                 dashboard_address=None, silence_logs=50,
             )  # fmt: skip
-        with here as cluster, Client(cluster) as client:
-            yield from _connected_spread(client, sweep, iter(blocks), report)
+        with local as cluster, Client(cluster) as client:
+            yield from _distribute_connected(client, sweep, iter(blocks), report)
 
     return solve
 
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Processes started meanwhile ignore Ctrl-C: it is the sweep's to stop them."""
+    """Processes started in the block ignore Ctrl-C: the sweep stops them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -88,7 +90,7 @@ def _without_interrupts() -> Generator[None, None, None]:
 
 
 def _connected(address: str) -> "distributed.Client":
-    """A client of a scheduler that runs somewhere."""
+    """A client of a running scheduler."""
     from distributed import Client
 
     try:
@@ -100,17 +102,17 @@ def _connected(address: str) -> "distributed.Client":
         ) from None
 
 
-def _connected_spread(
+def _distribute_connected(
     client: "distributed.Client",
     sweep: Sweep,
     blocks: Iterator[int],
     report: Callable[[str], None],
-) -> Iterator[tuple[int, Found]]:
-    """Hand out blocks; a scheduler that goes away is one message."""
+) -> Iterator[tuple[int, SolvedPoints]]:
+    """Distribute blocks; the loss of the scheduler is one message."""
     from distributed.comm import CommClosedError
 
     try:
-        yield from _spread(client, sweep, blocks, report)
+        yield from _distribute(client, sweep, blocks, report)
     except (CommClosedError, CancelledError):
         raise BadInput(
             "sweep: the connection to the scheduler was lost; finished points are in "
@@ -118,13 +120,13 @@ def _connected_spread(
         ) from None
 
 
-def _spread(
+def _distribute(
     client: "distributed.Client",
     sweep: Sweep,
     blocks: Iterator[int],
     report: Callable[[str], None],
-) -> Iterator[tuple[int, Found]]:
-    """Hand out blocks as workers become free; what is found comes in any order."""
+) -> Iterator[tuple[int, SolvedPoints]]:
+    """Distribute blocks as workers become free; results come in any order."""
     from distributed import KilledWorker, as_completed
 
     _check_workers(client)
@@ -132,19 +134,19 @@ def _spread(
     size, flying, times = 1, 0, []
     waiting: Any = as_completed()
 
-    def hand_out() -> None:
+    def submit() -> None:
         nonlocal flying
-        # asked each time: clusters grow and shrink
+        # each time anew: clusters grow and shrink
         threads = max(1, sum(client.nthreads().values()))
         while flying < _IN_FLIGHT * threads and (some := list(islice(blocks, size))):
             tasks = [(block, sweep.points(block)) for block in some]
             waiting.add(client.submit(solve_task, *question, tasks, pure=False))
             flying += 1
 
-    hand_out()
+    submit()
     for future in waiting:
         try:
-            seconds, found = future.result()
+            seconds, solved = future.result()
         except KilledWorker:
             raise BadInput(
                 "sweep: some points killed every worker they were given to, as "
@@ -153,10 +155,10 @@ def _spread(
         future.release()
         flying -= 1
         times.append(seconds)
-        per_block = seconds / len(found)
+        per_block = seconds / len(solved)
         size = int(min(_LARGEST, max(1.0, _TASK / max(per_block, 1e-6))))
-        yield from found
-        hand_out()
+        yield from solved
+        submit()
     if times:
         median = sorted(times)[len(times) // 2]
         report(f"{len(times)} tasks, {median:.2g} s each")
@@ -177,38 +179,38 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> str:
-    """The program here: its version, and which sources and libraries it is made of."""
+    """This program: its version, and the digest of its sources and libraries."""
     return f"forcefit {version('forcefit')}, program_sha256 {program_hash()[:12]}"
 
 
 def solve_task(
     question: bytes, digest: str, tasks: list[Task]
-) -> tuple[float, list[tuple[int, Found]]]:
+) -> tuple[float, list[tuple[int, SolvedPoints]]]:
     """On a worker: solve some blocks on one thread.
 
     Args:
         question: pickled.
-        digest: of the question where it was asked.
+        digest: of the question on the client.
         tasks: number and points of each block.
 
     Returns:
-        [s] that it took, and each block's number with what was found.
+        [s] of computation, and each block's number with its results.
 
     Raises:
-        BadInput: the question is another one here: a mesh or a library differs.
+        BadInput: the digest differs here: a mesh or a library is another one.
     """
     from threadpoolctl import threadpool_limits
 
     asked = _question(question, digest)
     start = time.perf_counter()
     with threadpool_limits(1):
-        found = [(block, solve_points(asked, points)) for block, points in tasks]
-    return time.perf_counter() - start, found
+        solved = [(block, solve_points(asked, points)) for block, points in tasks]
+    return time.perf_counter() - start, solved
 
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """The question, unpacked once on each worker: robots are prepared by identity."""
+    """The question, unpickled once on each worker: robots are cached by identity."""
     question: Question = pickle.loads(content)
     if question_hash(question) != digest:
         raise BadInput(

@@ -1,7 +1,7 @@
-"""A sweep's results as an xarray data set, in memory or straight to a NetCDF file.
+"""A sweep's results as an xarray data set, in memory or in a NetCDF file.
 
-Written block by block from the journal, a file never needs more memory than a few
-blocks, and its bytes depend on the sweep alone.
+A file is written from the journal by blocks, so memory stays bounded, and its bytes
+depend on the sweep alone.
 """
 
 import os
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# what commands write, and an attribute that none but such a file has
+# kinds of files that commands write, and an attribute that identifies each
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
 }  # fmt: skip
@@ -32,14 +32,14 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
-_TOGETHER = 64  # blocks written at a time
+_TOGETHER = 64  # blocks written together
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
     """The data set of a whole sweep in memory.
 
     Args:
-        sweep: what was asked.
+        sweep: of the results.
         records: (points,) rows of all points.
         texts: by name, the text of points that have one.
 
@@ -65,12 +65,12 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
 def write_sweep(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
 ) -> None:
-    """The same data set as a NetCDF file, whole or not at all.
+    """Write the data set of a whole sweep as a NetCDF file, whole or not at all.
 
     Args:
-        sweep: what was asked.
+        sweep: of the results.
         read: rows and texts of a block.
-        path: of the new file; it replaces an old one only once it is complete.
+        path: of the new file; it replaces an old one only when it is complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -118,7 +118,7 @@ def _write(
 
 
 def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> None:
-    """Values of consecutive points into their places of a variable."""
+    """Write values of consecutive points to a variable."""
     done = 0
     for slab in slabs(shape, first, first + len(values)):
         size = [s.stop - s.start for s in slab]
@@ -161,9 +161,11 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
     """Blocks one after the other."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
-    for records, said in blocks:
+    for records, texts_of_block in blocks:
         for name in TEXTS:
-            texts[name] |= {start + row: text for row, text in said[name].items()}
+            texts[name] |= {
+                start + row: text for row, text in texts_of_block[name].items()
+            }
         start += len(records)
     return np.concatenate([records for records, _ in blocks]), texts
 
@@ -184,7 +186,7 @@ def _attributes(variable: Any) -> dict[str, str]:
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Name: axes, values, attributes of everything that labels an axis."""
+    """Axes, values and attributes of every coordinate, by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -225,7 +227,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
     Args:
         path: of the file to be written later.
-        what: one of :data:`KINDS`; a file that stands there already must be one.
+        what: one of :data:`KINDS`; an existing file must be one.
 
     Raises:
         BadInput: it is not, or as :func:`forcefit.inputs.writing.check_writable`.
@@ -240,16 +242,16 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Whether a file says that it is ours and of a kind."""
+    """Whether the attributes of a file are those of a kind of ours."""
     import h5py
 
     try:
         with h5py.File(path, "r") as file:
-            said = {str(name): file.attrs[name] for name in file.attrs}
+            attributes = {str(name): file.attrs[name] for name in file.attrs}
     except (OSError, RuntimeError, KeyError, ValueError, TypeError):
         return False
-    ours = str(said.get("program", "")).startswith("forcefit ")
-    return ours and KINDS[what] in said
+    ours = str(attributes.get("program", "")).startswith("forcefit ")
+    return ours and KINDS[what] in attributes
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":

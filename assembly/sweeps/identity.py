@@ -1,4 +1,4 @@
-"""What must be the same for numbers to be the same: program, robot and question.
+"""Digests that identify results: of the program, the robot and the question.
 
 Each is a SHA-256, compared by journals and by the workers of a cluster.
 """
@@ -22,13 +22,13 @@ from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# what computes with our sources: another version may round otherwise
+# libraries that the numbers depend on: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "numba", "clarabel")
 
 
 @cache
 def program_hash() -> str:
-    """SHA-256 of the sources that numbers come from and of the libraries they use."""
+    """SHA-256 of the program's sources and of the versions of its libraries."""
     digest = hashlib.sha256()
     for package in (forcefit.inputs, stiffness, assembly):
         root = Path(str(package.__file__)).parent
@@ -37,13 +37,13 @@ def program_hash() -> str:
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
-    said = [f"{name} {version(name)}" for name in ("forcefit", *_LIBRARIES)]
-    digest.update("\n".join(said).encode())
+    versions = [f"{name} {version(name)}" for name in ("forcefit", *_LIBRARIES)]
+    digest.update("\n".join(versions).encode())
     return digest.hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:
-    """SHA-256 of all that a robot file says, and of the meshes it names.
+    """SHA-256 of the content of a robot file, and of the meshes it names.
 
     Args:
         robot: any.
@@ -68,7 +68,7 @@ def robot_hash(robot: Robot) -> str:
 
 
 def _content(path: Path) -> bytes:
-    """What stands in a file."""
+    """The content of a file."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -76,31 +76,31 @@ def _content(path: Path) -> bytes:
 
 
 def question_hash(question: Any) -> str:
-    """SHA-256 of all that is asked: every attribute of a question, by its name.
+    """SHA-256 of a question: every attribute, by its name.
 
     Args:
         question: plain values, arrays, robots, designs and dataclasses of such.
 
     Returns:
-        The digest; meshes and libraries are read where the robot says they are.
+        The digest; meshes and libraries are read from the robot's paths.
     """
-    return hashlib.sha256(json.dumps(_said(question)).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(_as_json(question)).encode()).hexdigest()
 
 
-def _said(value: Any) -> Any:
-    """A value as JSON can say it, no two different ones alike."""
+def _as_json(value: Any) -> Any:
+    """A value in terms of JSON; different values give different results."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
-    if isinstance(value, Design):  # wherever its file lies
-        return ["design", _said(value.content)]
+    if isinstance(value, Design):  # independent of its file's path
+        return ["design", _as_json(value.content)]
     if isinstance(value, np.ndarray):
         content = np.ascontiguousarray(value)
         digest = hashlib.sha256(content.tobytes()).hexdigest()
         return ["array", content.dtype.str, content.shape, digest]
     if is_dataclass(value):
-        return [[f.name, _said(getattr(value, f.name))] for f in fields(value)]
+        return [[f.name, _as_json(getattr(value, f.name))] for f in fields(value)]
     if isinstance(value, Mapping):
-        return [[str(k), _said(v)] for k, v in value.items()]
+        return [[str(k), _as_json(v)] for k, v in value.items()]
     if isinstance(value, list | tuple):
-        return [_said(v) for v in value]
+        return [_as_json(v) for v in value]
     return repr(value)

@@ -1,11 +1,11 @@
-"""A sweep's journal: finished blocks on disk, whatever happens to the program.
+"""A sweep's journal: finished blocks on disk, safe against a kill of the program.
 
-The file begins with one line of JSON that says whose it is, and its check sum.  Records
-follow, each appended by one write: a block's number, its length and a check sum, then
-its rows and texts.  Each check sum goes on from the first line's, so that a record says
-by itself whose it is.  What does not fit is not believed: a record cut short by a kill
-is dropped, a damaged one is passed over, all others stand.  Records may come in any
-order, and twice.  One program at a time holds the file.
+The file begins with one line of JSON that identifies its sweep, and its check sum.
+Records follow, each appended by one write: a block's number, its length and a check
+sum, then its rows and texts.  Each check sum continues the first line's, so that every
+record identifies its sweep.  Records with a wrong check sum are ignored: the last one,
+cut short by a kill, or a damaged one.  Records may come in any order, and twice.  The
+file is locked by one program at a time.
 """
 
 import json
@@ -27,7 +27,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import check_writable, unwritable
 
 _MAGIC = b"FFB2"
-_HEAD = struct.Struct("<4sQQI")  # magic, block, length of what follows, check sum
+_HEAD = struct.Struct("<4sQQI")  # magic, block, length of the content, check sum
 _KIND = "forcefit sweep journal 2"
 
 
@@ -39,8 +39,7 @@ class Journal:
         path: of the file.
         record_type: of the rows.
         owner: check sum of the first line, with which those of the records begin.
-        places: where each finished block stands: offset of its record's content, and
-            its length.
+        places: offset and length of the content of each finished block's record.
     """
 
     path: Path
@@ -51,7 +50,7 @@ class Journal:
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
     ) -> None:
-        """Append a finished block; it stands once this returns.
+        """Append a finished block; it is in the file when this returns.
 
         Args:
             block: its number.
@@ -61,8 +60,8 @@ class Journal:
         Raises:
             BadInput: the file cannot be written, as on a full disk.
         """
-        said = json.dumps(texts, separators=(",", ":"), sort_keys=True).encode()
-        content = struct.pack("<Q", len(records)) + records.tobytes() + said
+        text = json.dumps(texts, separators=(",", ":"), sort_keys=True).encode()
+        content = struct.pack("<Q", len(records)) + records.tobytes() + text
         check = _check(self.owner, block, content)
         head = _HEAD.pack(_MAGIC, block, len(content), check)
         try:
@@ -76,7 +75,7 @@ class Journal:
         self.places[block] = start + len(head), len(content)
 
     def remove_after(self, held: ExitStack) -> None:
-        """Remove the file when a block of code has ended well; a failure keeps it."""
+        """Remove the file when a block of code ends without an error."""
 
         def remove(kind: object, *_: object) -> None:
             if kind is None:
@@ -94,7 +93,7 @@ class Journal:
             Both, as they were added.
 
         Raises:
-            BadInput: the file was changed meanwhile, or cannot be read.
+            BadInput: the file was changed in between, or cannot be read.
         """
         start, length = self.places[block]
         try:
@@ -123,19 +122,19 @@ class Journal:
 def open_journal(
     path: Path, whose: dict[str, Any], record_type: np.dtype
 ) -> Generator[Journal, None, None]:
-    """A new journal, or the one that a sweep left behind, held until the block ends.
+    """A new journal, or that of an interrupted sweep, locked until the block ends.
 
     Args:
         path: of the file.
-        whose: plain values that say which sweep this is: all must be the same.
+        whose: plain values that identify the sweep: all must be equal.
         record_type: of the rows.
 
     Yields:
         The journal, with the blocks that are finished.
 
     Raises:
-        BadInput: another program holds the file; it is another sweep's, or no journal,
-            or cannot be written.
+        BadInput: another program has locked the file; it is another sweep's, or no
+            journal, or cannot be written.
     """
     check_writable(path)
     line = json.dumps({"kind": _KIND} | whose).encode()
@@ -155,19 +154,19 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Places of the finished blocks; the first line is put right, a torn end cut."""
+    """Places of the finished blocks; the first line is repaired, a torn end cut."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
-            found = file.read(len(header))
+            first_line = file.read(len(header))
             places: dict[int, tuple[int, int]] = {}
             end = len(header)
             if size > len(header):
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                     places, end = _scan(content, len(header), owner)
-            if found != header:
-                # records that fit say whose they are: the line alone was damaged
-                if not places and not header.startswith(found):
+            if first_line != header:
+                # valid records identify the sweep: only the line was damaged
+                if not places and not header.startswith(first_line):
                     file.seek(0)
                     raise BadInput(f"{path}: {_difference(file.readline(), header)}")
                 file.seek(0)
@@ -201,16 +200,16 @@ def _scan(
 
 
 def _check(owner: int, block: int, content: bytes) -> int:
-    """Check sum of a record: of whose it is, its number, its length and its content."""
+    """Check sum of a record: of its sweep, its number, its length and its content."""
     head = struct.pack("<QQ", block, len(content))
     return zlib.crc32(content, zlib.crc32(head, owner))
 
 
-def _difference(found: bytes, header: bytes) -> str:
+def _difference(first_line: bytes, header: bytes) -> str:
     """How a journal differs from the one expected."""
     expected = json.loads(header.rpartition(b" ")[0])
-    line, _, check = found.rstrip(b"\n").rpartition(b" ")
-    if not found.startswith(b'{"kind": "forcefit sweep journal'):
+    line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
+    if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
         return "found no journal of a sweep; expected one, or no such file"
     if check != b"%08x" % zlib.crc32(line):
         return (
@@ -219,11 +218,11 @@ def _difference(found: bytes, header: bytes) -> str:
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # a hash of everything tells nothing where something is named
+    # the hash of the whole question is no use where a part of it is named
     keys = [k for k in keys if k != "question_sha256"] or keys
-    said = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
+    found = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)
     return (
-        f"journal of another sweep: found {said}; expected {wanted} (finish that "
+        f"journal of another sweep: found {found}; expected {wanted} (finish that "
         "sweep, delete its journal, or write to another file)"
     )

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# variable, factor, title, colours: the six panels of the paper's figure 5, then what
-# stands in for the last two where they were not asked for
+# variable, factor, title, colours: the six panels of the paper's figure 5, then those
+# that replace the last two where they were not asked for
 _PAPER = (
     ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
     ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
@@ -40,8 +40,8 @@ def figure_of(
 
     Args:
         data: of a sweep, as saved.
-        at: where to stand on other axes, by name: the nearest value is taken; over
-            draws that are not chosen from, the median is shown.
+        at: values on other axes, by name, the nearest is taken; unless a draw is
+            chosen, the median of the draws is shown.
 
     Returns:
         A figure with six panels.
@@ -51,7 +51,7 @@ def figure_of(
     """
     if "energy" not in data or "status" not in data:
         raise BadInput("figure: found no energy and status; expected those of a sweep")
-    view, note = seen_at(data, at or {})
+    view, note = part_of_sweep(data, at or {})
     axes = {str(d): view.sizes[d] for d in view["energy"].dims}
     check_axes(axes)
     figure = map_figure(view) if len(axes) == 2 else path_figure(view)
@@ -61,42 +61,42 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Refuse to draw what is neither a map nor a line.
+    """Refuse to plot what is neither a map nor a line.
 
     Args:
         sizes: number of values on each axis.
 
     Raises:
-        BadInput: not one or two axes have more than one value, draws aside.
+        BadInput: no axis, or more than two, with more than one value; draws aside.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
-        said = ", ".join(f"{name} ({n})" for name, n in long.items())
+        named = ", ".join(f"{name} ({n})" for name, n in long.items())
         raise BadInput(
-            f"figure: found axes {said}, expected one or two; forcefit assembly plot "
+            f"figure: found axes {named}, expected one or two; forcefit assembly plot "
             "draws a part of the file, with --at AXIS=VALUE"
         )
     if not long:
         raise BadInput("figure: found a single point; expected an axis or two")
 
 
-def seen_at(
+def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """A part of a sweep: some axes held, draws by their median.
+    """A part of a sweep: values on some axes fixed, draws by their median.
 
     Args:
         data: of a sweep.
         at: value by axis.
 
     Returns:
-        The part, without axes of one value, and a note that says what it is.
+        The part, without axes of one value, and a note that describes it.
 
     Raises:
         BadInput: an axis or a value is unknown.
     """
     axes = [str(d) for d in data["energy"].dims]
-    said = []
+    note = []
     for name, value in at.items():
         if name not in axes:
             raise BadInput(f"--at: no axis {quoted(name)}{nearest(name, axes)}")
@@ -110,12 +110,12 @@ def seen_at(
                 f"--at {name}: no {quoted(str(value))}{nearest(str(value), known)}"
             )
         data = data.isel({name: place})
-        said.append(f"{name} = {labels[place]}")
+        note.append(f"{name} = {labels[place]}")
     data = data.squeeze(drop=True)
     if "draw" in data["energy"].dims:
-        said.append(f"median of {data.sizes['draw']} draws")
+        note.append(f"median of {data.sizes['draw']} draws")
         data = _median(data)
-    return data, "; ".join(said)
+    return data, "; ".join(note)
 
 
 def _number(name: str, value: float | str) -> float:
@@ -129,7 +129,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Median over the draws; a status that any draw has instead of ok."""
+    """Median over the draws; the first status other than ok, if there is one."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -152,8 +152,8 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
         data: of a sweep over two axes with more than one value each.
 
     Returns:
-        A figure with a panel for each quantity; the line in the margins is 1, inside
-        which the manipulator assembles rigidly; crosses mark singularities near by.
+        A figure with a panel for each quantity; the contour of margin 1 bounds the
+        assembly zone; crosses mark nearby singularities.
 
     Raises:
         ValueError: the grid does not have two such axes.
@@ -191,7 +191,7 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
         data: of a sweep over one axis.
 
     Returns:
-        A figure with a panel for each quantity; crosses mark singularities near by.
+        A figure with a panel for each quantity; crosses mark nearby singularities.
     """
     from matplotlib.figure import Figure
 
@@ -220,7 +220,7 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """The same with rising numbers on each axis: labels become 1, 2, .."""
+    """The same with increasing numbers on each axis: labels become 1, 2, .."""
     for name in map(str, data["energy"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -229,14 +229,14 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels that a data set has the numbers for."""
+    """The panels whose variables a data set has."""
     if "rotation_error_play" in data:
         return _PAPER
     return (*_PAPER[:4], _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A variable; for pose errors the upper bound, or else half the platform screw."""
+    """A variable; for pose errors the upper bound, or the size of half the screw."""
     halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
     if key not in halves:
         return data[key].sel(bound="upper", drop=True) if "play" in key else data[key]
@@ -258,13 +258,13 @@ def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
     """Crosses where a singularity is near."""
     i, j = np.nonzero(_near(data))
     if len(i):
-        here = data["energy"].dims[0] == x
-        xs, ys = (i, j) if here else (j, i)
+        x_first = data["energy"].dims[0] == x
+        xs, ys = (i, j) if x_first else (j, i)
         panel.plot(data[x].values[xs], data[y].values[ys], "kx", markersize=3)
 
 
 def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Which points were solved, as text and colour."""
+    """Status of the points, as text and colour."""
     texts = data["status"].transpose(y, x).values.astype(str)
     _, codes = np.unique(texts, return_inverse=True)
     codes = codes.reshape(texts.shape)
@@ -296,12 +296,12 @@ def _counts(data: "xarray.Dataset") -> str:
 
 def _caption(data: "xarray.Dataset") -> str:
     """Robot, statuses, and the singularities that the crosses mark."""
-    said = f"{data.attrs.get('robot', '')}; {_counts(data)}"
+    caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))
         kinds = sorted({
             part.partition(",")[0] for t in texts if t for part in t.split("; ")
         })  # fmt: skip
         more = f" and {len(kinds) - 6} more" if len(kinds) > 6 else ""
-        said += f"\nx: singularities near by ({'; '.join(kinds[:6])}{more})"
-    return plot_label(said)
+        caption += f"\nx: singularities near by ({'; '.join(kinds[:6])}{more})"
+    return plot_label(caption)

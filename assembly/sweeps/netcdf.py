@@ -36,14 +36,14 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 def forgive_damaged_files() -> None:
-    """Let h5netcdf close what it could not open; else it writes to stderr."""
+    """Keep h5netcdf from writing to stderr when it closes a damaged file."""
     import h5netcdf
 
     h5netcdf.File._writable = False  # until a file says otherwise
 
 
 class _Target:
-    """Where HDF5 writes; a failure is kept until HDF5 has closed its file.
+    """The file that HDF5 writes to; a failure is kept until HDF5 has closed it.
 
     HDF5 crashes the whole process at its end when a file could not be closed.
     """
@@ -53,7 +53,7 @@ class _Target:
         self.failure: OSError | None = None
 
     def write(self, content: Any) -> int:
-        """Write all of it, or note why not and say that it is written."""
+        """Write the content; a failure is recorded and success returned."""
         left = memoryview(content).cast("B")
         size = len(left)
         try:
@@ -65,7 +65,7 @@ class _Target:
         return size
 
     def readinto(self, content: Any) -> int:
-        """Read what was written before."""
+        """Read bytes written before."""
         return self.file.readinto(content) or 0
 
     def read(self, size: int = -1) -> bytes:
@@ -73,15 +73,15 @@ class _Target:
         return self.file.read(size) or b""
 
     def seek(self, offset: int, whence: int = SEEK_SET) -> int:
-        """Go to a place of the file."""
+        """Set the position in the file."""
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The place where it is."""
+        """The position in the file."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the file's size, or note why not."""
+        """Set the file's size; a failure is recorded."""
         try:
             return self.file.truncate(size)
         except OSError as error:
@@ -89,4 +89,4 @@ class _Target:
             return size or 0
 
     def flush(self) -> None:
-        """Nothing waits here."""
+        """Nothing is buffered."""

@@ -19,7 +19,7 @@ from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
-_ABSENT: dict[str, Any] = {  # what a frame says that does not mention it
+_ABSENT: dict[str, Any] = {  # values of keys that a frame leaves out
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
@@ -38,7 +38,7 @@ Setter = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A robot as its file says it, ready to have numbers changed.
+    """A robot as the content of its file, whose numbers can be changed.
 
     Attributes:
         content: the root table, plain values.
@@ -56,7 +56,7 @@ class Design:
         return [path for path, _ in _numbers(copy.deepcopy(self.content))]
 
     def find(self, path: str) -> list[str]:
-        """Full paths that a path stands for.
+        """Full paths that a path matches.
 
         Args:
             path: full, or with the frame's name without its leg.
@@ -68,13 +68,13 @@ class Design:
             BadInput: the robot has no such number; the nearest is named.
         """
         known = self.paths
-        found = [p for p in known if p == path] or [
+        matches = [p for p in known if p == path] or [
             p for p in known if p.partition(".")[2] == path
         ]
-        if not found:
+        if not matches:
             hint = nearest(path, known) if known else ""
             raise BadInput(f"{self.file}: no number {quoted(path)}{hint}")
-        return found
+        return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
         """The root table with other numbers.
@@ -117,7 +117,7 @@ class Design:
             values: by path.
 
         Raises:
-            BadInput: they do; whether the closures still hold is not looked at.
+            BadInput: they do; whether the closures still hold is not checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
@@ -128,7 +128,7 @@ def design_of(robot: Robot) -> Design:
 
 
 def load_design(name: str | Path) -> Design:
-    """A built-in robot, or a robot file, with the numbers it is written in.
+    """A built-in robot, or a robot file, as a design.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file.
@@ -143,7 +143,7 @@ def load_design(name: str | Path) -> Design:
 
     if str(name) in BUILT_IN:
         return design_of(load_robot(name))
-    robot = load_robot(name)  # a file with mistakes is refused before numbers change
+    robot = load_robot(name)  # refuses a wrong file before numbers are changed
     return Design(read_toml(Path(name)).content, str(name), robot.name)
 
 
@@ -158,7 +158,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
-    """Path and setter of every number; absent ones that mean zero are put there."""
+    """Path and setter of every number; absent ones that mean zero are inserted."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -171,19 +171,22 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
     """Numbers of a table."""
     for key, value in table.items():
-        here = f"{path}.{key}"
+        path_of_key = f"{path}.{key}"
         if _is_number(value):
-            yield here, _setter(table, key)
+            yield path_of_key, _setter(table, key)
         elif isinstance(value, dict):
-            yield from _inside(here, value)
+            yield from _inside(path_of_key, value)
         elif isinstance(value, list) and len(value) in _AXES:
             axes = _AXES[len(value)]
             for i, name in enumerate(axes):
                 if _is_number(value[i]):
-                    yield f"{here}.{name}", _setter(value, i)
+                    yield f"{path_of_key}.{name}", _setter(value, i)
                 elif isinstance(value[i], list) and len(value[i]) == len(axes):
                     for j, other in enumerate(axes):
-                        yield f"{here}.{name}.{other}", _setter_of_two(value, i, j)
+                        yield (
+                            f"{path_of_key}.{name}.{other}",
+                            _setter_of_two(value, i, j),
+                        )
 
 
 def _is_number(value: object) -> bool:
@@ -192,7 +195,7 @@ def _is_number(value: object) -> bool:
 
 
 def _setter(place: Any, key: Any) -> Setter:
-    """What writes a number to its place."""
+    """The function that writes a number to its place."""
     return lambda number: place.__setitem__(key, number)
 
 

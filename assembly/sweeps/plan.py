@@ -1,4 +1,4 @@
-"""What a sweep asks, and at which points."""
+"""A sweep: a question and the points at which it is asked."""
 
 import hashlib
 import json
@@ -23,11 +23,11 @@ class Sweep:
     """A question and the points at which it is asked.
 
     Attributes:
-        question: what is asked at each point.
+        question: the quantities.
         targets: the postures.
-        values: of each number that varies, in the order of ``question.varied``.
+        values: of each varied parameter, in the order of ``question.varied``.
         draws: number of draws of errors; 0 for the robot's own.
-        command: that asked for it, for provenance; empty if none did.
+        command: of the command line, for provenance; empty without one.
         block_size: points solved and journalled together.
     """
 
@@ -84,37 +84,37 @@ class Sweep:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each number that varies and of each component of the postures."""
+        """Unit of each varied parameter and of each component of the postures."""
         robot = self.question.robot
         of_postures = {n: unit_of_target(n, robot) for n in self.targets.names}
         return {path: unit_of(path) for path in self.question.varied} | of_postures
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
-        """Where the numbers come from, as attributes of the data set."""
-        asked = self.question
-        said: dict[str, str | int] = {
-            "robot": asked.robot.name,
-            "robot_sha256": robot_hash(asked.robot),
+        """Provenance of the numbers, as attributes of the data set."""
+        question = self.question
+        provenance: dict[str, str | int] = {
+            "robot": question.robot.name,
+            "robot_sha256": robot_hash(question.robot),
             "program": f"forcefit {version('forcefit')}",
             "program_sha256": program_hash(),
-            "reading": asked.reading or "none",
-            "near": repr(asked.near),
+            "reading": question.reading or "none",
+            "near": repr(question.near),
         }
-        if asked.sources is not None:
-            drawn = {k: v for k, v in vars(asked.sources).items() if k != "robot"}
-            said |= {"seed": asked.seed, "errors_sha256": question_hash(drawn)}
+        if question.sources is not None:
+            drawn = {k: v for k, v in vars(question.sources).items() if k != "robot"}
+            provenance |= {"seed": question.seed, "errors_sha256": question_hash(drawn)}
         if self.command:
-            said["command"] = self.command
-        return said
+            provenance["command"] = self.command
+        return provenance
 
     @property
     def identity(self) -> dict[str, str]:
-        """What must be the same for two sweeps to share a journal."""
-        asked = self.question
-        said = {k: str(v) for k, v in self.provenance.items() if k != "command"}
+        """Values that must be equal for two sweeps to share a journal."""
+        question = self.question
+        identity = {k: str(v) for k, v in self.provenance.items() if k != "command"}
         values = [*self.values, *self.targets.values]
-        return said | {
+        return identity | {
             "points": " x ".join(
                 f"{d} {n}" for d, n in zip(self.dims, self.shape, strict=True)
             ),
@@ -122,11 +122,11 @@ class Sweep:
                 b"".join(v.tobytes() for v in values)
                 + json.dumps(self.targets.labels).encode()
             ).hexdigest(),
-            "asked": " ".join(map(str, record_type(asked).names or ())),
-            "wrenches": " ".join(asked.wrenches),
-            "strength": str(asked.strength),
-            "situation": str((asked.load, asked.gravity, dict(asked.under))),
+            "asked": " ".join(map(str, record_type(question).names or ())),
+            "wrenches": " ".join(question.wrenches),
+            "strength": str(question.strength),
+            "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # whatever is not named above
-            "question_sha256": question_hash(asked),
+            # all that is not named above
+            "question_sha256": question_hash(question),
         }

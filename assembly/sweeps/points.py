@@ -1,7 +1,7 @@
-"""Points of a sweep, solved: margins, energy, wrenches, errors, singularities.
+"""Solution of a sweep's points: margins, energy, wrenches, errors, singularities.
 
-Points are solved in blocks.  A point that has no answer says why in its ``status`` and
-``reason`` and stops nothing; no point's numbers depend on the others of its block.
+Points are solved in blocks.  A point without a solution has its reason in ``status``
+and ``reason`` and stops no other; no point's numbers depend on the others of its block.
 """
 
 from collections.abc import Iterator
@@ -11,30 +11,32 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import Energies, minimise_energies, zone_margins
+from assembly.batch.many_pose_errors import PoseErrors, bound_pose_errors
+from assembly.batch.many_postures import Energies, minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.linear.closure import closure_signs
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.singularity import KINDS, find_singularities
+from assembly.linear.zone import MARGIN_READINGS
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
-from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
-from assembly.sweeps.situations import (
-    assemble_situations,
+from assembly.sweeps.point_conditions import (
+    assemble_rows,
     is_loaded,
-    situations,
+    point_conditions,
 )
+from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 from stiffness.screws import screw_map
 
-_PAGE = 256  # draws made at a time
+_PAGE = 256  # draws generated together
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ class Points:
     """Some points of a sweep.
 
     Attributes:
-        values: (k, p) of the numbers that vary.
+        values: (k, p) of the varied parameters.
         rows: (k, components) of the postures.
         draws: (k,) number of the draw of errors; not used without sources.
     """
@@ -57,11 +59,11 @@ class Points:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """What was found at k points.
+class SolvedPoints:
+    """Results at k points.
 
     Attributes:
-        records: (k,) of :func:`record_type`; NaN where there is no answer.
+        records: (k,) of :func:`record_type`; NaN where there is no solution.
         texts: by name, those of :data:`TEXTS`, the text of points that have one.
     """
 
@@ -69,28 +71,30 @@ class Found:
     texts: dict[str, dict[int, str]]
 
 
-def solve_points(question: Question, points: Points) -> Found:
-    """Everything asked for, at some points.
+def solve_points(question: Question, points: Points) -> SolvedPoints:
+    """Solve some points of a sweep.
 
     Args:
-        question: what is asked.
-        points: neighbours in the sweep, so that those of one posture follow another.
+        question: the quantities.
+        points: consecutive in the sweep, so that those of one posture are too.
 
     Returns:
         Rows in the order of the points.
     """
     count = len(points.rows)
-    found = Found(np.zeros(count, record_type(question)), {t: {} for t in TEXTS})
-    for name in found.records.dtype.names or ():
+    solved = SolvedPoints(
+        np.zeros(count, record_type(question)), {t: {} for t in TEXTS}
+    )
+    for name in solved.records.dtype.names or ():
         if name != "status":
-            found.records[name] = np.nan
+            solved.records[name] = np.nan
     for run in _runs(points.values):
-        _solve_variant(question, points.part(run), found, run.start)
-    return found
+        _solve_variant(question, points.part(run), solved, run.start)
+    return solved
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:
-    """Stretches of equal rows."""
+    """Runs of equal rows."""
     steps = np.flatnonzero(np.any(rows[1:] != rows[:-1], axis=1)) + 1
     edges = [0, *steps.tolist(), len(rows)]
     for first, last in zip(edges, edges[1:], strict=False):
@@ -107,9 +111,9 @@ def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot
 
 
 def _solve_variant(
-    question: Question, points: Points, found: Found, first: int
+    question: Question, points: Points, solved: SolvedPoints, first: int
 ) -> None:
-    """Points of one design, into rows ``first`` .. of what is found."""
+    """Solve points of one design, into rows ``first`` .. of the results."""
     count = len(points.rows)
     runs = list(_runs(points.rows))
     starts = [run.start for run in runs]
@@ -119,53 +123,55 @@ def _solve_variant(
         place = place_many_joints if of_joints(question.components) else place_many
         postures, reasons = place(robot, goals)
     except BadInput as error:
-        _fail(found, range(first, first + count), "invalid robot", str(error))
+        _fail(solved, range(first, first + count), "invalid robot", str(error))
         return
-    reached = []
+    reachable = []
     for run, posture, reason in zip(runs, postures, reasons, strict=True):
         rows = range(first + run.start, first + run.stop)
         if posture is None:
-            _fail(found, rows, "out of reach", reason)
+            _fail(solved, rows, "out of reach", reason)
         else:
-            reached += [(row, posture) for row in rows]
-    if not reached:
+            reachable += [(row, posture) for row in rows]
+    if not reachable:
         return
-    at = np.array([row for row, _ in reached])
-    some = [posture for _, posture in reached]
+    rows_reached = np.array([row for row, _ in reachable])
+    postures_reached = [posture for _, posture in reachable]
     errors = None
     if question.sources is not None:
-        errors = _errors(question, points.draws[at - first])
-    _solve_or_split(question, robot, perfect, some, errors, found, at)
+        errors = _errors(question, points.draws[rows_reached - first])
+    _solve_or_split(
+        question, robot, perfect, postures_reached, errors, solved, rows_reached
+    )
 
 
 def _solve_or_split(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
-    errors: NDArray | None, found: Found, rows: NDArray,
+    errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Points whose posture exists; where one breaks the others', one at a time."""
+    """Solve points whose posture exists; one by one where a solver fails for all."""
     try:
-        _solve_reached(question, robot, perfect, postures, errors, found, rows)
+        _solve_reached(question, robot, perfect, postures, errors, solved, rows)
     except (np.linalg.LinAlgError, SolverFailed) as error:
         if len(rows) == 1:
             row = int(rows[0])
-            _fail(found, range(row, row + 1), "solver failed", str(error))
+            _fail(solved, range(row, row + 1), "solver failed", str(error))
             return
         for i in range(len(rows)):
             one = slice(i, i + 1)
-            own = None if errors is None else errors[one]
+            own_errors = None if errors is None else errors[one]
             _solve_or_split(
-                question, robot, perfect, postures[one], own, found, rows[one]
+                question, robot, perfect, postures[one], own_errors, solved, rows[one]
             )
 
 
-def _fail(found: Found, rows: range, status: str, reason: str) -> None:
-    """Points without an answer."""
-    found.records["status"][rows.start : rows.stop] = STATUSES.index(status)
-    found.texts["reason"].update(dict.fromkeys(rows, reason))
+def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
+    """Record the status of points without a solution."""
+    solved.records["status"][rows.start : rows.stop] = STATUSES.index(status)
+    solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
 def _errors(question: Question, draws: NDArray) -> NDArray:
-    """(k, n, 6) [rad, m] the errors of some draws."""
+    """(k, n, 6) [rad, m] errors of some draws."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
 
@@ -180,67 +186,70 @@ def _page(question: Question, page: int) -> NDArray:
 
 def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
-    errors: NDArray | None, found: Found, rows: NDArray,
+    errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Points whose posture exists; most of what fails is a status already."""
-    out = found.records
+    """Solve points whose posture exists; most failures become a status here."""
+    out = solved.records
     T = np.array([posture.transforms for posture in postures])
-    _note_singularities(question, robot, T, found, rows)
-    here = situations(question, robot, postures, errors)
-    T, off = here.transforms, here.mismatch
+    _note_singularities(question, robot, T, solved, rows)
+    conditions = point_conditions(question, robot, postures, errors)
+    T, mismatch = conditions.transforms, conditions.mismatch
     if robot.effects:
-        robot, errors = here.robot, here.errors
+        robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     failed: dict[int, str] = {}
-    for key, compliant in (("margin", "rigid"), ("margin_free", "free")):
-        zone = zone_margins(robot, T, compliant, off, errors)
+    for key, compliant in MARGIN_READINGS.items():
+        zone = zone_margins(robot, T, compliant, mismatch, errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
     wrenches = None
-    if is_loaded(here):
-        energies, wrenches = assemble_situations(here)
+    if is_loaded(conditions):
+        energies, wrenches = assemble_rows(conditions)
     else:
-        energies = minimise_energies(robot, T, errors, off)
-    good = []
+        energies = minimise_energies(robot, T, errors, mismatch)
+    ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
         if i in failed:
             status, reason = "solver failed", failed[i]
         if status == "ok":
-            good.append(i)
+            ok.append(i)
         else:
-            _fail(found, range(row, row + 1), status, reason)
-    at = rows[good]
+            _fail(solved, range(row, row + 1), status, reason)
+    rows_ok = rows[ok]
     for key, values in (
         ("energy", energies.energy), ("platform_screw", energies.platform_screw),
         ("closure_residual", energies.closure_residual),
         ("clearance_excess", energies.clearance_excess),
         ("duality_gap", energies.gap),
     ):  # fmt: skip
-        out[key][at] = values[good]
-    if question.reads_otherwise and good:
-        out["reading"][at] = read(here.take(good), energies.platform_screw[good])
+        out[key][rows_ok] = values[ok]
+    if question.reads_otherwise and ok:
+        out["reading"][rows_ok] = read(conditions.take(ok), energies.platform_screw[ok])
     if wrenches is None and (question.wrenches or question.strength is not None):
         wrenches = _wrenches(robot, T, energies)
     if question.wrenches and wrenches is not None:
         chosen = [robot.index(name) for name in question.wrenches]
-        out["wrench"][at] = wrenches[good][:, chosen]
+        out["wrench"][rows_ok] = wrenches[ok][:, chosen]
     if question.strength is not None and wrenches is not None:
-        stress = peak_stresses(robot, wrenches[good])
-        out["stress"][at] = stress
+        stress = peak_stresses(robot, wrenches[ok])
+        out["stress"][rows_ok] = stress
         with np.errstate(divide="ignore"):
-            out["safety"][at] = question.strength / stress.max(axis=1)
-    if question.play_alone:
-        _bound_play(perfect, T, off, found, rows)
-    if question.reading is not None and good:
-        _bound(question, robot, T, errors, off, energies, found, rows)
+            out["safety"][rows_ok] = question.strength / stress.max(axis=1)
+    if question.clearance_only:
+        _bound_clearance_only(perfect, T, mismatch, solved, rows)
+    if question.reading is not None and ok:
+        bounds = bound_pose_errors(
+            robot, T, question.reading, errors, mismatch, energies
+        )
+        _record_bounds(bounds, solved, rows)
     if question.linearisation:
-        for i in good:
-            _compare_finite(here, i, found, int(rows[i]))
+        for i in ok:
+            _compare_finite(conditions, i, solved, int(rows[i]))
 
 
 def _note_singularities(
-    question: Question, robot: Robot, T: NDArray, found: Found, rows: NDArray
+    question: Question, robot: Robot, T: NDArray, solved: SolvedPoints, rows: NDArray
 ) -> None:
     """Distances to singularities, and the names of those that are near."""
     # all draws of a posture share its singularities
@@ -250,10 +259,10 @@ def _note_singularities(
     distances = np.stack([getattr(near, kind) for kind in KINDS], axis=1)
     condition = near.condition
     for i, run in enumerate(runs):
-        found.records["singular_distance"][rows[run]] = distances[i]
-        found.records["condition"][rows[run]] = condition[i]
+        solved.records["singular_distance"][rows[run]] = distances[i]
+        solved.records["condition"][rows[run]] = condition[i]
         if names[i]:
-            found.texts["near_singularity"].update(
+            solved.texts["near_singularity"].update(
                 dict.fromkeys(rows[run].tolist(), names[i])
             )
 
@@ -268,51 +277,49 @@ def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:
     return np.einsum("kfji,kfj->kfi", paths, at_platform)
 
 
-def _bound(
-    question: Question, robot: Robot, T: NDArray, errors: NDArray | None, off: NDArray,
-    energies: Energies, found: Found, rows: NDArray,
-) -> None:  # fmt: skip
-    """Bounds of (27) where (22) has an answer; their failure is the point's."""
-    bounds = bound_pose_errors(
-        robot, T, question.reading or "", errors, off, energies
-    )  # fmt: skip
-    out = found.records
+def _record_bounds(bounds: PoseErrors, solved: SolvedPoints, rows: NDArray) -> None:
+    """Bounds of (27) where (22) has a solution; their failure is the point's."""
+    out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
         if bounds.status[i] != "ok":
-            _fail(found, range(row, row + 1), bounds.status[i], bounds.reason[i])
+            _fail(solved, range(row, row + 1), bounds.status[i], bounds.reason[i])
             continue
         out["rotation_error"][row] = bounds.rotation_error[i]
         out["translation_error"][row] = bounds.translation_error[i]
 
 
-def _bound_play(
-    perfect: Robot, T: NDArray, off: NDArray, found: Found, rows: NDArray
+def _bound_clearance_only(
+    perfect: Robot, T: NDArray, mismatch: NDArray, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Bounds of (27) by play alone, once a posture."""
+    """Bounds of (27) by clearances alone, once for each posture."""
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
-    bounds = bound_pose_errors(perfect, T[starts], "frozen", None, off[starts])
+    bounds = bound_pose_errors(perfect, T[starts], "frozen", None, mismatch[starts])
     for i, run in enumerate(runs):
-        found.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
-        found.records["translation_error_play"][rows[run]] = bounds.translation_error[i]
+        solved.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
+        solved.records["translation_error_play"][rows[run]] = bounds.translation_error[
+            i
+        ]
         if bounds.status[i] != "ok":
             for row in rows[run].tolist():
                 reason = f"play alone: {bounds.reason[i]}"
-                found.texts["reason"].setdefault(row, reason)
+                solved.texts["reason"].setdefault(row, reason)
 
 
-def _compare_finite(here: Conditions, i: int, found: Found, row: int) -> None:
-    """What the linear closures cost at a point."""
-    out = found.records
+def _compare_finite(
+    conditions: Conditions, i: int, solved: SolvedPoints, row: int
+) -> None:
+    """Linearisation error at a point."""
+    out = solved.records
     try:
-        exact = assemble_row(replace(here, exact=True), i)
+        exact = assemble_row(replace(conditions, exact=True), i)
         assert isinstance(exact, ExactAssembly)
-        gap = exact.linearisation_error
+        difference = exact.linearisation_error
     except (SolverFailed, CannotAssemble) as error:
-        # the linear answer stands: only what it is worth is not known
-        found.texts["reason"][row] = f"linearisation error unknown: {error}"
+        # the linear solution remains valid: only its error is unknown
+        solved.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
-    out["linearisation_rotation"][row] = np.linalg.norm(gap.rotation)
-    out["linearisation_translation"][row] = np.linalg.norm(gap.translation)
-    out["linearisation_energy"][row] = gap.relative_energy
+    out["linearisation_rotation"][row] = np.linalg.norm(difference.rotation)
+    out["linearisation_translation"][row] = np.linalg.norm(difference.translation)
+    out["linearisation_energy"][row] = difference.relative_energy

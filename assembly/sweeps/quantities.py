@@ -1,4 +1,4 @@
-"""What a sweep may ask at its points, and the table of numbers that it gets."""
+"""The quantities of a sweep: what may be asked at its points, and their table."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -25,21 +25,21 @@ TEXTS = ("reason", "near_singularity")
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked at every point; workers are sent this once.
+    """The quantities asked for at every point; sent to each worker once.
 
     Attributes:
-        robot: with its errors, which stand where none are drawn.
-        design: the numbers it is written in, if some vary; else None.
-        varied: paths of the numbers that vary.
+        robot: with its errors, which are used where none are drawn.
+        design: its parameters, if some vary; else None.
+        varied: paths of the varied parameters.
         components: of the postures, see :mod:`assembly.sweeps.targets`.
         sources: of drawn errors; None for the robot's own.
         seed: of the draws.
         reading: of problem (27), or None to leave its bounds out.
-        play_alone: bound (27) also for the robot without errors: by play alone.
-        wrenches: frames whose wrench is kept.
+        clearance_only: bound (27) also for the robot without errors.
+        wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
-        strength: [Pa] yield strength of the links; stress and safety are then found.
+        strength: [Pa] yield strength of the links; stress and safety are then computed.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
@@ -52,7 +52,7 @@ class Question:
     sources: "ErrorSources | None" = None
     seed: int = 0
     reading: str | None = None
-    play_alone: bool = False
+    clearance_only: bool = False
     wrenches: tuple[str, ...] = ()
     linearisation: bool = False
     near: float = 0.02
@@ -65,7 +65,7 @@ class Question:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether a measuring device reads something else than the platform's screw."""
+        """Whether readings of a measuring device differ from the screw."""
         return any(name in self.robot.effects for name in ("registration", "drift"))
 
 
@@ -118,11 +118,11 @@ def variables(question: Question) -> dict[str, Variable]:
     }  # fmt: skip
     if question.reads_otherwise:
         table["reading"] = Variable(screw, "rad, m", "what a measuring device reads")
-    for suffix, said in _bound_suffixes(question):
+    for suffix, condition in _bound_suffixes(question):
         for part, unit in (("rotation", "rad"), ("translation", "m")):
             table[f"{part}_error{suffix}"] = Variable(
                 bound, unit, f"certified bounds of the largest {part} error, eq. (27)"
-                + said,
+                + condition,
             )  # fmt: skip
     if question.wrenches:
         table["wrench"] = Variable(
@@ -148,12 +148,12 @@ def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
     """Suffix and meaning of each pair of bounds asked for."""
     if question.reading is not None:
         yield "", f", {question.reading}"
-    if question.play_alone:
+    if question.clearance_only:
         yield "_play", ", frozen, by play alone: without errors"
 
 
 def record_type(question: Question) -> np.dtype:
-    """A point as a row of numbers: its quantities, and ``status`` as a code."""
+    """Type of a point's record: its quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in variables(question).items()

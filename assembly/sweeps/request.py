@@ -1,4 +1,4 @@
-"""A sweep asked for in words, checked before any work; what it found, summed up."""
+"""A sweep from the options of its command, checked first; and its summary."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.acting import check_covariates
+from assembly.effects.robot_effects import check_covariates
 from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
@@ -16,8 +16,8 @@ from assembly.model.robot import Robot
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
+from assembly.sweeps.point_conditions import is_loaded, point_conditions
 from assembly.sweeps.quantities import Question
-from assembly.sweeps.situations import is_loaded, situations
 from assembly.sweeps.targets import (
     Targets,
     grid_targets,
@@ -51,7 +51,7 @@ def ask_sweep(
     gravity: Sequence[float] = (0.0,) * 3,
     under: Mapping[str, float] | None = None,
 ) -> Sweep:
-    """The sweep that options of ``forcefit assembly sweep`` ask for.
+    """The sweep of the options of ``forcefit assembly sweep``, by their names.
 
     Args:
         robot: a robot file, or a built-in name.
@@ -59,14 +59,14 @@ def ask_sweep(
         poses: a table of postures.
         vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``.
         errors: file that says how errors are distributed, see docs/statistics.md.
-        draws: how many are drawn.
+        draws: number of draws.
         seed: of the draws.
         reading: of problem (27), or ``"none"``.
         play_alone: bound (27) also without errors.
-        wrench: frames whose wrench is kept.
+        wrench: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
-        yield_strength: [Pa] of the links, to find their stress and safety.
+        yield_strength: [Pa] of the links, for their stress and safety.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
@@ -77,11 +77,11 @@ def ask_sweep(
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
     """
-    said = {k: v for k, v in locals().items() if k != "robot"}
+    options = {k: v for k, v in locals().items() if k != "robot"}
     machine = load_robot(robot)
     under = dict(under or {})
     check_covariates(machine, under)
-    said |= {
+    options |= {
         "load": _assigned((name.lower() for name in WRENCH), load),
         "gravity": _assigned("xyz", gravity),
         "under": ",".join(f"{k}={v:g}" for k, v in under.items()) or None,
@@ -117,20 +117,34 @@ def ask_sweep(
             raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")
     targets = _targets(machine, grid, poses)
     question = Question(
-        machine, design, tuple(varied), targets.names, sources, seed,
-        None if reading == "none" else reading, play_alone, tuple(wrench),
-        linearisation, near, yield_strength, tuple(load), tuple(gravity), under,
-    )  # fmt: skip
+        machine,
+        design=design,
+        varied=tuple(varied),
+        components=targets.names,
+        sources=sources,
+        seed=seed,
+        reading=None if reading == "none" else reading,
+        clearance_only=play_alone,
+        wrenches=tuple(wrench),
+        linearisation=linearisation,
+        near=near,
+        strength=yield_strength,
+        load=tuple(load),
+        gravity=tuple(gravity),
+        under=under,
+    )
     _check_readings(question)
     return Sweep(
-        question, targets, tuple(varied.values()), draws or 0, _command(robot, said)
+        question, targets, tuple(varied.values()), draws or 0, _command(robot, options)
     )
 
 
 def _check_readings(question: Question) -> None:
-    """Refuse to bound the pose error of a loaded robot: (27) has no load."""
-    home = situations(question, question.robot, [home_posture(question.robot)], None)
-    if is_loaded(home) and (question.reading or question.play_alone):
+    """Refuse bounds of the pose error of a loaded robot: (27) has no load."""
+    home = point_conditions(
+        question, question.robot, [home_posture(question.robot)], None
+    )
+    if is_loaded(home) and (question.reading or question.clearance_only):
         raise BadInput(
             "--reading: the robot is loaded (--load, --gravity or an effect), and the "
             "bounds of the pose error are those of an unloaded one; expected "
@@ -146,8 +160,8 @@ def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Target
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Values by path; refused if a robot file could not say the least and largest."""
-    found: dict[str, NDArray] = {}
+    """Values by path; the least and the largest must be valid in a robot file."""
+    values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
         path, equals, specs = (piece.strip() for piece in text.partition("="))
@@ -166,12 +180,12 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
             raise BadInput(f"--vary {path}: found a value twice")
         for value in (float(values.min()), float(values.max())):
             design.check({path: value})
-        found[path] = values
-    return found
+        values_by_path[path] = values
+    return values_by_path
 
 
 def _command(robot: str | Path, options: Mapping[str, Any]) -> str:
-    """The command that asks for the same numbers, options at their default left out."""
+    """The command of the same sweep, options at their default left out."""
     default = {"seed": 1, "reading": "frozen", "near": 0.02}
     words = ["forcefit", "assembly", "sweep", str(robot)]
     for key, value in options.items():
@@ -193,14 +207,14 @@ def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
 
 
 def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
-    """What a sweep found, for machines.
+    """Summary of a sweep as plain values.
 
     Args:
         data: of a sweep.
 
     Returns:
-        Axes, how many points have each status, and of each quantity the least, median
-        and largest finite value with its unit; None where no value is finite.
+        Axes, the number of points of each status, and of each quantity the least,
+        median and largest finite value with its unit; None where no value is finite.
     """
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     axes = {str(d): data.sizes[d] for d in data["status"].dims}

@@ -1,8 +1,8 @@
-"""Many postures, many draws of errors, many designs: one question, a data set.
+"""A sweep over postures, draws of errors and designs, to one data set.
 
-A sweep's points are its designs x postures x draws, draws innermost, cut into blocks
-that are solved, journalled and written one after the other, in any order and by
-anyone: no number depends on who solved it or what was solved before.
+A sweep's points are its designs x postures x draws, draws innermost.  They are divided
+into blocks that are solved and journalled in any order, by any process: no number
+depends on the process or on what was solved before.
 """
 
 import signal
@@ -21,7 +21,7 @@ from assembly.model.robot import Robot
 from assembly.sweeps.dataset import sweep_dataset, write_sweep
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.plan import Sweep
-from assembly.sweeps.points import Found, solve_points
+from assembly.sweeps.points import SolvedPoints, solve_points
 from assembly.sweeps.quantities import TEXTS, Question, record_type
 from assembly.sweeps.targets import grid_targets
 
@@ -29,11 +29,13 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# yields each block's number with what was found there, in any order
-Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, Found]]]
+# yields each block's number with its results, in any order
+Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
-def solve_here(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found]]:
+def solve_here(
+    sweep: Sweep, blocks: Iterable[int]
+) -> Iterator[tuple[int, SolvedPoints]]:
     """Solve blocks one after the other, on one thread."""
     # small matrices: more threads take longer, and sum in another order
     with threadpool_limits(1), _interrupts_noted() as noted:
@@ -45,7 +47,7 @@ def solve_here(sweep: Sweep, blocks: Iterable[int]) -> Iterator[tuple[int, Found
 
 @contextmanager
 def _interrupts_noted() -> Generator[list[int], None, None]:
-    """Ctrl-C is noted, so that a block is finished; a second one stops at once."""
+    """The first Ctrl-C is recorded, to finish the block; a second stops at once."""
     noted: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield noted
@@ -70,20 +72,19 @@ def run_sweep(
     solve: Solver = solve_here,
     held: ExitStack | None = None,
 ) -> None:
-    """Solve a sweep into a NetCDF file, going on from its journal if there is one.
+    """Solve a sweep into a NetCDF file, resumed from its journal if there is one.
 
-    The journal, ``<path>.journal``, holds every finished block from the first on; kill
-    the program when you like, the same sweep goes on from there and ends in the same
-    file, byte for byte.
+    The journal, ``<path>.journal``, holds every finished block.  After a kill the same
+    sweep resumes from it and writes the same file, byte for byte.
 
     Args:
-        sweep: what to solve.
-        path: of the file; it appears when it is complete, and the journal goes.
+        sweep: to be solved.
+        path: of the file; it appears when it is complete, and the journal is removed.
         progress: called at the start and after each block with the number of points
             that are in the journal, and of all.
         solve: solves blocks: :func:`solve_here`, or :mod:`assembly.sweeps.cluster`.
-        held: keeps the journal until it is closed, for what is still made of the
-            file: killed meanwhile, the same sweep has nothing to solve again.
+        held: keeps the journal until it is closed, while further results are made from
+            the file: after a kill the same sweep has no block to solve again.
 
     Raises:
         BadInput: the journal is another sweep's, another run holds it, or a file
@@ -99,8 +100,8 @@ def run_sweep(
         done = sum(_length(sweep, block) for block in journal.places)
         progress(done, sweep.size)
         waiting = [b for b in range(sweep.blocks) if b not in journal.places]
-        for block, found in solve(sweep, waiting):
-            journal.add(block, found.records, found.texts)
+        for block, solved in solve(sweep, waiting):
+            journal.add(block, solved.records, solved.texts)
             done += _length(sweep, block)
             progress(done, sweep.size)
         write_sweep(sweep, journal.read, path)
@@ -108,7 +109,7 @@ def run_sweep(
 
 
 def journal_path(path: Path | str) -> Path:
-    """Where the journal of a file stands."""
+    """Path of the journal of a file."""
     path = Path(path)
     return path.with_name(path.name + ".journal")
 
@@ -124,7 +125,7 @@ def sweep_in_memory(
     """Solve a sweep without a file.
 
     Args:
-        sweep: what to solve.
+        sweep: to be solved.
         progress: called after each block with the number of points done, and of all.
 
     Returns:
@@ -132,12 +133,12 @@ def sweep_in_memory(
     """
     records = np.zeros(sweep.size, record_type(sweep.question))
     texts: dict[str, dict[int, str]] = {name: {} for name in TEXTS}
-    for block, found in solve_here(sweep, range(sweep.blocks)):
+    for block, solved in solve_here(sweep, range(sweep.blocks)):
         first = block * sweep.block_size
-        records[first : first + len(found.records)] = found.records
+        records[first : first + len(solved.records)] = solved.records
         for name in TEXTS:
-            texts[name] |= {first + i: t for i, t in found.texts[name].items()}
-        progress(first + len(found.records), sweep.size)
+            texts[name] |= {first + i: t for i, t in solved.texts[name].items()}
+        progress(first + len(solved.records), sweep.size)
     return sweep_dataset(sweep, records, texts)
 
 
@@ -161,7 +162,7 @@ def sweep_poses(
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
         ``platform_screw``, with a reading ``rotation_error`` and ``translation_error``
         (lower and upper), certificates, distances to singularities and ``status``; NaN
-        where there is no answer, and the status then says why.
+        where there is no solution, with the reason as status.
     """
     targets = grid_targets(axes)
     question = Question(robot, components=targets.names, reading=reading)
@@ -169,5 +170,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Bool over the grid: where the margin says it goes together rigidly."""
+    """Bool over the grid: inside the assembly zone by the margin."""
     return np.asarray(data[key] <= ASSEMBLABLE)

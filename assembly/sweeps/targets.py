@@ -1,4 +1,4 @@
-"""Where a sweep goes: a grid of poses or joint coordinates, or a list of them.
+"""The postures of a sweep: a grid of poses or joint coordinates, or a list of them.
 
 A grid has an axis for each component named; a list has one axis, ``posture``.  Names
 are ``tx ty tz rx ry rz`` for the platform's pose, ``q.<frame>`` for the coordinate of
@@ -17,7 +17,7 @@ from assembly.kinematics.posture import POSE
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_text
 
-LARGEST_GRID = 10_000_000  # points; more is a slip of the step
+LARGEST_GRID = 10_000_000  # points; more is a mistaken step
 _JOINT = "q."
 
 
@@ -58,7 +58,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """What :mod:`assembly.kinematics.posture` is asked for.
+    """Poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
 
     Args:
         names: of the components, of one kind.
@@ -146,7 +146,7 @@ def parse_values(whose: str, spec: str) -> NDArray:
     """Values written ``start:stop:step``, or as one number.
 
     Args:
-        whose: they are, for messages.
+        whose: place of the text, for messages.
         spec: the text.
 
     Returns:
@@ -193,9 +193,9 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
         row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))
     ]
     if len(rows) < 2:
-        found = "only a header" if rows else "nothing"
+        content = "only a header" if rows else "nothing"
         raise BadInput(
-            f"{path}: found {found}; expected one and a row for each posture"
+            f"{path}: found {content}; expected one and a row for each posture"
         )
     header = [cell.strip() for cell in rows[0][1]]
     names = [cell.removeprefix("pose.") for cell in header if cell != "id"]

@@ -64,7 +64,9 @@ def frame_expansion(campaign: Campaign, coefficient: float) -> NDArray:
     """
     q, T = campaign.coordinates, campaign.transforms
     warm = campaign.covariates["temperature"]
-    here = as_declared(Posture(campaign.robot, q, T, 0.0), temperature=warm)
+    here = as_declared(
+        Posture(campaign.robot, q, T, 0.0), covariates={"temperature": warm}
+    )
     grown = apply_effects(here, {"thermal_expansion": {"frame": coefficient}})
     return predict(grown).deviation[:, 5]
 

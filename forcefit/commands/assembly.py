@@ -24,6 +24,8 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.progress import one_thread
+from forcefit.commands.statistics import statistics, tolerances
+from forcefit.commands.sweep import plot, sweep
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import (
     PIXELS,
@@ -46,17 +48,17 @@ def solve(
     json: JsonOption = None,
 ) -> None:
     """Close at least energy: pose error, energy, wrenches, margin."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import solution_of, solution_text
 
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
     with one_thread():
-        results = solution_of(acting.posture, acting.load, acting.gravity)
-    if results["status"] == "ok" and acting.conditions.reads_otherwise:
-        results["reading"] = acting.reading(results["platform_screw"])
+        results = solution_of(applied.posture, applied.load, applied.gravity)
+    if results["status"] == "ok" and applied.conditions.reads_otherwise:
+        results["reading"] = applied.reading(results["platform_screw"])
     write_json(results, json)
     if json != "-":
         print(solution_text(results))
@@ -71,14 +73,14 @@ def zone(
     joint: JointOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Whether the robot goes together by play alone; the margin."""
+    """Whether clearances alone let the robot assemble; the margin."""
     from assembly.report.results import zone_of, zone_text
 
-    found = zone_of(posture_of(robot, pose, joint))
-    write_json({"robot": robot, "zone": found}, json)
+    margins = zone_of(posture_of(robot, pose, joint))
+    write_json({"robot": robot, "zone": margins}, json)
     if json != "-":
-        print(zone_text(found))
-    if found["status"] != "ok":
+        print(zone_text(margins))
+    if margins["status"] != "ok":
         raise typer.Exit(1)
 
 
@@ -93,15 +95,15 @@ def exact(
     json: JsonOption = None,
 ) -> None:
     """Close the robot with finite motions: closures hold exactly."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import exact_of, exact_text
 
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under), finite=True,
     )  # fmt: skip
     with one_thread():
-        results = exact_of(acting.posture, acting.load, acting.gravity)
+        results = exact_of(applied.posture, applied.load, applied.gravity)
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -143,10 +145,10 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.linear.reach import READINGS
     from assembly.model.largest import LARGEST_LENGTH
-    from assembly.report.results import pose_error_of, pose_error_text
+    from assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in reading or ():
         if name not in READINGS:
@@ -162,13 +164,14 @@ def error(
             option = "--" + key.replace("_", "-")
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
-    acting = act(
+    applied = apply_robot_effects(
         declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
         parse_covariates(under),
     )  # fmt: skip
     with one_thread():
         results = pose_error_of(
-            acting.posture, reading or None, load=acting.load, gravity=acting.gravity,
+            applied.posture, reading or None,
+            load=applied.load, gravity=applied.gravity,
             point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
             direction=parse_direction(direction), **options,
         )  # fmt: skip
@@ -206,12 +209,12 @@ def show(
         ),
     ] = None,
 ) -> None:
-    """Draw the nominal and the forced robot, and its errors."""
+    """Plot the nominal and the forced robot, and its errors."""
     from assembly.linear.energy import CannotAssemble, solve_assembly
     from assembly.linear.error_body import PARTS
     from assembly.linear.reach import READINGS
     from assembly.linear.reduction import FreeMotion
-    from assembly.report.plot import draw_assembly
+    from assembly.report.plot import plot_assembly
     from assembly.report.results import failure_status, remark_lines
     from assembly.solvers.conic import SolverFailed
 
@@ -238,9 +241,9 @@ def show(
     for line in remark_lines(posture.robot.remarks):
         print(line)
     try:
-        answer = solve_assembly(posture, wrench)
-        plotter = draw_assembly(
-            answer, exaggeration, error_body, reading, output is not None
+        assembly = solve_assembly(posture, wrench)
+        plotter = plot_assembly(
+            assembly, exaggeration, error_body, reading, output is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
@@ -250,3 +253,7 @@ def show(
     else:
         save_pixels(plotter.screenshot(return_img=True), output)
     plotter.close()
+
+
+for command in (statistics, tolerances, sweep, plot):
+    app.command()(command)

@@ -1,4 +1,4 @@
-"""What the command line says about a beam."""
+"""The options of a beam."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from stiffness.link import LinkStiffness
 
 @dataclass(frozen=True)
 class BeamOptions:
-    """What the command line says about a beam; absent values are None."""
+    """The options of a beam; absent values are None."""
 
     young: float
     poisson: float
@@ -31,7 +31,7 @@ class BeamOptions:
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
     def declared(self) -> dict[str, float]:
-        """The section's lengths or constants by name; an error that says what lacks."""
+        """The section's lengths or constants by name; errors name what is missing."""
         plain = {
             "radius": self.radius,
             "inner_radius": self.inner_radius,
@@ -63,7 +63,7 @@ class BeamOptions:
         return given
 
     def section(self) -> Section:
-        """The section that the options describe, or an error that says what lacks."""
+        """The section of the options; an error names what is missing."""
         _, nu = self.material()
         return declared_section(self.declared(), nu)
 
@@ -95,6 +95,6 @@ class BeamOptions:
 
 
 def beam_name(theory: str) -> str:
-    """What a result of a beam theory is called."""
+    """Name of a result of a beam theory."""
     names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
     return names[theory]

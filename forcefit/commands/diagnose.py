@@ -44,27 +44,29 @@ def diagnose(
             check_writable(path, kind)
     data = read_campaign(campaign)
     with progress_bars() as update:
-        found = trace(data, finite=finite_motions, update=update)
+        diagnosis = trace(data, finite=finite_motions, update=update)
     tally = None
     if calibrate:
         from validation.diagnosis.verdict import calibrate as simulate
 
         with progress_bars() as update:
             tally = simulate(
-                found.screen, found.best, calibrate,
+                diagnosis.screen, diagnosis.best, calibrate,
                 lambda done, n: update("simulated campaigns", done, n),
             )  # fmt: skip
-    write_json(results.table(found, tally), json)
+    write_json(results.table(diagnosis, tally), json)
     if json != "-":
-        print(results.text(found, tally))
+        print(results.text(diagnosis, tally))
     if report is not None:
         from validation.diagnosis.report import write_report
 
-        write_report(found, report, tally)
+        write_report(diagnosis, report, tally)
     if save is not None:
-        if found.verdict != "explained":
-            typer.echo(f"{save}: not written, the verdict is {found.verdict}", err=True)
+        if diagnosis.verdict != "explained":
+            typer.echo(
+                f"{save}: not written, the verdict is {diagnosis.verdict}", err=True
+            )
             raise typer.Exit(1)
         from assembly.files.robot_file import write_robot
 
-        write_robot(results.corrected(found), save)
+        write_robot(results.corrected(diagnosis), save)

@@ -113,7 +113,7 @@ def generate(
     """Measure a simulated machine with effects its file lacks.
 
     Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints are tight
-    unless their play is hidden.
+    unless a clearance is hidden.
     """
     import numpy as np
 
@@ -136,9 +136,16 @@ def generate(
         )
     wanted, measured = parse_effects(effect), parse_point(point)
     design = CampaignDesign(
-        configurations, rows, reach, stroke, force, loads, temperature, command,
-        humidity,
-    )  # fmt: skip
+        configurations=configurations,
+        rows=rows,
+        reach=reach,
+        size=stroke,
+        load=force,
+        levels=loads,
+        temperature=temperature,
+        command=command,
+        humidity=humidity,
+    )
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
     check_folder(folder)
     check_json(str(truth))
@@ -148,10 +155,10 @@ def generate(
         )
     machine = without_clearance(load_robot(robot))
     if error_size:
-        drawn = np.random.default_rng(seed + 1).uniform(
+        errors = np.random.default_rng(seed + 1).uniform(
             -error_size, error_size, (len(machine.frames), 6)
         )
-        machine = machine.with_errors(drawn * np.repeat([1.0, 0.5], 3))
+        machine = machine.with_errors(errors * np.repeat([1.0, 0.5], 3))
     try:
         with progress_bars() as update:
             campaign = generate_campaign(

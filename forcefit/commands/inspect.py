@@ -26,7 +26,7 @@ def inspect(campaign: CampaignArgument, json: JsonOption = None) -> None:
 
     data = read_campaign(campaign)
     with progress_bars() as update:
-        found = inspect_campaign(data, lambda done, n: update("effects", done, n))
-    write_json(found.table(), json)
+        inspection = inspect_campaign(data, lambda done, n: update("effects", done, n))
+    write_json(inspection.table(), json)
     if json != "-":
-        print(inspection_text(found))
+        print(inspection_text(inspection))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.stiffness_options import Json
+from forcefit.commands.options import JsonOption
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
@@ -17,7 +17,7 @@ Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
 def build(
     spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
     workers: Annotated[int, typer.Option(help="Processes.")] = 1,
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """Compute the entries of a build file that are not there yet."""
     from rich.console import Console
@@ -41,7 +41,7 @@ def build(
 
 
 @library.command(name="list")
-def list_entries(folder: Folder, json: Json = None) -> None:
+def list_entries(folder: Folder, json: JsonOption = None) -> None:
     """The entries of a library and how good they are."""
     from stiffness.report.library import read_library
 
@@ -57,7 +57,7 @@ def list_entries(folder: Folder, json: Json = None) -> None:
 def look_up_entry(
     folder: Folder,
     at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E between a library's entries, interpolated, with its error."""
     from forcefit.commands.options import parse_assignments

@@ -1,6 +1,6 @@
-"""Options that several commands share, and what is read from their texts.
+"""Options that several commands share, and the parsing of their texts.
 
-Every mistake names its option.
+Every error message names its option.
 """
 
 import math
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def _built_in_names(incomplete: str) -> list[str]:
-    """What a shell offers beside files."""
+    """Names that a shell completes, beside files."""
     from assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
@@ -81,7 +81,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 
     Args:
         texts: such as ``["fx=10,mz=1"]``; components not named are zero.
-        option: whose they are, for messages.
+        option: their name, for messages.
 
     Returns:
         Six numbers [N m, N].
@@ -102,9 +102,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 def _components(
     texts: list[str], option: str, names: Sequence[str], largest: float
 ) -> dict[str, float]:
-    """Numbers given by component, of a known few."""
-    pass
-
+    """Numbers given by component, all of known names."""
     given = parse_assignments(texts, option, largest)
     for name in given:
         if name not in names:
@@ -123,7 +121,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
 
     Args:
         texts: such as ``["z=-9.81"]``.
-        option: whose they are, for messages.
+        option: their name, for messages.
 
     Returns:
         The numbers along x, y and z.
@@ -134,8 +132,6 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     if not texts:
         return None
     from assembly.model.largest import LARGEST_LENGTH
-
-    pass
 
     given = parse_assignments(texts, option, LARGEST_LENGTH)
     for name in given:
@@ -184,23 +180,23 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
         The posture, of the robot as the effects of its file make it.
 
     Raises:
-        BadInput: an effect loads the robot, which the command asking does not know.
+        BadInput: an effect loads the robot, and the command supports no loads.
     """
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
 
-    acting = act(declared_posture(robot, pose, joint))
-    if acting.gravity is not None or acting.load.any():
+    applied = apply_robot_effects(declared_posture(robot, pose, joint))
+    if applied.gravity is not None or applied.load.any():
         raise BadInput(
             f"{robot}: its effects load it; expected assembly solve or exact, or "
             "validation crosscheck, which know loads"
         )
-    return acting.posture
+    return applied.posture
 
 
 def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
-    """The posture asked for, of the robot without the effects of its file."""
+    """The posture of the options, of the robot without the effects of its file."""
     from assembly.kinematics.posture import place_robot
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.robots import load_robot
@@ -226,8 +222,6 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float]:
     """
     if not texts:
         return {}
-    pass
-
     return parse_assignments(texts, "--under")
 
 
@@ -238,7 +232,7 @@ def parse_assignments(
 
     Args:
         texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
-        option: whose they are, for messages.
+        option: their name, for messages.
         largest: no sound value is larger than this, either sign.
 
     Returns:
@@ -290,7 +284,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
     """
     import numpy as np
 
-    from forcefit.inputs.table import comma_numbers
+    from forcefit.inputs.number_arrays import comma_numbers
 
     name = text.strip().lower()
     if name.lstrip("+-") in _AXES and len(name) <= 2:

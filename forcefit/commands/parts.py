@@ -1,4 +1,4 @@
-"""Parts of a link on the command line: boxes of another material, added masses."""
+"""Options of a link's parts: boxes of another material, added masses."""
 
 from functools import partial
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from forcefit.commands.options import parse_assignments
 from forcefit.inputs.errors import checked
-from forcefit.inputs.table import BadInput, comma_numbers, describe
+from forcefit.inputs.number_arrays import comma_numbers
+from forcefit.inputs.table import BadInput, describe
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 
@@ -71,5 +72,5 @@ def parse_mass(option: str, text: str) -> PointMass:
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
-    """Which points are in a box."""
+    """Whether points are in a box."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

@@ -1,4 +1,4 @@
-"""Progress bars, and how many threads work."""
+"""Progress bars, and the number of threads."""
 
 import sys
 import time
@@ -9,13 +9,13 @@ from typing import Any
 
 from forcefit.inputs.errors import BadInput
 
-_MOMENT = 2.0  # [s] that may pass without a word
+_DELAY = 2.0  # [s] before the first line of progress
 
 
 def one_thread() -> AbstractContextManager:
     """Linear algebra on one thread: a posture's matrices are too small for more.
 
-    The others would spin while they wait for work, at the cost of this one's time.
+    Idle threads wait actively and would slow down the working one.
     """
     from threadpoolctl import threadpool_limits
 
@@ -26,8 +26,8 @@ def one_thread() -> AbstractContextManager:
 def progress_bars() -> Generator[Any, None, None]:
     """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each.
 
-    Where stderr is no terminal, bars show at the end alone: a line says what takes
-    longer than a moment.  Bad input leaves none, its message is enough.
+    Where stderr is no terminal, bars appear only at the end; a line is printed for
+    what takes longer than two seconds.  With bad input no bar is left.
     """
     from rich.console import Console
     from rich.progress import (
@@ -52,11 +52,13 @@ def progress_bars() -> Generator[Any, None, None]:
         def update(what: str, done: int, total: int) -> None:
             if what not in tasks:
                 if not console.is_terminal:
-                    said = f"{what}: {done} of {total}"
-                    waiting.append(Timer(_MOMENT, print, [said], {"file": sys.stderr}))
+                    line_of_progress = f"{what}: {done} of {total}"
+                    waiting.append(
+                        Timer(_DELAY, print, [line_of_progress], {"file": sys.stderr})
+                    )
                     waiting[-1].daemon = True
                     waiting[-1].start()
-                # what was done in an earlier run does not count in the rate
+                # points of an earlier run do not count in the rate
                 tasks[what] = bars.add_task(what, total=total, completed=done, rate="")
                 began[what] = time.monotonic(), done
             start, before = began[what]

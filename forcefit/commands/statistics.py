@@ -1,7 +1,4 @@
-"""The commands ``forcefit assembly statistics`` and ``tolerances``.
-
-Importing this module adds them to the application.
-"""
+"""The commands ``forcefit assembly statistics`` and ``tolerances``."""
 
 import sys
 from collections.abc import Generator, Sequence
@@ -11,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -30,13 +26,12 @@ from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_
 PlayOption = Annotated[
     str,
     typer.Option(
-        help="What is assumed of play where a pose error is judged: worst (anywhere, "
-        "the largest error counts) | uniform | contact | least (as it is solved)."
+        help="Clearance positions for pose errors: worst (any, the largest error "
+        "counts) | uniform | contact | least (that of the solution)."
     ),
 ]
 
 
-@app.command()
 def statistics(
     robot: RobotArgument,
     errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
@@ -81,13 +76,14 @@ def statistics(
     """
     from assembly.model.error_distributions import read_sources
     from assembly.statistics.experiment import Experiment, precision_for
+    from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
     from assembly.statistics.plot import histogram_figure
     from assembly.statistics.quantities import parse_limit
     from assembly.statistics.summary import summarise, summary_text
     from assembly.sweeps.dataset import check_dataset
 
-    _check_play(play)
+    _check_clearance_model(play)
     _check_word("--by", by, ("source", "frame", "kind"))
     if not 0 < confidence < 1:
         raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
@@ -107,11 +103,14 @@ def statistics(
         precision=precision_for(limits),
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
+    options = None
+    if importance is not None:
+        options = ImportanceOptions(importance, by, confidence)
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         data = run_draws(
             experiment, draws, output, workers, lambda d, n: update("draws", d, n),
-            None if importance is None else (importance, by), confidence, held,
+            options, held,
         )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
@@ -132,10 +131,10 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
-def _check_play(play: str) -> None:
-    from assembly.statistics.play import PLAY
+def _check_clearance_model(play: str) -> None:
+    from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
-    _check_word("--play", play, tuple(PLAY))
+    _check_word("--play", play, tuple(CLEARANCE_MODELS))
 
 
 @contextmanager
@@ -149,7 +148,6 @@ def _interruptible(output: Path | None) -> Generator[None, None, None]:
         raise typer.Exit(130) from None
 
 
-@app.command()
 def tolerances(
     robot: RobotArgument,
     grid: Annotated[
@@ -163,7 +161,7 @@ def tolerances(
     ] = "free",
     play: PlayOption = "worst",
     fresh: Annotated[
-        int, typer.Option(help="New draws that verify the answer.", min=0)
+        int, typer.Option(help="Fresh draws that verify the tolerances.", min=0)
     ] = 2000,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")
@@ -198,7 +196,7 @@ def tolerances(
     )
     from assembly.sweeps.dataset import check_dataset, save_dataset
 
-    _check_play(play)
+    _check_clearance_model(play)
     _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure):
         raise BadInput("tolerances: --output and --figure need a --plan")
@@ -207,29 +205,35 @@ def tolerances(
     if figure is not None:
         check_writable(figure, PICTURE)
     machine = load_robot(robot)
-    asked = None if plan is None else replace(read_plan(plan, machine), play=play)
+    asked_plan = (
+        None
+        if plan is None
+        else replace(read_plan(plan, machine), clearance_model=play)
+    )
     postures = grid_postures(machine, grid)
     results: dict = {"robot": machine.name, "postures": len(postures)}
-    said = []
+    texts = []
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
             results["present"] = present_errors(
-                postures, compliant, lambda d, n: update("present errors", d, n)
+                postures,
+                "free" if compliant == "free" else "rigid",
+                lambda d, n: update("present errors", d, n),
             )
-            said.append(present_text(results["present"]))
-        elif asked is None:
+            texts.append(present_text(results["present"]))
+        elif asked_plan is None:
             raise BadInput(
                 f"{machine.name}: its frames have no errors to judge; give them a "
                 "geometric_error, or ask for tolerances with --plan"
             )
-        if asked is not None:
-            whose = identity_of(postures, asked, fresh)
+        if asked_plan is not None:
+            whose = identity_of(postures, asked_plan, fresh)
             replay = held.enter_context(journalled(output, whose))
-            answer = allocate(postures, asked, fresh, update, replay)
-            results["allocation"] = allocation_of(answer)
-            said.append(allocation_text(results["allocation"]))
-            data = tolerance_dataset(answer)
+            allocation = allocate(postures, asked_plan, fresh, update, replay)
+            results["allocation"] = allocation_of(allocation)
+            texts.append(allocation_text(results["allocation"]))
+            data = tolerance_dataset(allocation)
             if output is not None:
                 save_dataset(data, output)
             if figure is not None:
@@ -237,7 +241,7 @@ def tolerances(
     write_json(results, json)
     held.close()
     if json != "-":
-        print("\n".join(said))
+        print("\n".join(texts))
     check = results.get("allocation", {}).get("verification") or {}
     if check.get("verdict") == "contradicted":
         raise typer.Exit(1)

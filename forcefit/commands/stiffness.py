@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from forcefit.commands.library import library
+from forcefit.commands.options import JsonOption
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
@@ -14,7 +15,6 @@ from forcefit.commands.stiffness_options import (
     Figure,
     Height,
     InnerRadius,
-    Json,
     Kind,
     Masses,
     Parts,
@@ -107,7 +107,7 @@ def beam(
     axis: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
     up: Up = None,
     theory: Theory = "timoshenko",
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E of a straight beam of constant section, in closed form."""
     import numpy as np
@@ -134,7 +134,7 @@ def curve(
     young: Young,
     poisson: Poisson,
     theory: Theory = "timoshenko",
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E of a beam along a curve: tapered, bent, L-shaped."""
     from forcefit.commands.beam_options import BeamOptions
@@ -160,7 +160,7 @@ def fea(
     part: Parts = None,
     mass: Masses = None,
     time_limit: TimeLimit = 300.0,
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E by finite elements, refined to the asked accuracy."""
     from forcefit.commands.beam_options import BeamOptions
@@ -208,7 +208,7 @@ def compare(
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
     figure: Figure = None,
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E by finite elements beside a beam, entry by entry.
 
@@ -264,7 +264,7 @@ def slenderness(
     accuracy: Accuracy = 0.002,
     interface: Kind = "rigid",
     figure: Figure = None,
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """Beam beside finite elements over L / r: the end effect.
 
@@ -323,7 +323,7 @@ def stress(
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
     figure: Figure = None,
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """Peak von Mises stress, away from the clamped edges.
 
@@ -348,8 +348,8 @@ def stress(
         _up(up),
         np.array(parse_load(wrench, "--wrench")),
     )
-    plain = {radius, inner_radius, width, height, section} == {None}
-    declared = None if plain else options.declared()
+    no_section = {radius, inner_radius, width, height, section} == {None}
+    declared = None if no_section else options.declared()
     held, moved = _interfaces(base, tip)
     accuracy = _accuracy(accuracy)
     if away is not None:
@@ -367,8 +367,8 @@ def stress(
 
         everywhere = stress_influence(solved, away=0.0)
         ends = solved.link.base, solved.link.tip
-        drawn = plot_stress(everywhere, peak, *ends, declared, roll)
-        save_figure(drawn, figure)
+        figure_of_stress = plot_stress(everywhere, peak, *ends, declared, roll)
+        save_figure(figure_of_stress, figure)
     write_json(stress_results(peak), json)
     if json != "-":
         print(stress_text(peak))

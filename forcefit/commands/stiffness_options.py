@@ -1,11 +1,9 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that the stiffness commands share."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from forcefit.inputs.writing import check_json
 
 Surface = Annotated[
     Path, typer.Argument(metavar="SURFACE", help="STL, OBJ, PLY, VTK, MSH, STEP.")
@@ -50,10 +48,4 @@ Masses = Annotated[
     typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
 ]
 TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]
-Json = Annotated[
-    str | None,
-    typer.Option(
-        "--json", help="Write results as JSON; - is stdout.", callback=check_json
-    ),
-]
 Figure = Annotated[Path | None, typer.Option(help="Draw it (png, svg, pdf).")]

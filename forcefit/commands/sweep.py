@@ -1,7 +1,4 @@
-"""The commands ``forcefit assembly sweep`` and ``plot``.
-
-Importing this module adds them to the application.
-"""
+"""The commands ``forcefit assembly sweep`` and ``plot``."""
 
 import sys
 from contextlib import ExitStack
@@ -10,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JsonOption,
@@ -26,7 +22,6 @@ from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
 
-@app.command()
 def sweep(
     robot: RobotArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
@@ -103,7 +98,7 @@ def sweep(
     check_dataset(output, "a sweep")
     if figure is not None:
         check_writable(figure, PICTURE)
-    push, g = parse_load(load), parse_gravity(gravity)
+    wrench, g = parse_load(load), parse_gravity(gravity)
     covariates = parse_covariates(under)
     with progress_bars() as update:
         update("robot", 0, 1)  # where it is placed, code may be compiled
@@ -111,7 +106,7 @@ def sweep(
             robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
             seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
             linearisation=linearisation, near=near, yield_strength=yield_strength,
-            load=push or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
+            load=wrench or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
@@ -148,7 +143,6 @@ def sweep(
         print(summary_text(summary, data))
 
 
-@app.command()
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
     output: Annotated[
@@ -179,7 +173,7 @@ def plot(
         places[name] = value
     data = open_dataset(file)
     try:
-        drawn = figure_of_draws(data, kind)
+        figure = figure_of_draws(data, kind)
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(drawn or figure_of(data, places), output)
+    save_figure(figure or figure_of(data, places), output)

@@ -58,8 +58,8 @@ def _with_errors(posture: "Posture", errors: Path | None, seed: int) -> "Posture
     from assembly.model.error_distributions import read_sources
 
     sources = read_sources(errors, posture.robot)
-    drawn = sources.errors(sources.draw(0, 1, seed)[0])
-    return replace(posture, robot=posture.robot.with_errors(drawn))
+    errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
+    return replace(posture, robot=posture.robot.with_errors(errors_drawn))
 
 
 def parse_scales(text: str) -> list[float]:
@@ -107,7 +107,10 @@ def crosscheck(
         str, typer.Option(help="How the simulation models links: beam | spring | fem.")
     ] = "beam",
     clearances: Annotated[
-        bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")
+        bool,
+        typer.Option(
+            "--clearances", help="Keep the joints' clearances in both models."
+        ),
     ] = False,
     grid: Annotated[
         str | None,
@@ -128,7 +131,7 @@ def crosscheck(
     status 1 when a check fails, or when the robot has neither errors nor a load:
     nothing is then compared.
     """
-    from assembly.effects.acting import act
+    from assembly.effects.robot_effects import apply_robot_effects
     from validation.crosscheck.crosscheck import Crosscheck, attempt
     from validation.crosscheck.crosscheck import crosscheck as compare_models
 
@@ -142,14 +145,14 @@ def crosscheck(
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
     def compare(posture: "Posture") -> Crosscheck:
-        given = _with_errors(posture, errors, seed)
-        acting = act(given, wrench, g, covariates)
+        with_errors = _with_errors(posture, errors, seed)
+        applied = apply_robot_effects(with_errors, wrench, g, covariates)
         return compare_models(
-            acting.posture,
+            applied.posture,
             scales,
-            acting.load,
+            applied.load,
             links,
-            acting.gravity,
+            applied.gravity,
             time_limit,
             clearances,
         )
@@ -158,15 +161,15 @@ def crosscheck(
         _crosscheck_grid(robot, grid, compare, json)
         return
     posture = declared_posture(robot, pose, joint)
-    answer, failure = attempt(posture.robot.name, lambda: compare(posture))
-    write_json(failure if answer is None else answer.table(), json)
+    results, failure = attempt(posture.robot.name, lambda: compare(posture))
+    write_json(failure if results is None else results.table(), json)
     if json != "-":
-        print(failure["reason"] if answer is None else answer.text())
-    if figure is not None and answer is not None:
+        print(failure["reason"] if results is None else results.text())
+    if figure is not None and results is not None:
         from validation.crosscheck.plot import slope_figure
 
-        save_figure(slope_figure(answer), figure)
-    if answer is None or not answer.passed:
+        save_figure(slope_figure(results), figure)
+    if results is None or not results.passed:
         raise typer.Exit(1)
 
 

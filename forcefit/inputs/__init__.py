@@ -1,4 +1,4 @@
-"""The ground floor: input read and refused, output written whole or not at all.
+"""Input and output: files read and checked, files written whole or not at all.
 
-Begin at ``table.py``, which reads TOML, and ``errors.py``, the words of a refusal.
+Begin at ``table.py``, which reads TOML, and ``errors.py``, which words error messages.
 """

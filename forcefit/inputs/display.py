@@ -1,12 +1,12 @@
-"""How an object shows itself: a title and a few figures with their units.
+"""Short representations of objects: a title and a few figures with their units.
 
-A dataclass takes part with one line in its body::
+A dataclass uses them with one line in its body::
 
     __repr__, _repr_html_ = short_repr, html_table
 
-It may say which figures by a method ``_figures``; else they are its fields, shortened.
-The text is for a console, the table for a notebook; both are a few lines however large
-the object is.
+The figures come from its method ``_figures`` if it has one; else they are its fields,
+abbreviated.  The text is for a console, the table for a notebook; both are a few lines
+for objects of any size.
 """
 
 import html
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 Figures = dict[str, str]
 
 _LONGEST = 72  # characters of a value
-_FEW = 6  # numbers that are shown rather than counted
+_FEW = 6  # numbers that are shown; of more only the count
 
 
 def short_repr(self: Any) -> str:
@@ -69,7 +69,7 @@ def title(thing: object) -> str:
 
 
 def brief(value: object) -> str:
-    """One short line for any value: what it is, if it does not fit."""
+    """One short line for any value; its kind, if the value is too long."""
     if isinstance(value, np.ndarray):
         if 0 < value.size <= _FEW and value.dtype.kind in "fiu":
             return "[" + " ".join(f"{v:.4g}" for v in value.ravel()) + "]"
@@ -89,12 +89,12 @@ def brief(value: object) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers in brackets; below 1e-9, rounding in any unit here, they are zero."""
+    """Numbers in brackets, rounded as by :func:`rounded`."""
     return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
 
 
 def rounded(value: float) -> float:
-    """A number for people: rounding errors, below 1e-9 in any unit here, are zero."""
+    """A number for people: below 1e-9, rounding error in all units used, it is zero."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
@@ -118,7 +118,7 @@ def bracket(bounds: tuple[float, float], unit: str) -> str:
 
 
 def _figures(thing: Any) -> Figures:
-    """What an object says of itself, or its fields."""
+    """The figures of an object by its own method, or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]

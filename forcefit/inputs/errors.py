@@ -1,7 +1,7 @@
-"""The words of an error: one short line that says whose, what was found, expected.
+"""Error messages: one short line with the place, what was found and what expected.
 
-:class:`BadInput` is a ``ValueError``; the command line prints it and leaves with exit
-status 2.  However large or odd what was found is, its message stays one short line.
+:class:`BadInput` is a ``ValueError``; the command line prints it and exits with status
+2.  Large or odd values are abbreviated, so that the message stays one short line.
 """
 
 import difflib
@@ -14,14 +14,14 @@ _LONGEST_MESSAGE = 800  # characters: a path, a place, what was found and expect
 
 
 class BadInput(ValueError):
-    """Something given from outside is not what it should be: one line says what."""
+    """An input is wrong; the message is one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message, _LONGEST_MESSAGE))
 
 
 def one_line(text: str, longest: int) -> str:
-    """The text without line breaks and control characters, its middle cut out."""
+    """The text without control characters, abbreviated in the middle."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -34,19 +34,19 @@ def printable(text: str) -> bool:
 
 
 def plot_label(text: str) -> str:
-    """A text as matplotlib must be given it to show it as it is written.
+    """A text escaped for matplotlib, which reads a formula between dollar signs.
 
     Args:
         text: with a name in it that a user chose.
 
     Returns:
-        The text; matplotlib reads a formula between two dollar signs.
+        The escaped text.
     """
     return text.replace("$", r"\$")
 
 
 def quoted(name: str) -> str:
-    """A name in double quotes, on one line and never pages of it."""
+    """A name in double quotes, on one line, abbreviated if long."""
     return f'"{one_line(name, 60)}"'
 
 
@@ -62,13 +62,13 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def describe(value: object) -> str:
-    """Short description of a wrong value: what was found, never pages of it."""
+    """Short description of a wrong value, abbreviated if long."""
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 class _Short(reprlib.Repr):
-    """Python's own, which neither loops over pages nor fails on huge integers."""
+    """Python's abbreviated repr, extended to huge integers."""
 
     def repr_bool(self, x: bool, level: int) -> str:
         return str(x).lower()
@@ -110,11 +110,11 @@ def checked(
         The value.
 
     Raises:
-        BadInput: it is not finite, outside, or beyond what machines are made of.
+        BadInput: it is not finite, outside the range, or of no physical size.
     """
     if math.isfinite(value) and above < value < below and value >= least:
-        sane = abs(value) <= _LARGEST and (above != 0 or value >= 1 / _LARGEST)
-        if not sane:
+        in_range = abs(value) <= _LARGEST and (above != 0 or value >= 1 / _LARGEST)
+        if not in_range:
             raise BadInput(
                 f"{option}: found {value:g}, expected a size between {1 / _LARGEST:g} "
                 f"and {_LARGEST:g} [{unit}]"

@@ -1,7 +1,7 @@
 """Files that one program at a time may write.
 
-The lock is the operating system's (``flock``): it ends with the program that holds it,
-however that ends.  Where there is none (Windows, some network disks) nothing is locked.
+The lock is the operating system's (``flock``): it ends with the program that holds it.
+Where there is none (Windows, some network disks) nothing is locked.
 """
 
 import os
@@ -17,18 +17,18 @@ except ImportError:  # Windows
 
 @contextmanager
 def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
-    """Hold a file that no other program holds meanwhile.
+    """Lock a file against other programs.
 
     Args:
-        path: of the file, made if it is absent.  Whoever holds it may rename or remove
-            it.
-        wait: until it is free.
+        path: of the file, created if it is absent.  The program with the lock may
+            rename or remove it.
+        wait: until it is unlocked.
 
     Yields:
-        Nothing; the file is held until the block ends.
+        Nothing; the file is locked until the block ends.
 
     Raises:
-        BlockingIOError: another program holds it, and waiting was not asked for.
+        BlockingIOError: another program has locked it, and ``wait`` is False.
         OSError: it cannot be opened.
     """
     if fcntl is None:  # and no open file can be renamed there
@@ -42,13 +42,13 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
             if _stands_at(handle, path):
                 yield
                 return
-            # renamed or removed by whom we waited for: there may be a new one
+            # renamed or removed by the other program: there may be a new file
         finally:
             os.close(handle)
 
 
 def _lock(handle: int, wait: bool) -> None:
-    """Lock an open file, if its disk can."""
+    """Lock an open file, if its file system supports locks."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:

@@ -1,7 +1,7 @@
-"""Reading other people's files: every mistake gets one message.
+"""Reading of TOML files, with one message for every mistake.
 
 A message names the file, the place in it, what was found and what was expected, and
-the nearest valid name where a name is wrong; ``forcefit/inputs/errors.py`` words it.
+the nearest valid name where a name is wrong; see ``forcefit/inputs/errors.py``.
 """
 
 import difflib
@@ -24,14 +24,13 @@ from forcefit.inputs.errors import (
     printable,
     quoted,
 )
+from forcefit.inputs.number_arrays import as_number, find_fault, number_array
 
 __all__ = [
     "BadInput",
     "Table",
     "describe",
-    "find_fault",
     "nearest",
-    "number_array",
     "quoted",
     "read_text",
     "read_toml",
@@ -87,7 +86,7 @@ def read_toml(path: Path | str) -> "Table":
         BadInput: the file cannot be read or is not TOML.
     """
     text = read_text(path)
-    if _DEEP_KEY.search(text):  # tomllib would take minutes over it
+    if _DEEP_KEY.search(text):  # tomllib would take minutes
         raise BadInput(f"{path}: not valid TOML: nested too deeply")
     try:
         return Table(tomllib.loads(text), str(path), "")
@@ -96,14 +95,14 @@ def read_toml(path: Path | str) -> "Table":
     except tomllib.TOMLDecodeError as error:  # its text ends with line and column
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
-    except ValueError:  # Python reads no whole number of more than 4300 digits
+    except ValueError:  # Python parses no integer of more than 4300 digits
         reason = "found a whole number of thousands of digits"
         raise BadInput(f"{path}: not valid TOML: {reason}") from None
 
 
 @dataclass(eq=False)
 class Table:
-    """A TOML table that is emptied key by key and refuses what is left over.
+    """A TOML table that records the keys asked for and refuses all others.
 
     Attributes:
         content: the table's keys and values.
@@ -179,8 +178,8 @@ class Table:
         if not isinstance(value, str) or not value.strip():
             raise self.bad(key, f"found {describe(value)}, expected {expected}")
         if len(value) > longest:
-            found = f"found {quoted(value)} of {len(value)} characters"
-            raise self.bad(key, f"{found}, expected at most {longest}")
+            excess = f"found {quoted(value)} of {len(value)} characters"
+            raise self.bad(key, f"{excess}, expected at most {longest}")
         if not printable(value):
             message = f"found {describe(value)}, expected no control characters"
             raise self.bad(key, message)
@@ -272,14 +271,14 @@ class Table:
         expected = " ".join(filter(None, ["a finite number", range_, f"[{unit}]"]))
         if default is not None and not self.has(key):
             return default
-        value = _number(self.require(key, expected))
+        value = as_number(self.require(key, expected))
         if not (math.isfinite(value) and above < value < below and value >= least):
-            found = describe(self.content[key])
-            raise self.bad(key, f"found {found}, expected {expected}")
+            value_text = describe(self.content[key])
+            raise self.bad(key, f"found {value_text}, expected {expected}")
         if abs(value) > largest:
-            found = describe(self.content[key])
+            value_text = describe(self.content[key])
             expected = f"a number of size at most {largest:g} [{unit}]"
-            raise self.bad(key, f"found {found}, expected {expected}")
+            raise self.bad(key, f"found {value_text}, expected {expected}")
         return value
 
     def array(
@@ -313,8 +312,8 @@ class Table:
         value = self.require(key, expected)
         array = number_array(value)
         if array is None or array.shape != shape or not np.isfinite(array).all():
-            found = find_fault(value, shape)
-            raise self.bad(key, f"found {found}, expected {expected}")
+            fault = find_fault(value, shape)
+            raise self.bad(key, f"found {fault}, expected {expected}")
         if np.abs(array).max(initial=0.0) > largest:
             expected = f"numbers of size at most {largest:g} [{unit}]"
             raise self.bad(key, f"found {describe(value)}, expected {expected}")
@@ -353,7 +352,7 @@ class Table:
         ]
 
     def finish(self) -> None:
-        """Refuse whatever was never asked for.
+        """Refuse keys that were not asked for.
 
         Raises:
             BadInput: a key that this table does not have.
@@ -362,63 +361,3 @@ class Table:
             if key not in self._asked:
                 hint = nearest(key, self._asked)
                 raise self.bad("", f"unknown key {quoted(key)}{hint}")
-
-
-def _number(value: object) -> float:
-    """The number, or nan for anything that is not one (true and false are not)."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return math.nan
-    try:
-        return float(value)
-    except OverflowError:
-        return math.nan
-
-
-def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """What is wrong with numbers of a given shape, and where, counted from 1.
-
-    Args:
-        value: nested lists that are not that, or something else.
-        shape: expected.
-        infinite: whether inf is a number here.
-
-    Returns:
-        The wrong entry or row with its place, or the whole, shortened.
-    """
-    if not isinstance(value, list):
-        return describe(value)
-    if len(value) != shape[0]:
-        return f"{describe(value)} of length {len(value)}"
-    for i, inner in enumerate(value, 1):
-        if len(shape) > 1:
-            fault = find_fault(inner, shape[1:], infinite)
-            if fault:
-                return f"{fault} in row {i}"
-        elif not (math.isfinite(x := _number(inner)) or (infinite and math.isinf(x))):
-            return f"{describe(inner)} as number {i}"
-    return ""
-
-
-def number_array(value: object) -> NDArray | None:
-    """Nested lists of numbers as an array; None when ragged or not numbers."""
-    if not isinstance(value, list):
-        return None
-    if value and all(isinstance(v, list) for v in value):
-        rows = [row for row in map(number_array, value) if row is not None]
-        same = len(rows) == len(value) and len({row.shape for row in rows}) == 1
-        return np.array(rows) if same else None
-    return np.array([_number(v) for v in value]) if _proper(value) else None
-
-
-def comma_numbers(text: str) -> NDArray:
-    """Finite numbers between commas; none at all if one of them is not."""
-    try:
-        found = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        return np.empty(0)
-    return found if np.isfinite(found).all() else np.empty(0)
-
-
-def _proper(values: list) -> bool:
-    """Whether all are numbers that a float can hold; nan and inf are, true is not."""
-    return all(isinstance(v, float) or not math.isnan(_number(v)) for v in values)

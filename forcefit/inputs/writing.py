@@ -1,7 +1,7 @@
-"""Files for others: each is written whole or not at all.
+"""Output files, each written whole or not at all.
 
-What is being written stands in ``FILE.part`` beside the file and takes its name when it
-is complete and on the disk.  What a killed program leaves of it, the next one replaces.
+The content is written to ``FILE.part`` beside the file, which is renamed when it is
+complete and on the disk.  The remains of a killed program are overwritten by the next.
 """
 
 import io
@@ -27,7 +27,7 @@ class Kind:
     Attributes:
         name: for messages.
         endings: that the names of its files may have.
-        begins: what its files begin with, one of these; letters of either case.
+        begins: possible first bytes of its files; letters of either case.
     """
 
     name: str
@@ -52,22 +52,21 @@ ROBOT = Kind(
 
 
 def check_writable(path: Path | str, kind: Kind | None = None) -> None:
-    """Refuse a file that could not be written, before the work that leads to it.
+    """Refuse a file that could not be written, before the computation.
 
     Args:
         path: of a file to be written later.
-        kind: of the file; one that stands there already must be of it.
+        kind: of the file; an existing file must be of it.
 
     Raises:
-        BadInput: its ending is not of the kind; its folder is absent or closed to us;
-            what stands there is no regular file, is not ours to change, or is of
-            another kind.
+        BadInput: its ending is not of the kind; its folder is absent or not writable;
+            the existing file is not regular, not writable, or of another kind.
     """
     path = Path(path)
     if kind is not None and path.suffix.lower() not in kind.endings:
-        found = f"the ending {quoted(path.suffix)}" if path.suffix else "no ending"
+        ending = f"the ending {quoted(path.suffix)}" if path.suffix else "no ending"
         expected = " or ".join(kind.endings)
-        raise BadInput(f"{path}: found {found}, expected {kind.name}: {expected}")
+        raise BadInput(f"{path}: found {ending}, expected {kind.name}: {expected}")
     folder = path.parent
     try:
         folder = Path(os.path.realpath(path)).parent
@@ -85,7 +84,7 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
 
 
 def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
-    """Refuse to replace what already stands at a path."""
+    """Refuse to replace an existing file that is not writable or of another kind."""
     if stat.S_ISDIR(mode):
         raise BadInput(f"{path}: found a folder, expected a file or nothing")
     if not stat.S_ISREG(mode):
@@ -121,11 +120,11 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
     """Write a file whole or not at all.
 
     Args:
-        path: of the file; where a link leads, its target.
+        path: of the file; for a symbolic link, its target is written.
 
     Yields:
-        The path to write to.  When the block ends it takes the file's name; when it
-        fails it is removed, and the file stays as it was.
+        The path to write to.  When the block ends it is renamed to the file; when it
+        fails it is removed, and the file is unchanged.
 
     Raises:
         BadInput: the file cannot be written, as on a full disk.
@@ -214,7 +213,7 @@ def save_pixels(pixels: Any, path: Path | str) -> None:
 
 
 def check_json(target: str | None) -> str | None:
-    """Refuse a target of :func:`write_json` before the work that leads to it.
+    """Refuse a target of :func:`write_json` before the computation.
 
     Args:
         target: a path, ``"-"`` for standard output, None for nowhere.

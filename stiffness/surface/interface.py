@@ -7,13 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.table import (
-    BadInput,
-    comma_numbers,
-    describe,
-    nearest,
-    number_array,
-)
+from forcefit.inputs.number_arrays import comma_numbers, number_array
+from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.beam.beam import unit_vector
 
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.energy import Assembly, solve_with
-from assembly.linear.load import forces_on
+from assembly.linear.load import loads_on_frames
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
@@ -67,4 +67,6 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     joints = bush_joints(virtual_joints(posture.robot))
-    return solve_with(linearise(posture), joints, wrench, forces_on(posture, wrench))
+    return solve_with(
+        linearise(posture), joints, wrench, loads_on_frames(posture, wrench)
+    )

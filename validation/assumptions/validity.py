@@ -78,7 +78,7 @@ def cost_between(
         clearances count as that: inside an assembly zone both are rounding.
     """
     energy = better.energy + missing
-    least = 0.0 if model.forces else 1e-6 * model.energy_without_play
+    least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
     stored = max(energy, model.energy, 1e6 * least) > energy_floor(model.posture.robot)
     moved = np.abs([model.platform_screw, better.platform_screw]).max(axis=0)
     turn, shift = (

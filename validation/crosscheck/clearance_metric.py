@@ -71,7 +71,9 @@ class ClearanceMetric:
         closing without clearances would cost energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
-        return max(linear.energy_without_play, linear.energy) >= FLOOR_ENERGY * s**2
+        return (
+            max(linear.energy_without_clearance, linear.energy) >= FLOOR_ENERGY * s**2
+        )
 
     @cached_property
     def limits(self) -> dict[str, Check]:
@@ -203,7 +205,7 @@ def optimality_gap(pair: Pair) -> float:
         :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
-    small = reduce_problem(linearise(best.posture), best.joints, best.forces)
+    small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
     cones = best.joints.cones
     # a column of cones has one entry, its bound
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
@@ -211,5 +213,5 @@ def optimality_gap(pair: Pair) -> float:
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h
     cost = (strain @ strain - least @ least) / 2 - small.d @ (u - best.clearances)
     least_reference = FLOOR_ENERGY * pair.scale**2
-    reference = max(small.energy_without_play, best.energy, least_reference)
+    reference = max(small.energy_without_clearance, best.energy, least_reference)
     return float(cost / reference)

@@ -190,7 +190,7 @@ def _judge(
     after = apply_effects(here, found.fit.effects)
     explained = predict(after)
     residual_after = measured - explained.deviation
-    open_ = declared_model.open | explained.open
+    open_ = declared_model.undetermined | explained.undetermined
     left: tuple[Trend, ...] = ()
     if said == "outside_library":
         left = tuple(trends(fitting, here.take(used), residual_after[used]))

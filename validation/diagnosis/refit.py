@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from assembly.effects import apply_effects
 from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, settle
+from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis
@@ -127,7 +127,9 @@ def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDAr
     Returns:
         (R, n, 6) in units of its bounds; a foundation's frame is left out.
     """
-    there = settle(apply_effects(here, dict(_public(members, x, here.robot))))
+    there = with_rest_positions(
+        apply_effects(here, dict(_public(members, x, here.robot)))
+    )
     assert there.rest is not None
     return there.rest[:, -len(here.robot.frames) :]
 

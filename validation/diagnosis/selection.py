@@ -15,7 +15,7 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import settle
+from assembly.measurement.predict import with_rest_positions
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
@@ -84,8 +84,8 @@ def _select_settled(campaign: Campaign, here: Conditions, update: Update) -> Sel
     play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
     if not play:
         return _select(campaign, here, update)
-    found = _select(campaign, settle(here), update)
-    there = settle(apply_effects(here, found.fit.effects))
+    found = _select(campaign, with_rest_positions(here), update)
+    there = with_rest_positions(apply_effects(here, found.fit.effects))
     assert there.rest is not None
     rest = there.rest[:, -len(here.robot.frames) :]
     return _select(campaign, replace(here, rest=rest), update)

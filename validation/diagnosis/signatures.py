@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import Conditions, as_declared
+from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
 from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import taken_up
+from assembly.measurement.settled_clearance import with_clearances_taken_up
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
@@ -66,9 +66,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
         mismatch=campaign.mismatch,
         point=campaign.reference_point,
         gravity=gravity,
-        temperature=known.get("temperature", np.nan),
-        time=known.get("time", np.nan),
-        approach=known.get("approach", np.nan),
+        covariates={name: known[name] for name in COVARIATES if name in known},
     )
     return apply_effects(declared, campaign.robot.effects)
 
@@ -118,7 +116,7 @@ class Tangents:
         """
         there = apply_effects(self.here, effects)
         if "joint_clearance" in effects and there.rest is None and not there.exact:
-            there, _ = taken_up(there)
+            there, _ = with_clearances_taken_up(there)
         return whiten(self.campaign, predict(there).deviation)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:

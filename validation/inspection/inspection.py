@@ -132,7 +132,7 @@ def inspect_campaign(
         signatures=signatures,
         separability=compare_signatures(signatures.columns, signatures.nuisance),
         remarks=tuple(remarks),
-        open=predict(conditions_of(campaign)).open,
+        open=predict(conditions_of(campaign)).undetermined,
     )
 
 

@@ -17,7 +17,8 @@ from assembly.linear.reach import READINGS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.report.results import pose_error_of, solution_of
+from assembly.report.pose_errors import pose_error_of
+from assembly.report.results import solution_of
 from assembly.sweeps.sweep import sweep_poses
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput

@@ -16,10 +16,10 @@ from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import SolverFailed
+from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.play import settle_play
-from forcefit.commands.statistics import app
+from forcefit.commands.assembly import app
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import random_robot
 
@@ -45,7 +45,7 @@ def test_draws_under_load_agree_with_one_solve_at_a_time(name, gravity):
     for i, own in enumerate(errors):
         erring = replace(posture, robot=robot.with_errors(own))
         answer = solve_assembly(erring, LOAD, gravity=gravity)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_play
+        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
         assert found.energy[i] - found.bound[i] <= allowed
         assert found.energy[i] == pytest.approx(answer.energy, rel=1e-6)
         size = np.abs(answer.wrenches).max()
@@ -105,7 +105,7 @@ def test_play_that_is_left_does_no_work_on_the_load(play, load):
     one = prepare_energies(home_posture(robot), load)
     found = one.solve(some_errors(robot) / 50)
     generators = [draw_generator(1, d, 1) for d in range(8)]
-    settled, mixed = settle_play(one, found, play, generators)
+    settled, mixed = position_clearances(one, found, play, generators)
     assert mixed.all()
     moved = settled - found.platform_screw
     assert np.abs(moved).max() > 3e-5

@@ -12,7 +12,7 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict, read
-from assembly.measurement.settled_clearance import taken_up
+from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import load_robot
 
@@ -40,9 +40,9 @@ def arm(stiffness=None, rigid=False, theory="euler"):
     )
 
 
-def here(robot, load=(0, 0, 0, 0, 0, 0), q=0.0, **given):
+def here(robot, load=(0, 0, 0, 0, 0, 0), q=0.0, **covariates):
     posture = place_robot(robot, joints={"drive": q})
-    return as_declared(posture, np.array(load, dtype=float), **given)
+    return as_declared(posture, np.array(load, dtype=float), covariates=covariates)
 
 
 def change(conditions, name, values):
@@ -155,7 +155,7 @@ def test_play_rests_where_the_load_pushes():
 def test_play_without_load_is_said_to_be_open():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
-    assert found.open.all()
+    assert found.undetermined.all()
     assert found.deviation == pytest.approx(0.0, abs=1e-18)
 
 
@@ -274,6 +274,6 @@ def test_play_in_an_open_chain_agrees_with_the_cone_solver():
     there = apply_effects(given, {"joint_clearance": values})
     slow = read(there, assemble_row(there, 0).platform_screw[None])
     assert np.abs(predict(there).deviation - slow).max() < 1e-13
-    closed_form, open_ = taken_up(there)
+    closed_form, open_ = with_clearances_taken_up(there)
     assert not open_.any()
     assert np.allclose(predict(closed_form).deviation, slow, atol=1e-13)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.exact.dead_load import curvature_of, dead_loads, slopes_of, work_of
+from assembly.exact.dead_load import curvature_of, dead_loads, work_gradient, work_of
 from assembly.exact.exact import solve_exact
-from assembly.exact.placement import LINK
+from assembly.exact.finite_robot import LINK
+from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import link_compliance
@@ -56,14 +57,16 @@ def test_at_rest_the_loads_pull_as_in_the_linear_model(seed):
     linear = solve_assembly(posture, load, bodies, gravity)
     model = moved_unknowns(posture, rng, 0.0)[0]
     loads = dead_loads(posture, load, bodies, gravity)
-    here = model.place(np.zeros(len(model.frame)))
+    here = place(model, np.zeros(len(model.frame)))
     forces = np.where(model.motion == LINK, *(
         np.einsum(
             "ij,ij->i", model.columns, forces.reshape(-1, 6)[model.frame]
-        ) for forces in (linear.forces.body, linear.forces.joint)
+        ) for forces in (linear.frame_loads.body, linear.frame_loads.joint)
     ))  # fmt: skip
     assert work_of(here, loads) == pytest.approx(0.0, abs=1e-13)
-    assert np.abs(slopes_of(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
+    assert (
+        np.abs(work_gradient(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -74,10 +77,10 @@ def test_both_derivatives_of_the_work(seed):
     model, x, h = moved_unknowns(posture, rng, 0.1)
     load, bodies, gravity = some_loads(posture, rng)
     loads, step = dead_loads(posture, 0 * load, bodies, gravity), 1e-5
-    here, ahead, behind = (model.place(x + k * step * h) for k in (0, 1, -1))
+    here, ahead, behind = (place(model, x + k * step * h) for k in (0, 1, -1))
     slope = (work_of(ahead, loads) - work_of(behind, loads)) / (2 * step)
-    assert slopes_of(here, loads) @ h == pytest.approx(slope, rel=1e-7)
-    bend = (slopes_of(ahead, loads) - slopes_of(behind, loads)) / (2 * step)
+    assert work_gradient(here, loads) @ h == pytest.approx(slope, rel=1e-7)
+    bend = (work_gradient(ahead, loads) - work_gradient(behind, loads)) / (2 * step)
     found = curvature_of(here, np.zeros(len(here.residual)), loads)
     assert np.abs(found @ h - bend).max() < 1e-7 * np.abs(bend).max()
     assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()
@@ -146,7 +149,7 @@ def test_the_base_carries_all_weight_where_it_hangs():
     answer = solve_exact(home_posture(robot), gravity=g)
     total, balance = np.zeros(6), np.zeros(6)
     for i, frame in enumerate(robot.frames):
-        p = (answer.placement.bodies[i] @ [*frame.centre_of_mass, 1.0])[:3]
+        p = (answer.placement.body_ends[i] @ [*frame.centre_of_mass, 1.0])[:3]
         total += frame.mass * np.concatenate([np.cross(p, g), g])
         if robot.parents[i] < 0:
             # the joint's wrench, and what pulls the body itself

@@ -10,7 +10,8 @@ from scipy.optimize import brentq, root
 import assembly.exact.exact as exact
 from assembly.exact.descent import NotConverged
 from assembly.exact.exact import solve_exact
-from assembly.exact.placement import FiniteRobot
+from assembly.exact.finite_robot import FiniteRobot
+from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture, place_many, place_robot
 from assembly.kinematics.se3 import (
     bracket,
@@ -157,7 +158,7 @@ def test_without_motion_the_closures_are_the_linear_ones(seed):
     posture = home_posture(robot.with_errors(0 * robot.errors))
     lin = solve_assembly(posture).linearisation
     model = FiniteRobot(posture, virtual_joints(posture.robot))
-    here = model.place(np.zeros(len(model.frame)))
+    here = place(model, np.zeros(len(model.frame)))
     columns = np.hstack([model.joints.elastic, model.joints.cones, model.joints.free])
     assert here.largest_gap < 1e-15
     assert np.abs(here.rows - lin.rows @ columns).max() < 1e-14
@@ -169,8 +170,8 @@ def test_first_derivatives_of_closures_and_platform(seed):
     """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
     rng = np.random.default_rng(seed)
     model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
-    here, step = model.place(x), 1e-5
-    ahead, behind = model.place(x + step * h), model.place(x - step * h)
+    here, step = place(model, x), 1e-5
+    ahead, behind = place(model, x + step * h), place(model, x - step * h)
     difference = (ahead.residual - behind.residual) / (2 * step)
     assert np.abs(here.rows @ h - difference).max() < 1e-7
     difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
@@ -183,15 +184,17 @@ def test_second_derivatives_of_closures_and_platform(seed, load):
     """Where the closures hold, against differences of the first derivatives."""
     rng = np.random.default_rng(seed)
     model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.02)
-    T, (first, second) = model.place(x).transforms, model.closed_frames.T
-    vars(model)["shut"] = inverse(T[first]) @ T[second]  # close it where it stands
-    here, step, load = model.place(x), 1e-5, np.array(load, dtype=float)
+    T, (first, second) = place(model, x).transforms, model.closed_frames.T
+    vars(model)["nominal_closures"] = (
+        inverse(T[first]) @ T[second]
+    )  # close it where it stands
+    here, step, load = place(model, x), 1e-5, np.array(load, dtype=float)
     multipliers = rng.normal(size=len(here.residual))
 
     def slope(place):
         return multipliers @ place.rows + load @ place.platform_rows
 
-    difference = slope(model.place(x + step * h)) - slope(model.place(x - step * h))
+    difference = slope(place(model, x + step * h)) - slope(place(model, x - step * h))
     expected = difference / (2 * step)
     found = here.curvature(multipliers, load) @ h
     assert here.largest_gap < 1e-14
@@ -410,7 +413,7 @@ def test_turning_the_whole_robot_changes_nothing(seed):
         frames.append(frame)
     here = solve_exact(home_posture(robot))
     there = solve_exact(home_posture(replace(robot, frames=tuple(frames))))
-    scale = here.linear.energy_without_play
+    scale = here.linear.energy_without_clearance
     assert abs(there.energy - here.energy) < 1e-11 * scale
     screws = here.platform_screw.reshape(2, 3) @ X[:3, :3].T
     size = np.abs(screws).max(axis=1, keepdims=True)

@@ -94,7 +94,9 @@ def test_the_robot_built_from_its_platform_is_the_same(seed):
     other = solve_assembly(home_posture(robot_of(from_the_platform(legs))))
     assert one.energy > 1e-6
     assert other.energy == pytest.approx(one.energy, rel=1e-8)
-    assert other.energy_without_play == pytest.approx(one.energy_without_play, rel=1e-9)
+    assert other.energy_without_clearance == pytest.approx(
+        one.energy_without_clearance, rel=1e-9
+    )
     # the old base's error seen from the platform is the platform's, turned round
     R, p = platform[:3, :3], platform[:3, 3]
     expected = -screw_map(R.T @ p, R.T) @ one.platform_screw

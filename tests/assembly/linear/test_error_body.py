@@ -9,7 +9,7 @@ from assembly.linear.error_body import error_body, even_directions
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.report.plot import draw_assembly
+from assembly.report.plot import plot_assembly
 from assembly.robots.irsbot2 import irsbot2
 
 
@@ -70,7 +70,7 @@ def test_directions_are_unit_vectors_spread_over_all_octants():
 
 def test_the_picture_shows_the_body_and_says_its_size():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
-    plotter = draw_assembly(answer, errors="translation", reading="frozen")
+    plotter = plot_assembly(answer, errors="translation", reading="frozen")
     said = plotter.actors["body"].GetText(0)
     pixels = plotter.screenshot(return_img=True).astype(int)
     plotter.close()

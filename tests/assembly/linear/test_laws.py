@@ -65,7 +65,7 @@ def test_another_unit_of_length_changes_numbers_and_nothing_else(seed):
             solve_assembly(other)
         return
     there = solve_assembly(other)
-    floor = 1e-9 * here.energy_without_play
+    floor = 1e-9 * here.energy_without_clearance
     assert there.energy / 1000 == pytest.approx(here.energy, rel=1e-7, abs=floor)
     a, b = zone_margin(one).margin, zone_margin(other).margin
     assert (a is None) == (b is None)
@@ -90,14 +90,14 @@ def test_moving_the_whole_robot_moves_the_answer_with_it(seed):
             solve_assembly(home_posture(moved))
         return
     other = solve_assembly(home_posture(moved))
-    floor = 1e-9 * one.energy_without_play
+    floor = 1e-9 * one.energy_without_clearance
     assert other.energy == pytest.approx(one.energy, rel=1e-7, abs=floor)
     one_error = bound_pose_error(one, "frozen")
     other_error = bound_pose_error(other, "frozen")
     for name in ("rotation_error", "translation_error"):
         a, b = getattr(one_error, name), getattr(other_error, name)
         assert a == b or (a[0] <= b[1] + 1e-9 and b[0] <= a[1] + 1e-9)
-    if one.energy > 1e-6 * one.energy_without_play:
+    if one.energy > 1e-6 * one.energy_without_clearance:
         R = rotation_matrix(turn)
         back = np.concatenate([R.T @ other.platform_screw[:3],
                                R.T @ other.platform_screw[3:]])  # fmt: skip

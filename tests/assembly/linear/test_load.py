@@ -5,7 +5,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
-from assembly.linear.load import forces_on
+from assembly.linear.load import loads_on_frames
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from tests.robots_for_tests import planar_four_bar
 
@@ -98,7 +98,7 @@ def test_a_load_on_the_platforms_body_is_the_platforms_load():
     load = np.array([0.1, -0.2, 0.3, 4.0, 5.0, 6.0])
     bodies = np.zeros((6, 6))
     bodies[posture.robot.index("end_a")] = load
-    one, other = forces_on(posture, load), forces_on(posture, bodies=bodies)
+    one, other = loads_on_frames(posture, load), loads_on_frames(posture, bodies=bodies)
     assert np.allclose(one.body, other.body, rtol=0, atol=1e-14)
     assert np.allclose(one.joint, other.joint, rtol=0, atol=1e-14)
 

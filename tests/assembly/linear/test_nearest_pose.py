@@ -13,7 +13,7 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reference import reference_energy
 from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict, settle
+from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.links import joint_compliances, link_compliances
 from assembly.model.robot import Clearance, Frame, Robot
@@ -111,7 +111,7 @@ def test_inside_the_zone_the_pose_is_the_nearest_that_closes(name, seed):
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
     found = predict(here)
-    assert found.open.tolist() == [True]
+    assert found.undetermined.tolist() == [True]
     answer = solve_assembly(posture)
     near, free = nearest_pose(answer, arm_of(posture))
     assert answer.energy < 1e-15
@@ -133,7 +133,7 @@ def test_under_a_load_springs_stay_and_what_is_loose_goes_nearest(name, margin):
     here = as_declared(posture, load, point=POINT)
     answer = solve_assembly(posture, here.load_at_origin()[0])
     found = predict(here)
-    assert found.open.tolist() == [True]
+    assert found.undetermined.tolist() == [True]
     near, _ = nearest_pose(answer, arm_of(posture))
     assert near.energy == pytest.approx(answer.energy, rel=1e-12)
     assert near.duality_gap() <= answer.duality_gap() + 1e-9 * answer.energy
@@ -165,7 +165,7 @@ def test_two_pins_side_by_side_by_hand(play):
     )  # fmt: skip
     posture = home_posture(Robot("pins", "end", frames, (("end", "meets"),)))
     found = predict(as_declared(posture))
-    assert found.open.tolist() == [True]
+    assert found.undetermined.tolist() == [True]
     expected = [0, 0, 0, 1e-4 - play, 0, 0]
     assert found.deviation[0] == pytest.approx(expected, abs=1e-10)
 
@@ -173,7 +173,7 @@ def test_two_pins_side_by_side_by_hand(play):
 def test_a_pose_that_nothing_leaves_free_is_not_marked():
     """A load that presses all play; no play at all."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
-    assert predict(as_declared(tight)).open.tolist() == [False]
+    assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4)
     frames = (
         Frame("one", joint="revolute", clearance=pin, actuated=True),
@@ -190,7 +190,7 @@ def test_a_pose_that_nothing_leaves_free_is_not_marked():
         Frame("end2", "slack")))  # fmt: skip
     for one in (robot, closed):
         found = predict(as_declared(home_posture(one), load))
-        assert found.open.tolist() == [False], one.name
+        assert found.undetermined.tolist() == [False], one.name
         pushed = np.array(load) * 0
         pushed[:2] = 1e-4 * np.array(load[:2]) / np.linalg.norm(load[:2])
         pushed[2], pushed[5] = 1e-4, 2e-5
@@ -201,7 +201,7 @@ def test_a_pose_that_nothing_leaves_free_is_not_marked():
 def test_settled_play_reads_as_the_prediction_that_settled_it():
     """Effects are tried from there: without one nothing may change."""
     here = as_declared(erring("five_bar", 5), point=POINT)
-    found, held = predict(here), predict(settle(here))
+    found, held = predict(here), predict(with_rest_positions(here))
     assert held.deviation == pytest.approx(found.deviation, abs=1e-9)
 
 
@@ -209,7 +209,7 @@ def test_finite_motions_start_from_the_nearest_pose():
     """Errors of 20 um: what finite motions add is far below a micrometre."""
     here = as_declared(erring("five_bar", 0), point=POINT)
     found = predict(replace(here, exact=True))
-    assert found.open.tolist() == [True]
+    assert found.undetermined.tolist() == [True]
     assert found.deviation == pytest.approx(predict(here).deviation, abs=2e-7)
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import _farthest, bound_pose_error
-from assembly.linear.reach import Reach, reachable_screws
+from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.robots.irsbot2 import irsbot2
 from assembly.solvers.conic import cone_sizes
 from assembly.solvers.support import within
@@ -72,7 +72,7 @@ def small_reach(rng, cones, rows, flat):
     H = np.linalg.qr(rng.normal(size=(nv, rows)))[0].T if rows else np.zeros((0, nv))
     start = rng.uniform(-0.5, 0.5, nv)
     X = rng.normal(size=(6, nv)) * 1e-3
-    return Reach(rng.normal(size=6) * 2e-3, X, H, start, group)
+    return ReachableSet(rng.normal(size=6) * 2e-3, X, H, start, group)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.load import row_forces
+from assembly.linear.load import loads_with_weight
 from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_play
+from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 
@@ -34,7 +34,7 @@ def solved(robot, load, errors=None):
     """The robot's only row."""
     errors = robot.errors if errors is None else errors
     postures = at_home(robot)
-    forces = row_forces(postures, np.array(load, dtype=float)[None], STILL)
+    forces = loads_with_weight(postures, np.array(load, dtype=float)[None], STILL)
     return flexibility(postures).solve([0], errors.reshape(1, -1), forces)
 
 
@@ -75,7 +75,7 @@ def test_what_is_claimed_to_be_closed_has_the_least_energy(seed, legs):
     Where it cannot, or nearly cannot, nothing is claimed.
     """
     rng = np.random.default_rng(seed)
-    robot = without_play(random_robot(rng, legs, link_share=0.4))
+    robot = without_joint_clearances(random_robot(rng, legs, link_share=0.4))
     fast = solved(robot, np.zeros(6))
     try:
         slow = solve_assembly(home_posture(robot))

@@ -11,7 +11,7 @@ from assembly.kinematics.posture import Posture, home_posture, place_many_joints
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import assemble_row, predict, read
-from assembly.measurement.settled_clearance import without_play
+from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 
@@ -23,7 +23,7 @@ def situations(name, rng, laws=()):
 
     Errors of 0.2 mm and mrad, forces of some 100 N.
     """
-    robot = without_play(load_robot(name))
+    robot = without_joint_clearances(load_robot(name))
     home = np.array([f.position if f.actuated else np.nan for f in robot.frames])
     wanted = home + ROBOTS[name] * rng.uniform(-1, 1, (3, len(home)))
     postures, _ = place_many_joints(robot, wanted)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies, zone_margins
+from assembly.batch.many_postures import minimise_energies
+from assembly.batch.zone_margins import zone_margins
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly

@@ -14,7 +14,7 @@ from assembly.robots.irsbot2 import (
     ERROR_FRAMES,
     ERROR_LEAST,
     ERROR_MOST,
-    Parameters,
+    IRSBot2Parameters,
     drive_angle,
     irsbot2,
 )
@@ -52,7 +52,7 @@ def test_frames_stand_where_the_reference_puts_them(robot, point):
     column = posture.paths[robot.index("leg1.link_a"), :, 2]
     assert np.abs(column - point["M_1_8_column_RZ"]).max() < 1e-12
     turned = posture.coordinates[robot.index("leg1.drive")]
-    home = drive_angle(Parameters(), 0.0, -0.5)
+    home = drive_angle(IRSBot2Parameters(), 0.0, -0.5)
     # the drive's z axis points along -y, so that its angle is the paper's q
     assert turned + home == pytest.approx(point["q_leg1"], abs=1e-12)
 
@@ -149,7 +149,7 @@ def test_euler_and_timoshenko_links_store_the_same_energy():
     case = NUMBERS["cases"][0]
     energies = []
     for theory in ("euler", "timoshenko"):
-        robot = irsbot2(Parameters(theory=theory)).with_errors(
+        robot = irsbot2(IRSBot2Parameters(theory=theory)).with_errors(
             irsbot2_with(case).errors
         )
         posture = place_robot(robot, pose={"tx": 0.0, "tz": -0.5})

@@ -23,10 +23,9 @@ from assembly.model.links import joint_compliances, link_compliances
 from assembly.model.random_errors import frames_named
 from assembly.model.robot import BeamLink, Clearance, Robot, beam_axis
 from assembly.robots import BUILT_IN, load_robot
-from assembly.robots.delta import Parameters as DeltaParameters
-from assembly.robots.delta import drive_angle
-from assembly.robots.five_bar import Parameters as FiveBarParameters
-from assembly.robots.hexapod import Parameters as HexapodParameters
+from assembly.robots.delta import DeltaParameters, drive_angle
+from assembly.robots.five_bar import FiveBarParameters
+from assembly.robots.hexapod import HexapodParameters
 from assembly.robots.irsbot2 import ERROR_FRAMES
 from assembly.robots.planar import arm_angle
 from forcefit.inputs.table import BadInput

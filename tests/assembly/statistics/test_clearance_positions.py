@@ -10,13 +10,13 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import place_robot
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.robots import load_robot
-from assembly.statistics.play import (
+from assembly.statistics.clearance_positions import (
+    clearance_constraints,
     free_starts,
     loaded_clearances,
-    play_rows,
-    settle_play,
+    position_clearances,
 )
-from assembly.statistics.uniform_play import diagnose, settle_uniformly
+from assembly.statistics.uniform_clearance import diagnose, sample_uniform_position
 
 
 def generators(count, seed=3):
@@ -32,7 +32,7 @@ def walked(rows, starts, count=1500, start=None):
     to_screw = np.zeros((6, starts[-1]))
     to_screw[:, : min(6, starts[-1])] = np.eye(6)[:, : starts[-1]]
     for v, rng in zip(u, generators(count), strict=True):
-        assert settle_uniformly(Z, starts, to_screw, v, rng)
+        assert sample_uniform_position(Z, starts, to_screw, v, rng)
     return u
 
 
@@ -124,11 +124,11 @@ def test_a_walk_that_is_not_mixed_says_so():
     starts, rng = np.array([0, 1, 2]), generators(1)[0]
     along = np.array([[1.0], [1.0]]) / np.sqrt(2)
     corner, to_screw = np.array([1.0, -1.0]), np.eye(6)[:, :2].copy()
-    assert not settle_uniformly(along, starts, to_screw, corner, rng)
+    assert not sample_uniform_position(along, starts, to_screw, corner, rng)
     np.testing.assert_array_equal(corner, [1.0, -1.0])
     middle = np.zeros(2)
-    assert not settle_uniformly(along, starts, to_screw, middle, rng, 0)
-    assert settle_uniformly(along, starts, to_screw, middle, rng)
+    assert not sample_uniform_position(along, starts, to_screw, middle, rng, 0)
+    assert sample_uniform_position(along, starts, to_screw, middle, rng)
 
 
 def near_the_edge(margin):
@@ -149,7 +149,7 @@ def test_near_the_edge_of_a_zone_longer_walks_change_no_distribution(margin):
     """All mixed; and four mixed walks in a row end nowhere else."""
     one, errors = near_the_edge(margin)
     found = one.solve(np.repeat(errors[None], 200, axis=0))
-    some, mixed = settle_play(one, found, "uniform", generators(200, 3))
+    some, mixed = position_clearances(one, found, "uniform", generators(200, 3))
     assert mixed.all()
     more = [settle_longer(one, found, rng) for rng in generators(200, 4)]
     for a, b in zip(some.T, np.array(more).T, strict=True):
@@ -159,12 +159,12 @@ def test_near_the_edge_of_a_zone_longer_walks_change_no_distribution(margin):
 def settle_longer(one, found, rng):
     """Platform screw after four mixed walks, one from where the other ended."""
     free = ~loaded_clearances(one, found)[0]
-    rows = play_rows(one, ~free)[:, free]
+    rows = clearance_constraints(one, ~free)[:, free]
     Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
     to_screw = np.ascontiguousarray(one.screws[:, : len(free)][:, free])
     u = found.clearances[0][free].copy()
     for _ in range(4):
-        settle_uniformly(Z, free_starts(one, free), to_screw, u, rng)
+        sample_uniform_position(Z, free_starts(one, free), to_screw, u, rng)
     return found.platform_screw[0] + to_screw @ (u - found.clearances[0][free])
 
 
@@ -184,7 +184,7 @@ def test_play_changes_neither_energy_nor_bounds(drawn, play):
     loaded = loaded_clearances(one, found)
     assert not loaded[found.energy < 1e-20].any()
     assert loaded[found.energy > 1e-8].any()
-    settled, mixed = settle_play(one, found, play, generators(600))
+    settled, mixed = position_clearances(one, found, play, generators(600))
     assert mixed.all()
     assert np.isfinite(settled).all()
     assert np.abs(settled - found.platform_screw).max() > 1e-5
@@ -197,7 +197,7 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
     size = size_of(one.posture.robot)
     push[:, 3:] /= size
     at_contact, anywhere = (
-        settle_play(one, found, play, generators(600))[0]
+        position_clearances(one, found, play, generators(600))[0]
         for play in ("contact", "uniform")
     )
     reach = (push * at_contact).sum(axis=1) - (push * anywhere).sum(axis=1)
@@ -207,4 +207,4 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
 def test_an_unknown_way_is_refused(drawn):
     one, found = drawn
     with pytest.raises(ValueError, match="play is 'most'"):
-        settle_play(one, found, "most", generators(600))
+        position_clearances(one, found, "most", generators(600))

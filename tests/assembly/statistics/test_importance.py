@@ -10,14 +10,15 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import (
     linear_importance,
     sobol_importance,
     source_groups,
 )
+from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.play import PLAY
 from assembly.statistics.summary import summarise, summary_text
 
 
@@ -122,7 +123,7 @@ def stiff():
 
 def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
     """0.9 and 0.1 um; parts of 1e-5 / sqrt(3) times these."""
-    data = run_draws(stiff, 50, importance=(3000, "source"))
+    data = run_draws(stiff, 50, importance=ImportanceOptions(3000, "source"))
     said = summarise(data)
     report = said["importance"]["platform"]
     for name, gain in (("one.TX", 0.9), ("two.TX", 0.1)):
@@ -148,9 +149,13 @@ def test_random_play_is_not_taken_for_importance():
     )
     robot = Robot("arm", "tip", frames)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
-    for play in PLAY:
-        experiment = Experiment(home_posture(robot), sources, play=play, margins=False)
-        said = summarise(run_draws(experiment, 20, importance=(500, "source")))
+    for play in CLEARANCE_MODELS:
+        experiment = Experiment(
+            home_posture(robot), sources, clearance_model=play, margins=False
+        )
+        said = summarise(
+            run_draws(experiment, 20, importance=ImportanceOptions(500, "source"))
+        )
         found = said["importance"]["platform"]["tip.TX"]
         assert found["translation_gain"] == pytest.approx(1.0, rel=0.1)
         expected = "worst" if play == "worst" else "least"
@@ -166,7 +171,7 @@ def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff
     robot = Robot("rigid", "one", frames, (("one", "two"),))
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     data = run_draws(Experiment(home_posture(robot), sources), 200,
-                     importance=(100, "source"))  # fmt: skip
+                     importance=ImportanceOptions(100, "source"))  # fmt: skip
     said = summarise(data)
     one = said["importance"]["quantities"]["translation"]
     assert one["largest_share_left_out"] > 0.3

@@ -17,6 +17,7 @@ from assembly.model.link_stress import peak_stresses
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.plot import (
     allocation_figure,
@@ -68,9 +69,9 @@ def test_a_draw_is_what_one_solve_says(experiment):
         posture = replace(experiment.posture, robot=robot.with_errors(errors))
         answer = solve_assembly(posture)
         one = data.isel(draw=i)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_play
+        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
         assert float(one["energy"]) == pytest.approx(answer.energy, abs=allowed)
-        if answer.energy > 1e-6 * answer.energy_without_play:
+        if answer.energy > 1e-6 * answer.energy_without_clearance:
             sizes = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
             assert float(one["force"]) == pytest.approx(sizes.max(), rel=1e-3)
             stress = peak_stresses(robot, answer.wrenches)
@@ -108,7 +109,7 @@ def test_a_kill_while_importance_is_found_loses_no_draw(
     experiment, small_blocks, tmp_path
 ):
     """The whole file, importance too, ends in the same bytes."""
-    groups = (16, "kind")
+    groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
     run_draws(experiment, 100, whole, importance=groups)
     total = []

@@ -241,7 +241,7 @@ def test_a_force_is_shared_by_lagranges_multipliers(play):
     np.testing.assert_allclose(found.tolerances, total * share, rtol=5e-3)
     best = float((c / (total * share)).sum())
     assert best * (1 - 1e-9) <= found.price <= 1.002 * best
-    assert found.price < 0.95 * found.price_alike
+    assert found.price < 0.95 * found.price_uniformly_scaled
     assert found.worst["force"][0] == pytest.approx(F, rel=1e-3)
     assert np.isnan(found.worst["force"][1])
     assert found.verification["verdict"] == "no draw failed"
@@ -271,9 +271,9 @@ def test_a_pose_error_is_shared_by_lagranges_multipliers():
     best = D * np.sqrt(c / w) / np.sqrt(c * w).sum()
     np.testing.assert_allclose(found.tolerances, best, rtol=5e-3)
     alike = D * np.sqrt(c) / (w * np.sqrt(c)).sum()
-    np.testing.assert_allclose(found.alike, alike, rtol=5e-3)
+    np.testing.assert_allclose(found.uniformly_scaled, alike, rtol=5e-3)
     assert found.price == pytest.approx((c / best).sum(), rel=2e-3)
-    assert found.price_alike == pytest.approx((c / alike).sum(), rel=2e-3)
+    assert found.price_uniformly_scaled == pytest.approx((c / alike).sum(), rel=2e-3)
 
 
 @pytest.mark.slow
@@ -297,7 +297,7 @@ def test_with_a_yield_pose_errors_add_up_as_squares():
     # 10000 draws know the quantile to 1 %, and its slopes' ratio to a few
     assert found.price == pytest.approx((c / best).sum(), rel=0.03)
     np.testing.assert_allclose(found.tolerances / best, 1.0, atol=0.12)
-    assert found.price < 0.97 * found.price_alike
+    assert found.price < 0.97 * found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
 
 
@@ -313,14 +313,14 @@ def several(paper):
               "margin_free": 4.0}  # fmt: skip
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
                 np.zeros(2), np.array([0.05, 0.005]), limits, asked_yield=0.9,
-                draws=200, play="least")  # fmt: skip
+                draws=200, clearance_model="least")  # fmt: skip
     return postures, plan, allocate(postures, plan, fresh=300)
 
 
 def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
     _, _, found = several
     assert np.isnan(found.price_bound)
-    assert found.price <= found.price_alike
+    assert found.price <= found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
 
 
@@ -369,7 +369,7 @@ def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
                 draws=200)  # fmt: skip
     with pytest.raises(BadInput, match="even perfect parts reach 0.0003877 m by play"):
         allocate([posture], plan, fresh=0)
-    at_rest = allocate([posture], replace(plan, play="least"), fresh=0)
+    at_rest = allocate([posture], replace(plan, clearance_model="least"), fresh=0)
     assert at_rest.tolerances.min() > 0
 
 
@@ -382,7 +382,7 @@ def test_with_the_worst_play_fresh_draws_stay_within_the_limit(paper):
                 np.zeros(2), np.array([0.05, 0.005]), {"translation": limit},
                 asked_yield=0.9, draws=200)  # fmt: skip
     found = allocate([posture], plan, fresh=300)
-    assert found.price <= found.price_alike
+    assert found.price <= found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
     half = plan.spread(found.tolerances)
     fits, largest = 0, 0.0
@@ -406,7 +406,9 @@ def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
     robot = Robot("arm", "tip", frames)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
     for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):
-        found = allocate([place_robot(robot)], replace(plan, play=play), fresh=100)
+        found = allocate(
+            [place_robot(robot)], replace(plan, clearance_model=play), fresh=100
+        )
         assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
         said = allocation_text(allocation_of(found))
         assert f"pose errors: play {play}" in said
@@ -415,7 +417,7 @@ def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
 class Coin:
     """Robots of which a known share holds, for the verification alone."""
 
-    asked_yield, postures, places = 0.9, (None,), (("force", 0),)
+    asked_yield, postures, cases = 0.9, (None,), (("force", 0),)
 
     def __init__(self, holds, seed):
         self.holds, self.seed, self.plan = holds, seed, self
@@ -426,7 +428,7 @@ class Coin:
     def spread(self, tolerances):
         return tolerances
 
-    def shares(self, values):
+    def utilisations(self, values):
         share = np.where(values.T < self.holds, 0.5, 2.0)
         return share, share
 
@@ -437,7 +439,7 @@ def test_looking_several_times_is_wrong_no_more_often_than_said(monkeypatch):
     The yield is just so low that most looks contradict it and another follows; with
     the whole error at every look 9 % missed.  A coin cannot be tightened.
     """
-    monkeypatch.setattr(verification, "fit", lambda work, samples, t: t)
+    monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2])
     monkeypatch.setattr(verification, "bracketed", cache(verification.bracketed))
     holds, trials, missed, looks = 0.85, 3000, 0, 0
     for seed in range(trials):

@@ -9,9 +9,9 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import load_robot
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment, precision_for
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.play import PLAY
 from assembly.statistics.responses import respond
 from assembly.statistics.summary import summarise, summary_text
 
@@ -46,7 +46,7 @@ def test_one_disc_of_play_adds_its_radius_along_the_error():
     experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
                             precision=(1e-9, 1e-9))  # fmt: skip
     values = experiment.sources.draw(0, 50, seed=1)
-    rows = experiment.answer(values, range(50))
+    rows = experiment.evaluate(values, range(50))
     worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
     assert (rows["translation_lower"] <= worst * (1 + 1e-12)).all()
     assert (rows["translation"] >= worst * (1 - 1e-12)).all()
@@ -58,7 +58,7 @@ def test_tilt_swings_the_tip_on_its_arm():
     """Tilt b about y moves a tip at distance L along x by L b; no radial play."""
     robot = chain(0.0, TILT)
     experiment = Experiment(home_posture(robot), tip_errors(robot, 0.0))
-    rows = experiment.answer(np.zeros((1, 0)), range(1))
+    rows = experiment.evaluate(np.zeros((1, 0)), range(1))
     assert rows["rotation"][0] == pytest.approx(TILT, abs=1e-6)
     assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
 
@@ -67,9 +67,9 @@ def test_tilt_swings_the_tip_on_its_arm():
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
 def test_no_other_play_is_worse_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
-    worst, other = papers(share), papers(share, play=play)
+    worst, other = papers(share), papers(share, clearance_model=play)
     values = worst.sources.draw(0, 60, seed=1)
-    bound, found = (e.answer(values, range(60)) for e in (worst, other))
+    bound, found = (e.evaluate(values, range(60)) for e in (worst, other))
     for name in ("rotation", "translation"):
         assert (bound[name] >= found[name] - 1e-9).all()
         assert (bound[f"{name}_lower"] <= bound[name]).all()
@@ -91,7 +91,7 @@ def test_more_play_is_never_better_where_play_alone_suffices():
         ))  # fmt: skip
         posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
         experiment = Experiment(posture, own, margins=False)
-        rows = experiment.answer(values, range(40))
+        rows = experiment.evaluate(values, range(40))
         assert rows["energy"].max() < 1e-20
         if before is not None:
             for name in ("rotation", "translation"):
@@ -109,8 +109,10 @@ def replace_robot(sources, robot):
 def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
     """Parts so good that play alone suffices: 0.1 mm is met at rest only."""
     limits, share = {"translation": 1e-4}, {}
-    for play in PLAY:
-        data = run_draws(papers(0.025, play=play, precision=precision_for(limits)), 120)
+    for play in CLEARANCE_MODELS:
+        data = run_draws(
+            papers(0.025, clearance_model=play, precision=precision_for(limits)), 120
+        )
         said = summarise(data, limits)
         share[play] = said["within_limits"]["probability"]
         assert said["within_limits"]["play"] == said["exceeds"]["translation"]["play"]
@@ -145,7 +147,7 @@ def test_a_load_that_takes_up_all_play_leaves_nothing_to_the_worst():
     robot = chain()
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
-    rows = Experiment(home_posture(robot), sources, load=load, margins=False).answer(
+    rows = Experiment(home_posture(robot), sources, load=load, margins=False).evaluate(
         values, range(10)
     )
     rest = np.linalg.norm(values + [RADIAL, 0, 0], axis=1)
@@ -180,4 +182,4 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
 
 def test_an_unknown_play_is_refused():
     with pytest.raises(ValueError, match="play is 'most', expected one of"):
-        papers(0.1, play="most")
+        papers(0.1, clearance_model="most")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects.acting import act
+from assembly.effects.robot_effects import apply_robot_effects
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.robots import load_robot
@@ -64,11 +64,11 @@ def test_points_with_effects_are_those_of_one_posture(load):
     for tx in (-0.1, 0.1):
         there = data.sel(tx=tx, tz=-0.45, method="nearest")
         posture = place_robot(robot, pose={"tx": tx, "tz": -0.45})
-        acting = act(posture, load, covariates={"temperature": 8.0})
-        one = solve_assembly(acting.posture, acting.load)
+        applied = apply_robot_effects(posture, load, covariates={"temperature": 8.0})
+        one = solve_assembly(applied.posture, applied.load)
         assert there.status == "ok"
         assert float(there.energy) == pytest.approx(one.energy, rel=1e-6)
-        row = acting.posture.robot.index("leg1.link_a")
+        row = applied.posture.robot.index("leg1.link_a")
         assert there.wrench.values[0] == pytest.approx(
             one.wrenches[row], rel=1e-3, abs=1e-3 * np.abs(one.wrenches).max()
         )

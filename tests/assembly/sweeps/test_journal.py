@@ -290,7 +290,7 @@ def test_block_size_changes_no_number():
     """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
     from dataclasses import replace
 
-    options = {"reading": "frozen", "wrenches": ("left.elbow",), "play_alone": True}
+    options = {"reading": "frozen", "wrenches": ("left.elbow",), "clearance_only": True}
     small = small_sweep(**options)
     one = sweep_in_memory(small)
     other = sweep_in_memory(replace(small, block_size=15))

@@ -38,7 +38,7 @@ def data(robot):
     """Everything that can be asked for, at six postures."""
     axes = parse_grid(GRID)
     question = Question(
-        robot, None, (), tuple(axes), reading="free", play_alone=True,
+        robot, None, (), tuple(axes), reading="free", clearance_only=True,
         wrenches=("leg1.link_a", "leg2.elbow_b_first"), linearisation=True,
     )  # fmt: skip
     return sweep_in_memory(Sweep(question, grid_targets(axes)))

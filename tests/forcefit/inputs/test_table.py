@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from forcefit.inputs.errors import one_line
+from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import (
     BadInput,
     Table,
     describe,
-    find_fault,
     nearest,
-    number_array,
     quoted,
     read_text,
     read_toml,

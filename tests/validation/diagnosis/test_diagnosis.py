@@ -206,7 +206,7 @@ def test_a_corrected_robot_predicts_what_the_fit_predicts(diagnosed):
         commanded = dict(zip(("one", "two"), campaign.coordinates[row], strict=False))
         here = as_declared(
             place_robot(robot, joints=commanded), campaign.loads[row],
-            temperature=campaign.covariates["temperature"][row],
+            covariates={"temperature": campaign.covariates["temperature"][row]},
         )  # fmt: skip
         told = predict(apply_effects(here, robot.effects)).deviation[0]
         expected = campaign.measured[row] - found.residual_after[row]

@@ -12,7 +12,7 @@ import xarray
 
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import place_robot
-from assembly.report.results import pose_error_of
+from assembly.report.pose_errors import pose_error_of
 from assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with

@@ -81,7 +81,7 @@ def machine(robot):
             UNDER)
         for p, w in zip(placed, loads, strict=True)
     ]  # fmt: skip
-    return as_declared(both, loads, point=POINT, **UNDER), rows
+    return as_declared(both, loads, point=POINT, covariates=UNDER), rows
 
 
 def test_no_effect_is_left_out():

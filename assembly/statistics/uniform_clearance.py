@@ -1,17 +1,16 @@
-"""Points uniform in the set where play may sit, by billiards.
+"""Uniformly distributed positions of the clearances, by the billiard walk.
 
 The set is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near the edge of a
-zone it is thin in some directions, and a walk with steps alike in all would hardly move
-along the others.  So flights start in directions of Dikin's ellipsoid at the analytic
-centre, which has the set's own proportions: it lies within, and the set is no farther
-from it than the number of cones.  Stretching the set changes nothing.
+zone it is thin in some directions, and a walk with isotropic steps would mix slowly.
+So the directions are drawn from Dikin's ellipsoid at the analytic centre, which has the
+proportions of the set: the ellipsoid lies inside the set, and the set inside the
+ellipsoid scaled by the number of cones.  The walk is affine invariant.
 
-A flight goes straight on and is mirrored at every bound it meets, as a billiard ball
-is, for a random time: it crosses the set several times where a step of hit-and-run
-ends at the first bound.  Several walks from different places are compared.  They are
-made longer by two, what came before left out, until split R-hat and the effective
-sample size of every component of the platform's screw say that all have forgotten
-where they began.
+A trajectory is straight and reflected at every bound it meets, for a random time: it
+crosses the set several times, where a step of hit-and-run ends at the first bound.
+Several chains from different starts are compared.  Their length is doubled, the earlier
+half discarded, until split R-hat and the effective sample size of every component of
+the platform's screw meet their criteria.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm; Nesterov,
@@ -22,18 +21,18 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-CHAINS, KEPT = 4, 64  # walks, and points of each that are compared
-R_HAT, EFFECTIVE = 1.05, 100.0  # most, and least
-DOUBLINGS = 10  # of the walks: flights of a draw, 4 x 65 472 at most
-_STILL = 1e-12  # [rad or m] deviation of a component that does not move
-_NEWTON = 300
+CHAINS, KEPT = 4, 64  # chains, and points of each that are compared
+R_HAT, EFFECTIVE = 1.05, 100.0  # largest R-hat, smallest effective sample size
+DOUBLINGS = 10  # of the chains: trajectories of a draw, 4 x 65 472 at most
+_CONSTANT = 1e-12  # [rad or m] standard deviation of a component that does not vary
+_NEWTON = 300  # iterations
 
 
-def settle_uniformly(
+def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """A point uniform in the set.
+    """A point uniformly distributed over the set.
 
     Args:
         Z: (nu, n) orthonormal columns: the directions in which u may move.
@@ -41,22 +40,22 @@ def settle_uniformly(
         to_screw: (6, nu) [rad, m] what u does to the platform.
         u: (nu,) a point of the set, overwritten with the new one.
         rng: of random numbers.
-        doublings: of the walks, at most.
+        doublings: of the chains, at most.
 
     Returns:
-        Whether the walks met the criterion; u stays where the set has no inside.
+        Whether the chains mixed; u is unchanged where the set has empty interior.
     """
-    from assembly.statistics.billiard_walk import begin_apart, walk
+    from assembly.statistics.billiard_walk import start_chains, walk
 
     if Z.shape[1] == 0:
         return True
-    found = _ellipsoid(Z, starts, u)
-    if found is None:
+    ellipsoid = _ellipsoid(Z, starts, u)
+    if ellipsoid is None:
         return False
-    centre, M = found
+    centre, M = ellipsoid
     gram = M @ M.T
     walks = np.empty((CHAINS, len(u)))
-    begin_apart(M, starts, centre, rng, walks)
+    start_chains(M, starts, centre, rng, walks)
     trace = np.empty((CHAINS, KEPT, 6))
     mixed = False
     for k in range(doublings):
@@ -74,11 +73,11 @@ def _ellipsoid(
 ) -> tuple[NDArray, NDArray] | None:
     """The analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
 
-    Least of -sum log(rho^2 - |u_k|^2) by Newton's method, damped so that it stays
-    inside; rho begins where the start is inside and shrinks to 1.
+    Minimum of -sum log(rho^2 - |u_k|^2) by damped Newton steps, which stay inside; rho
+    begins so that the start is inside and decreases to 1.
 
     Returns:
-        Both, each axis a column; None where the set has no inside.
+        Both, each axis a column; None where the set has empty interior.
     """
     u, heads = start.copy(), starts[:-1]
     cone = np.repeat(np.arange(len(heads)), np.diff(starts))
@@ -93,7 +92,7 @@ def _ellipsoid(
             step = np.linalg.solve(H, -g)
             # M M^T = Z H^-1 Z^T
             M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
-        except np.linalg.LinAlgError:  # thinner than numbers can tell: no inside
+        except np.linalg.LinAlgError:  # numerically empty interior
             return None
         decrement = np.sqrt(max(0.0, -float(g @ step)))
         if rho == 1.0 and decrement < 1e-3:
@@ -111,15 +110,15 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """How far the fullest cone is filled."""
+    """Largest size over the cones; 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
 def is_mixed(trace: NDArray) -> bool:
-    """Whether every component (chains, kept, components) that moves is mixed."""
-    moving = trace[:, :, trace.std(axis=(0, 1)) > _STILL]
+    """Whether every component (chains, kept, components) that varies has mixed."""
+    moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
-        # written so that what is not a number fails
+        # written so that NaN fails
         r_hat <= R_HAT and effective >= EFFECTIVE
         for r_hat, effective in map(diagnose, np.moveaxis(moving, 2, 0))
     )
@@ -132,7 +131,7 @@ def diagnose(x: NDArray) -> tuple[float, float]:
         x: (chains, 2 k) values along each chain; the halves count as chains.
 
     Returns:
-        Both; R-hat nears 1 as the chains forget where they began.
+        Both; R-hat tends to 1 as the chains become independent of their starts.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)
@@ -142,7 +141,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
     within = float((halves**2).sum()) / (m * (k - 1))
     whole = within * (k - 1) / k + float(means.var()) * m / (m - 1)
     r_hat = np.sqrt(whole / within)
-    # Geyer: sums of neighbouring correlations, until one is not positive, not rising
+    # Geyer's initial monotone sequence: sums of pairs of autocorrelations, while
+    # positive and not increasing
     time, before = -1.0, np.inf
     for lag in range(0, k - 1, 2):
         pair = 0.0

@@ -1,4 +1,4 @@
-"""A robot file's effects, at work in one situation."""
+"""The effects of a robot's file, applied at one posture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,25 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import Conditions, as_declared
+from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, nearest
 
-COVARIATES = ("temperature", "time", "approach")
-
 
 @dataclass(frozen=True, eq=False)
-class Acting:
-    """One situation with the effects of the robot's file.
+class AppliedEffects:
+    """A posture, load and gravity with the effects of the robot's file applied.
 
     Attributes:
-        posture: of the robot as the effects make it: its errors, springs, clearances,
-            and a foundation if it has one.
+        posture: of the robot with the errors, springs, clearances and foundation that
+            the effects give it.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, None without weight.
-        conditions: all of that, and what the measuring device adds.
+        conditions: one row: all of that, and what the measuring device adds.
     """
 
     posture: Posture
@@ -37,29 +35,29 @@ class Acting:
     __repr__, _repr_html_ = short_repr, html_table
 
     def reading(self, platform_screw: ArrayLike) -> NDArray:
-        """(6,) [rad, m] what a device reads of a platform screw."""
+        """(6,) [rad, m] a device's reading of a platform screw."""
         return read(self.conditions, np.array(platform_screw, dtype=float)[None])[0]
 
 
-def act(
+def apply_robot_effects(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     covariates: Mapping[str, float] | None = None,
     *,
     finite: bool = False,
-) -> Acting:
-    """Put the effects of a robot's file to work.
+) -> AppliedEffects:
+    """Apply the effects of a robot's file at one posture.
 
     Args:
-        posture: where the robot stands, as declared.
+        posture: of the robot as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
+        gravity: (3,) [m/s^2] base axes, added to that of the effects.
         covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
-        finite: whether what follows is the exact model.
+        finite: whether the exact model is used.
 
     Returns:
-        The situation; without effects, what was given.
+        All with the effects applied; without effects, what was given.
 
     Raises:
         BadInput: an effect needs a covariate that is not given, or asks for finite
@@ -68,35 +66,39 @@ def act(
     given = dict(covariates or {})
     effects = posture.robot.effects
     check_covariates(posture.robot, given, finite=finite)
-    plain = replace(posture, robot=replace(posture.robot, effects={}))
+    declared_only = replace(posture, robot=replace(posture.robot, effects={}))
     declared = as_declared(
-        plain,
+        declared_only,
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        **given,
+        covariates=given,
     )
-    here = apply_effects(declared, effects)
-    g = here.gravity[0] if here.gravity.any() else None
-    where = assemble_row(here, 0).posture if here.laws else here.posture(0)
+    conditions = apply_effects(declared, effects)
+    g = conditions.gravity[0] if conditions.gravity.any() else None
+    effective = (
+        assemble_row(conditions, 0).posture
+        if conditions.laws
+        else conditions.posture(0)
+    )
     if not effects:
-        where = posture
-    return Acting(where, here.load_at_origin()[0], g, here)
+        effective = posture
+    return AppliedEffects(effective, conditions.load_at_origin()[0], g, conditions)
 
 
 def check_covariates(
     robot: Robot, given: Mapping[str, float], *, finite: bool = False
 ) -> None:
-    """Refuse effects that cannot be put to work with what is given.
+    """Refuse effects that cannot be applied under the covariates given.
 
     Args:
         robot: with the effects of its file.
         given: covariates by name.
-        finite: whether the exact model is asked.
+        finite: whether the exact model is used.
 
     Raises:
         BadInput: an unknown covariate, one that an effect needs and is not given, or
-            an effect that asks for finite motions.
+            an effect that needs finite motions.
     """
     for name in given:
         if name not in COVARIATES:

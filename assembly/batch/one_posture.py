@@ -1,0 +1,268 @@
+"""Problem (22) at one posture, prepared for many draws of the errors.
+
+Free motions and springs are eliminated once: only the right sides differ from draw to
+draw, and every result, certificates included, is a linear map of few numbers.  A draw
+whose certificate falls short, or that this does not cover, is solved again: without
+loads by :mod:`assembly.batch.many_postures`, under loads by
+:mod:`assembly.linear.energy`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.batch.draws import Draws
+from assembly.batch.many_postures import minimise_energies
+from assembly.batch.posture_loads import PostureLoads
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import VirtualJoints
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.linear.rounding import closure_rounding, drop_zeros
+from assembly.linear.thresholds import INFEASIBLE, OPEN
+from assembly.solvers.conic import (
+    GAP,
+    GAP_WITHOUT_PLAY,
+    SolverFailed,
+    minimise_energy,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class OnePosture:
+    """A posture prepared for any errors, by ``prepare_energies``.
+
+    With n frames, nu clearances, r springs left after elimination, m = 6 closures;
+    ``screws``, ``motions`` and ``left`` take the columns [clearances | errors].
+
+    Attributes:
+        posture: where the robot stands; its own errors do not matter.
+        joints: what may move.
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        G: (r, nu) sensitivity of the scaled strains to the clearances.
+        H: (p, nu) rows of the clearances that no spring enters; where there are any,
+            every draw goes to the fallback.
+        closures: (m, 6n) scaled closure rows.
+        misfit: (r, 6n) sensitivity of the scaled strains to the errors, h = misfit @
+            errors; also the work of unit multipliers on the errors, before any
+            elimination.
+        closing: (m, r) closure multipliers of the springs'.
+        pulls: (ny, r) generalised forces of these on the springs, before elimination.
+        cones: (nu, r) on the clearances, likewise.
+        free: (nq, r) on free motions: nothing but rounding.
+        redundant: (m, m - ..) closure rows that neither free motions nor springs enter,
+            orthonormal columns.
+        infeasible: (m - .., 6n) infeasible component of the errors, redundant.T @
+            closures.
+        screws: (6, nu + 6n) platform screw.
+        platform: (6, 6n) screws of all frames to the platform's.
+        motions: (nq, nu + 6n) free motions.
+        left: (m, nu + 6n) residual of the closures: rounding.
+        ranges: (nq,) [rad or m] bounds of the free motions, which were left out.
+        wrench: (n, 6, m) [N m, N] wrenches of unit closure multipliers.
+        loads: on the robot, None if there are none.
+    """
+
+    posture: Posture
+    joints: VirtualJoints
+    starts: NDArray
+    G: NDArray
+    H: NDArray
+    closures: NDArray
+    misfit: NDArray
+    closing: NDArray
+    pulls: NDArray
+    cones: NDArray
+    free: NDArray
+    redundant: NDArray
+    infeasible: NDArray
+    screws: NDArray
+    platform: NDArray
+    motions: NDArray
+    left: NDArray
+    ranges: NDArray
+    wrench: NDArray
+    loads: PostureLoads | None = None
+
+    def solve(self, errors: ArrayLike) -> Draws:
+        """Least energies of k draws.
+
+        Args:
+            errors: (k, n, 6) [rad, m] delta l.
+
+        Returns:
+            Energies, screws, multipliers and certificates.  Under loads ``energy`` is
+            what is stored, and ``bound`` is it less the certified gap of energy minus
+            work.
+
+        Raises:
+            ValueError: the shape does not fit the robot, or a value is not finite.
+        """
+        errors = np.asarray(errors, dtype=float)
+        count, n = len(errors), len(self.posture.robot.frames)
+        if errors.shape != (count, n, 6) or not np.isfinite(errors).all():
+            raise ValueError(
+                f"errors have shape {errors.shape}, expected (k, {n}, 6), all finite"
+            )
+        if self.loads is not None:
+            return _solve_loaded(self, self.loads, errors)
+        return _solve_unloaded(self, errors)
+
+    def wrenches(self, multipliers: NDArray) -> NDArray:
+        """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
+        wrenches = np.tensordot(multipliers, self.wrench, axes=(1, 2))
+        if self.loads is not None:
+            wrenches += self.loads.frame_loads.body.reshape(-1, 6)
+        return wrenches
+
+
+def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
+    """Least energies of k draws without loads."""
+    from assembly.batch.compiled_draws import least_energies
+
+    count, n = len(errors), len(one.posture.robot.frames)
+    flat = errors.reshape(-1, 6 * n)
+    erring = np.flatnonzero(flat.any(axis=0))  # most components have no error
+    e = np.ascontiguousarray(flat[:, erring])
+    r, nu = one.G.shape
+    u, y = np.zeros((count, nu)), np.zeros((count, r))
+    energy, bound = np.zeros(count), np.zeros(count)
+    outcome = np.zeros(count, dtype=np.int64)
+    columns = np.concatenate([np.arange(nu), nu + erring])
+    screws, motions, left = (m[:, columns] for m in (one.screws, one.motions, one.left))
+    # nothing is larger than this in any draw, which saves a look at each one
+    most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
+    slip = np.abs(one.free).T @ (np.abs(motions) @ most)
+    least_energies(
+        np.ascontiguousarray(one.G.T), one.starts,
+        e @ one.misfit[:, erring].T, np.linalg.pinv(one.G), one.cones,
+        one.pulls.T @ one.pulls,
+        float(np.linalg.norm(slip)), u, y, energy, bound, outcome,
+    )  # fmt: skip
+    parts = np.hstack([u, e])
+    fallback = (outcome > 0) | bool(len(one.H))
+    for rows, limit in ((left, np.full(len(left), OPEN)), (motions, one.ranges)):
+        if (np.abs(rows) @ most > limit).any():
+            fallback |= (np.abs(parts @ rows.T) > limit).any(axis=1)
+    infeasible = np.abs(e @ one.infeasible[:, erring].T)
+    fallback |= infeasible.max(axis=1, initial=0.0) > INFEASIBLE
+    multipliers = y @ one.closing.T
+    rounding = closure_rounding(errors, one.joints, size_of(one.posture.robot))
+    drop_zeros(energy, bound, multipliers, rounding)
+    draws = Draws(
+        energy=energy,
+        bound=bound,
+        clearances=u,
+        multipliers=multipliers,
+        platform_screw=parts @ screws.T,
+        fallback=fallback,
+    )
+    _solve_fallback(one, errors, draws)
+    return draws
+
+
+def _solve_fallback(one: OnePosture, errors: NDArray, draws: Draws) -> None:
+    """Solve again the draws without loads that are marked."""
+    rows = np.flatnonzero(draws.fallback)
+    if not len(rows):
+        return
+    posture = one.posture
+    T = np.broadcast_to(posture.transforms, (len(rows), *posture.transforms.shape))
+    energies = minimise_energies(
+        posture.robot, T.copy(), errors[rows], posture.mismatch
+    )
+    draws.energy[rows], draws.bound[rows] = energies.energy, energies.bound
+    draws.platform_screw[rows] = energies.platform_screw
+    draws.clearances[rows] = energies.clearances
+    multipliers = energies.multipliers
+    if not len(one.H):
+        # the smallest wrenches where rigid parts leave them undetermined; those of
+        # joints at the end of their motion stay
+        multipliers = multipliers - multipliers @ one.redundant @ one.redundant.T
+    draws.multipliers[rows] = multipliers
+
+
+def _solve_loaded(one: OnePosture, loads: PostureLoads, errors: NDArray) -> Draws:
+    """Least energies of k draws under loads."""
+    count, nu = len(errors), one.G.shape[1]
+    e = errors.reshape(count, -1)
+    h = e @ one.misfit.T + loads.h
+    u, y = np.full((count, nu), np.nan), np.full(h.shape, np.nan)
+    if not len(one.H):
+        none = np.zeros((0, nu)), np.zeros(0)
+        for i in range(count):
+            try:
+                least = minimise_energy(one.G, h[i], loads.d, *none, one.joints.group)
+            except SolverFailed:
+                continue
+            u[i], y[i] = least.clearances, least.springs
+    springs = (u @ one.G.T + h) @ loads.spread.T + loads.springs
+    parts = np.hstack([u, e])
+    motions = parts @ one.motions.T + loads.motions
+    multipliers = loads.multipliers + y @ one.closing.T
+    energy = (springs**2).sum(axis=1) / 2
+    gap = _loaded_gaps(one, loads, e, u, springs, motions, multipliers)
+    residual = parts @ one.left.T + one.closures @ loads.screws
+    residual = np.abs(residual).max(axis=1, initial=0.0)
+    infeasible = np.abs(e @ one.infeasible.T).max(axis=1, initial=0.0)
+    allowed = GAP * energy + GAP_WITHOUT_PLAY * (h**2).sum(axis=1) / 2
+    # written so that NaN is not certified
+    certified = (gap <= allowed) & (residual <= OPEN) & (infeasible <= INFEASIBLE)
+    certified &= (np.abs(motions) <= one.ranges).all(axis=1)
+    draws = Draws(
+        energy=energy,
+        bound=energy - np.abs(gap),
+        clearances=u,
+        multipliers=multipliers,
+        platform_screw=parts @ one.screws.T + one.platform @ loads.screws,
+        fallback=~certified,
+    )
+    for i in np.flatnonzero(draws.fallback).tolist():
+        _solve_loaded_fallback(one, loads, errors[i], draws, i)
+    return draws
+
+
+def _loaded_gaps(
+    one: OnePosture, loads: PostureLoads, e: NDArray, u: NDArray, springs: NDArray,
+    motions: NDArray, multipliers: NDArray,
+) -> NDArray:  # fmt: skip
+    """(k,) [J] energy minus work, less its certified lower bound."""
+    # the bound is that of assembly.linear.assembled.Assembly, on the whole problem
+    joints, on_frames = one.joints, loads.frame_loads
+    closing = multipliers @ one.closures
+    body, joint = closing + on_frames.body, closing + on_frames.joint
+    on_springs = np.where(joints.links, body @ joints.elastic, joint @ joints.elastic)
+    on_cones = (joint @ joints.cones) ** 2
+    sizes = on_cones
+    if u.size:
+        sizes = np.sqrt(np.add.reduceat(on_cones, one.starts[:-1], axis=1))
+    slip = np.abs(joint @ joints.free) * np.abs(motions)
+    bound = -(body * e).sum(axis=1) - (on_springs**2).sum(axis=1) / 2
+    bound = bound - sizes.sum(axis=1) - slip.sum(axis=1)
+    of_links = (springs * joints.links) @ joints.elastic.T
+    of_joints = (springs * ~joints.links) @ joints.elastic.T
+    of_joints = of_joints + u @ joints.cones.T + motions @ joints.free.T
+    work = (e + of_links) @ on_frames.body + of_joints @ on_frames.joint
+    return (springs**2).sum(axis=1) / 2 - work - bound
+
+
+def _solve_loaded_fallback(
+    one: OnePosture, loads: PostureLoads, errors: NDArray, draws: Draws, i: int
+) -> None:
+    """Solve draw i again by :func:`assembly.linear.energy.solve_assembly`."""
+    for values in (draws.energy, draws.bound, draws.clearances, draws.multipliers,
+                   draws.platform_screw):  # fmt: skip
+        values[i] = np.nan
+    posture = replace(one.posture, robot=one.posture.robot.with_errors(errors))
+    try:
+        assembly = solve_assembly(posture, loads.load, gravity=loads.gravity)
+    except (CannotAssemble, SolverFailed, FreeMotion):
+        return
+    draws.energy[i] = assembly.energy
+    draws.bound[i] = assembly.energy - assembly.duality_gap()
+    draws.platform_screw[i] = assembly.platform_screw
+    draws.multipliers[i] = assembly.multipliers
+    if assembly.clearances.shape == draws.clearances[i].shape:
+        draws.clearances[i] = assembly.clearances

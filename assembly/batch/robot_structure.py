@@ -1,0 +1,79 @@
+"""A robot as the compiled methods read it: virtual joints as arrays."""
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import size_of
+from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
+from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
+from assembly.model.robot import Robot
+
+if TYPE_CHECKING:
+    from assembly.batch.compiled_reduction import Structure
+
+
+@lru_cache(maxsize=32)
+def structure_of(
+    robot: Robot, compliant: Compliant = "elastic"
+) -> tuple[VirtualJoints, "Structure"]:
+    """What may move, as columns and as arrays.
+
+    Args:
+        robot: any.
+        compliant: as for :func:`assembly.linear.closure.virtual_joints`.
+
+    Returns:
+        The columns; the same as arrays.
+    """
+    from assembly.batch.compiled_reduction import Structure
+
+    joints = virtual_joints(robot, compliant)
+    on_path = robot.on_path[robot.index(robot.platform)]
+    signs = closure_signs(robot).T.astype(float)
+    patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
+    # springs that enter the same closures, and the platform's path, act as one
+    spring_frame, springs = _by_frame(joints.elastic)
+    acting = np.any(signs[spring_frame] != 0.0, axis=1)
+    key = 2 * pattern_of[spring_frame] + on_path[spring_frame]
+    order = np.lexsort((np.arange(len(key)), key))
+    order = order[acting[order]]
+    keys, starts = np.unique(key[order], return_index=True)
+    cone_frame, cones = _by_frame(joints.cones)
+    free_frame, free = _by_frame(joints.free)
+    bounds = component_bounds(clearance_bounds(robot, compliant))
+    free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
+    cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
+    cone_count = int(joints.group.max(initial=-1)) + 1
+    cone_starts = np.searchsorted(joints.group, np.arange(cone_count + 1))
+    structure = Structure(
+        size=size_of(robot),
+        platform=robot.index(robot.platform),
+        on_path=on_path.astype(float),
+        patterns=patterns,
+        pattern_of=pattern_of.astype(np.int64),
+        springs=np.ascontiguousarray(springs[order]),
+        spring_frame=spring_frame[order],
+        spring_order=order,
+        groups=np.append(starts, len(order)).astype(np.int64),
+        group_pattern=keys // 2,
+        group_on_path=(keys % 2).astype(float),
+        cone_frame=cone_frame,
+        cone_axis=cone_axis,
+        cone_size=cones.sum(axis=1),
+        starts=cone_starts.astype(np.int64),
+        free_frame=free_frame,
+        free_axis=free_axis,
+        free_bound=bounds[free_frame, free_axis],
+    )
+    return joints, structure
+
+
+def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:
+    """Frame of each column, which has only one, and (count, 6) screw in its axes."""
+    blocks = columns.T.reshape(columns.shape[1], len(columns) // 6, 6)
+    frame = np.abs(blocks).max(axis=2).argmax(axis=1) if len(blocks) else np.zeros(0)
+    frame = frame.astype(np.int64)
+    return frame, np.ascontiguousarray(blocks[np.arange(len(blocks)), frame])

@@ -1,0 +1,188 @@
+r"""A robot at a posture, with unknowns that move its frames by finite screws.
+
+At a frame, in its axes, motions act one after the other, each a screw's exponential:
+
+    T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db),   then the joint's own,
+
+where F_i is the nominal body, exp(dl)^ the geometric error (rotation vector and
+translation, both in the frame's axes) and the joint's own motion a turn about z, or a
+slide along it, by its coordinate plus what a passive joint adds.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.kinematics.se3 import exponential, inverse
+from assembly.linear.closure import VirtualJoints, closure_signs
+from assembly.model.robot import Robot
+from stiffness.screws import rotation_matrix, transform
+
+# the motions at a frame, in the order in which they act
+LINK, CLEARANCE, SPRING, OWN = range(4)
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteRobot:
+    """A robot at a posture, prepared for finite screws.
+
+    Attributes:
+        posture: where it stands nominally.
+        joints: what may move; its columns are the unknowns y, u, q in this order.
+    """
+
+    posture: Posture
+    joints: VirtualJoints
+
+    @cached_property
+    def _blocks(self) -> NDArray:
+        """(n, 6, N) every column, by frame and component."""
+        j = self.joints
+        every = np.hstack([j.elastic, j.cones, j.free])
+        return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
+
+    @cached_property
+    def frame(self) -> NDArray:
+        """(N,) row of the frame each unknown acts at."""
+        return np.argmax(np.abs(self._blocks).max(axis=1), axis=0)
+
+    @cached_property
+    def columns(self) -> NDArray:
+        """(N, 6) screw of each unknown, in its frame's axes."""
+        return self._blocks[self.frame, :, np.arange(len(self.frame))]
+
+    @cached_property
+    def motion(self) -> NDArray:
+        """(N,) which of a frame's motions each unknown belongs to."""
+        links, (nu, nq) = self.joints.links, (len(self.joints.group), self._free)
+        kind = np.where(links, LINK, SPRING)
+        kind = np.concatenate([kind, np.full(nu + nq, CLEARANCE)])
+        for i in range(len(links), len(kind)):
+            frame = self.posture.robot.frames[self.frame[i]]
+            own = frame.passive and not frame.compliant
+            if own and self.columns[i, frame.own_axis]:
+                kind[i] = OWN
+        return kind
+
+    @property
+    def _free(self) -> int:
+        """Number of motions without bound."""
+        return self.joints.free.shape[1]
+
+    @property
+    def springs(self) -> slice:
+        """Where the springs are among the unknowns."""
+        return slice(0, len(self.joints.links))
+
+    @property
+    def bounded(self) -> slice:
+        """Where the clearances are among the unknowns."""
+        return slice(self.springs.stop, self.springs.stop + len(self.joints.group))
+
+    @cached_property
+    def units(self) -> NDArray:
+        """(N,) scale of the unknowns: springs as they are, free motions in metric 1."""
+        units = np.ones(len(self.frame))
+        units[self.bounded.stop :] /= np.linalg.norm(
+            self.columns[self.bounded.stop :] * self.scale, axis=1
+        )
+        return units
+
+    @cached_property
+    def size(self) -> float:
+        """[m] reference length by which translations are divided."""
+        return size_of(self.posture.robot)
+
+    @cached_property
+    def scale(self) -> NDArray:
+        """(6,) of a screw: translations by the reference length."""
+        return np.array([1.0, 1.0, 1.0, *[1 / self.size] * 3])
+
+    @cached_property
+    def metric(self) -> NDArray:
+        """(N, N) squared size of the screws that unknowns make, rad and lengths."""
+        together = self.same_motion & (self.frame[:, None] == self.frame)
+        scaled = self.columns * self.scale
+        return (scaled @ scaled.T) * together
+
+    @cached_property
+    def same_motion(self) -> NDArray:
+        """(N, N) bool, whether two unknowns are parts of one screw."""
+        return self._order[:, None] == self._order
+
+    @cached_property
+    def _order(self) -> NDArray:
+        """(N,) place of each unknown's motion along any chain that holds it."""
+        return 4 * self.frame + self.motion
+
+    @cached_property
+    def signs(self) -> NDArray:
+        """(K, N) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+        return closure_signs(self.posture.robot)[:, self.frame]
+
+    @cached_property
+    def chains(self) -> tuple[NDArray, NDArray]:
+        """(K, N) bool each: unknowns on a closure's first and second whole chain."""
+        robot = self.posture.robot
+        ends = self.closed_frames
+        first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
+        return first, second
+
+    @cached_property
+    def closed_frames(self) -> NDArray:
+        """(K, 2) rows of the frames that each closure joins."""
+        robot = self.posture.robot
+        rows = [[robot.index(name) for name in pair] for pair in robot.closures]
+        return np.array(rows, dtype=int).reshape(-1, 2)
+
+    @cached_property
+    def on_platform(self) -> NDArray:
+        """(N,) bool, unknowns that move the platform."""
+        robot = self.posture.robot
+        return robot.on_path[robot.index(robot.platform)][self.frame]
+
+    @cached_property
+    def precedence(self) -> NDArray:
+        """(K, N, N) +1 where the second unknown acts later round the loop, else -1.
+
+        Round a loop means out along the first chain and back along the second.
+        """
+        along = np.where(self.signs > 0, self._order, 1e6 - self._order)
+        return np.sign(along[:, None, :] - along[:, :, None])
+
+    @cached_property
+    def comes_before(self) -> NDArray:
+        """(N, N) 1 where the first unknown moves the second, 1/2 in one motion."""
+        above = self.posture.robot.on_path[self.frame][:, self.frame].T
+        return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
+
+    @cached_property
+    def erring_bodies(self) -> NDArray:
+        """(n, 4, 4) bodies with their geometric errors, seen from after the parent."""
+        robot = self.posture.robot
+        errors = robot.errors
+        off = transform(errors[:, 3:], rotation_matrix(errors[:, :3]))
+        return robot.fixed_transforms @ off
+
+    @cached_property
+    def nominal_closures(self) -> NDArray:
+        """(K, 4, 4) a closure's second frame seen from its first, nominally."""
+        first, second = self.posture.transforms[self.closed_frames.T]
+        return inverse(first) @ second  # rounded files: not quite 1
+
+
+def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
+    """(..., n, 4, 4) motions about or along each joint's z by (..., n) coordinates."""
+    screws = np.zeros((*coordinates.shape, 6))
+    axes = [frame.own_axis for frame in robot.frames]
+    screws[..., np.arange(len(axes)), axes] = coordinates
+    return exponential(screws)
+
+
+def nominally_carried(posture: Posture) -> NDArray:
+    """(..., n, 4, 4) nominal frames after their joint's coordinate."""
+    return posture.transforms @ along_own(posture.robot, posture.coordinates)

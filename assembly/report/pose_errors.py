@@ -1,0 +1,139 @@
+"""Results of ``assembly error``: bounds of the largest pose errors, problem (27)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.linear.pose_error import PoseError, bound_pose_error
+from assembly.linear.reach import READINGS, reachable_screws
+from assembly.linear.reduction import FreeMotion
+from assembly.report.results import failure_status, proof_status
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import bracket, numbers
+from forcefit.inputs.table import BadInput
+
+
+def pose_error_of(
+    posture: Posture,
+    readings: Sequence[str] | None = None,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    direction: ArrayLike | None = None,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Results of ``assembly error`` as plain values.
+
+    Args:
+        posture: of the robot.
+        readings: of problem (27); all that are defined if absent, under a load without
+            ``budget``.
+        point: (3,) [m] whose translation is bounded, platform axes.
+        direction: (6,) along which the largest error is bounded too.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        options: of :func:`assembly.linear.pose_error.bound_pose_error`.
+
+    Returns:
+        The keys of the public format; ``status`` as in :func:`solution_of`.
+
+    Raises:
+        BadInput: reading ``budget`` is asked under a load.
+    """
+    loaded = bool(np.any(load) or np.any(gravity))
+    if loaded and "budget" in (readings or ()):
+        raise BadInput(
+            "reading budget: found a load; expected frozen or free (the budget is a "
+            "factor on the energy of closing alone)"
+        )
+    readings = readings or (READINGS[:2] if loaded else READINGS)
+    results: dict[str, Any] = {
+        "robot": posture.robot.name,
+        "status": "ok",
+        "pose": posture.pose(),
+        "load": np.zeros(6) if load is None else np.asarray(load, dtype=float),
+        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
+        "error": None,
+        "point": np.asarray(point, dtype=float),
+    }
+    if direction is not None:
+        results["direction"] = np.asarray(direction, dtype=float)
+    offset = posture.platform[:3, :3] @ results["point"]
+    try:
+        assembly = solve_assembly(posture, load, gravity=gravity)
+        table: dict[str, Any] = {}
+        unproved = []
+        for name in readings:
+            try:
+                bound = bound_pose_error(assembly, name, offset=offset, **options)
+            except FreeMotion as error:  # compliant joints without their own springs
+                no_bounds = dict.fromkeys(("rotation", "translation"))
+                table[name] = no_bounds | {"reason": str(error)}
+                continue
+            table[name] = _bounds(bound)
+            unproved += [f"{name}: {bound.unproved}"] if bound.unproved else []
+            if direction is not None:
+                along = _support(assembly, name, offset, direction, **options)
+                table[name]["along"] = along
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": failure_status(error), "reason": str(error)}
+    certificate = {"relative_gap": assembly.relative_gap()}
+    return results | proof_status("; ".join(unproved)) | {
+        "energy": assembly.energy, "platform_screw": assembly.platform_screw,
+        "error": table, "certificate": certificate,
+    }  # fmt: skip
+
+
+def _bounds(bound: PoseError) -> dict[str, Any]:
+    """Both brackets of a reading."""
+    return {
+        "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
+        "translation": _bracket(bound.translation_error, bound.translation_screw),
+        "cuts": bound.cuts,
+    }
+
+
+def _support(
+    assembly: Assembly, reading: str, offset: NDArray, direction: ArrayLike,
+    energy_budget: float = 0.05, **_: float,
+) -> dict[str, Any]:  # fmt: skip
+    """Largest error along a direction: certified, attained, and the screw there."""
+    reach = reachable_screws(assembly, reading, energy_budget).at_point(offset)
+    support = reach.support(direction)
+    if support.height == np.inf:
+        return _bracket((np.inf, np.inf), reach.centre)
+    attained = float(np.asarray(direction) @ support.screw)
+    return _bracket((attained, support.height), support.screw)
+
+
+def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
+    """Two bounds, and the platform screw that attains the lower."""
+    return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
+
+
+def pose_error_text(results: dict[str, Any]) -> str:
+    """Bounds for people: a line for each reading."""
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    if results["status"] != "ok":
+        lines.append(f"{results['status']}: {results['reason']}")
+    for reading, bounds in (results["error"] or {}).items():
+        if "reason" in bounds:
+            lines.append(f"{reading:7s} no answer: {bounds['reason']}")
+            continue
+        lines.append(
+            f"{reading:7s} rotation {_bounds_text(bounds['rotation'], 'mrad')}, "
+            f"translation {_bounds_text(bounds['translation'], 'mm')}"
+        )
+        if "along" in bounds:
+            unit = "mm" if np.any(results["direction"][3:]) else "mrad"
+            lines.append(f"        along it {_bounds_text(bounds['along'], unit)}")
+    return "\n".join(lines)
+
+
+def _bounds_text(bounds: dict[str, Any], unit: str) -> str:
+    """Two bounds, in thousandths of rad or m."""
+    return bracket((bounds["lower"], bounds["upper"]), unit)

@@ -1,0 +1,172 @@
+"""Largest pose errors over all clearance positions: problem (27) for many draws.
+
+The reading is ``frozen``: all springs as in the solution of (22), all clearances that
+carry no load anywhere within their bounds.  By strict convexity every solution of (22)
+has the same springs, and by complementary slackness the same loaded clearances.  So
+this is the set of *all* solutions of (22), inside a zone and outside.  The positions of
+the uniform and the contact model and the solver's own solution are points of it.  The
+other readings change the robot: ``free`` lets compliant joints turn without energy,
+``budget`` lets parts store more energy than the least.
+
+Under a load the same holds for energy minus work: only clearances that no load holds
+are free.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.batch.many_pose_errors import bound_pose_errors
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reduction import FreeMotion
+from assembly.solvers.conic import SolverFailed
+from assembly.statistics.clearance_positions import (
+    clearance_constraints,
+    free_starts,
+    loaded_clearances,
+)
+from assembly.statistics.quantities import POSE_ERRORS
+
+if TYPE_CHECKING:
+    from assembly.solvers.support import Body
+
+READING = "frozen"
+PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
+_SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slopes
+
+
+def bound_worst_errors(
+    prepared: OnePosture, draws: Draws, errors: NDArray,
+    precision: tuple[float, float] = PRECISION,
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Certified bounds of the largest pose errors over all clearance positions.
+
+    Args:
+        prepared: the posture.
+        draws: its solutions for k draws.
+        errors: (k, n, 6) [rad, m] of these draws.
+        precision: [rad, m] asked of upper minus lower bounds; inf leaves a part out.
+
+    Returns:
+        (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],
+        no lower than the screw of ``draws``; NaN for a draw without a solution, upper
+        bounds inf where none is proved.  And (k, 2, 6) [rad, m] screws that attain the
+        lower bounds, at least nearly.
+    """
+    bounds = np.full((len(errors), 2, 2), np.nan)
+    screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
+    solved = np.flatnonzero(np.isfinite(draws.energy))
+    if prepared.loads is None:
+        bounds[solved], screws[solved] = _without_load(
+            prepared, errors[solved], precision
+        )
+    else:
+        for i in solved.tolist():
+            bounds[i], screws[i] = _under_load(prepared, errors[i], precision)
+    # solutions of (22) may differ by the square root of their duality gaps
+    least = np.stack([
+        np.linalg.norm(draws.platform_screw[:, part], axis=1)
+        for part in (slice(0, 3), slice(3, 6))
+    ], axis=1)  # fmt: skip
+    own = ~(bounds[..., 0] > least)
+    screws[own] = np.tile(draws.platform_screw[:, None], (1, 2, 1))[own]
+    bounds[..., 0] = np.where(own, least, bounds[..., 0])
+    upper = np.where(np.isnan(bounds[..., 1]), np.inf, bounds[..., 1])
+    bounds[..., 1] = np.maximum(upper, bounds[..., 0])
+    bounds[~np.isfinite(draws.energy)] = np.nan
+    return bounds, screws
+
+
+def _without_load(
+    prepared: OnePosture, errors: NDArray, precision: tuple[float, float]
+) -> tuple[NDArray, NDArray]:
+    """Bounds and screws of unloaded draws, compiled."""
+    posture = prepared.posture
+    T = np.repeat(posture.transforms[None], len(errors), axis=0)
+    error_bounds = bound_pose_errors(
+        posture.robot, T, READING, errors, posture.mismatch,
+        tolerance_rotation=precision[0], tolerance_translation=precision[1],
+    )  # fmt: skip
+    return (
+        np.stack([error_bounds.rotation_error, error_bounds.translation_error], axis=1),
+        np.stack([error_bounds.rotation_screw, error_bounds.translation_screw], axis=1),
+    )
+
+
+def _under_load(
+    prepared: OnePosture, errors: NDArray, precision: tuple[float, float]
+) -> tuple[NDArray, NDArray]:
+    """Bounds and screws of one loaded draw; NaN if the solver failed."""
+    assert prepared.loads is not None
+    posture = replace(
+        prepared.posture, robot=prepared.posture.robot.with_errors(errors)
+    )
+    try:
+        assembly = solve_assembly(
+            posture, prepared.loads.load, gravity=prepared.loads.gravity
+        )
+        error_bound = bound_pose_error(
+            assembly, READING,
+            tolerance_rotation=precision[0], tolerance_translation=precision[1],
+        )  # fmt: skip
+    except (CannotAssemble, SolverFailed, FreeMotion):
+        return np.full((2, 2), np.nan), np.zeros((2, 6))
+    bounds = np.array([error_bound.rotation_error, error_bound.translation_error])
+    return bounds, np.array([error_bound.rotation_screw, error_bound.translation_screw])
+
+
+def worst_error_slopes(
+    prepared: OnePosture, draws: Draws, key: str, screws: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Slopes of the largest pose error with the platform's screw and the clearances.
+
+    The farthest point attains a support function in its own direction, so by the
+    envelope theorem the slopes are those of the support function there.
+
+    Args:
+        prepared: the posture.
+        draws: its solutions for k draws, none under a load.
+        key: ``"rotation"`` or ``"translation"``.
+        screws: (k, 6) [rad, m] that attain the largest, of :func:`bound_worst_errors`.
+
+    Returns:
+        (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
+        multipliers of the bounds of the clearances that carry no load.
+    """
+    from assembly.solvers.support import pulls_along
+
+    part = 3 * POSE_ERRORS.index(key)
+    size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
+    by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
+    by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
+    loaded = loaded_clearances(prepared, draws)
+    for i in range(len(screws)):
+        free = ~loaded[i]
+        if free.any():
+            body = _remaining_screws(prepared, draws, i, free)
+            direction = by_screw[i, part : part + 3].copy()
+            by_clearance[i, free] = pulls_along(
+                body, part, direction, _SUPPORT_PRECISION
+            )
+    return by_screw, by_clearance
+
+
+def _remaining_screws(
+    prepared: OnePosture, draws: Draws, i: int, free: NDArray
+) -> "Body":
+    """The set of possible platform screws of draw i."""
+    from assembly.solvers.support import Body
+
+    nu = len(free)
+    rows = clearance_constraints(prepared, ~free)[:, free]
+    return Body(
+        draws.platform_screw[i].copy(),
+        np.ascontiguousarray(prepared.screws[:, :nu][:, free]),
+        np.ascontiguousarray(rows),
+        draws.clearances[i, free].copy(), free_starts(prepared, free),
+    )  # fmt: skip

@@ -1,0 +1,68 @@
+"""Numbers and arrays of numbers from the plain values of a file or an option."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import describe
+
+
+def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
+    """The fault in numbers of a given shape, and its place, counted from 1.
+
+    Args:
+        value: wrong nested lists, or another value.
+        shape: expected.
+        infinite: whether inf is allowed.
+
+    Returns:
+        The wrong entry or row with its place, or the whole, abbreviated.
+    """
+    if not isinstance(value, list):
+        return describe(value)
+    if len(value) != shape[0]:
+        return f"{describe(value)} of length {len(value)}"
+    for i, inner in enumerate(value, 1):
+        if len(shape) > 1:
+            fault = find_fault(inner, shape[1:], infinite)
+            if fault:
+                return f"{fault} in row {i}"
+        elif not (math.isfinite(x := as_number(inner)) or (infinite and math.isinf(x))):
+            return f"{describe(inner)} as number {i}"
+    return ""
+
+
+def number_array(value: object) -> NDArray | None:
+    """Nested lists of numbers as an array; None when ragged or not numbers."""
+    if not isinstance(value, list):
+        return None
+    if value and all(isinstance(v, list) for v in value):
+        rows = [row for row in map(number_array, value) if row is not None]
+        same = len(rows) == len(value) and len({row.shape for row in rows}) == 1
+        return np.array(rows) if same else None
+    return np.array([as_number(v) for v in value]) if _proper(value) else None
+
+
+def comma_numbers(text: str) -> NDArray:
+    """Finite numbers between commas; none at all if one of them is not."""
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        return np.empty(0)
+    return numbers if np.isfinite(numbers).all() else np.empty(0)
+
+
+def as_number(value: object) -> float:
+    """The number, or nan for anything that is not one (true and false are not)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
+
+def _proper(values: list) -> bool:
+    """Whether all are numbers that a float can hold; nan and inf are, true is not."""
+    return all(isinstance(v, float) or not math.isnan(as_number(v)) for v in values)
