@@ -2,11 +2,11 @@
 
 The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
 up to a share of the paper's.  Printed for each share: how many of the draws cost
-nothing, how many were certified and how many went the slower road; draws per second of
+nothing, how many were certified and how many needed the fallback; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-road of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second of
-processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+solver of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second
+of processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
 import sys
@@ -44,7 +44,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
-    """Draws without energy, certified, and slower, of one block; drawing included."""
+    """Draws without energy, certified, and by the fallback, of one block."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
     h = errors.reshape(BLOCK, -1) @ one.misfit.T
@@ -71,13 +71,13 @@ def main() -> None:
     one = prepare_energies(posture)
     print(f"{blocks * BLOCK} draws a line; goal {TARGET:.0e} in {GOAL:.0f} s")
     print(
-        "errors  no energy  certified  slower  per core s  1e7, 2 cores [s]  "
+        "errors  no energy  certified  fallback  per core s  1e7, 2 cores [s]  "
         "2 threads, per s  batch, per core s"
     )
     for share in SHARES:
         sources = paper_sources(share)
         solve_block(one, sources, 0)  # compiled before the clock starts
-        single, _, (without, certified, slower) = run(one, sources, blocks, 1)
+        single, _, (without, certified, fallback) = run(one, sources, blocks, 1)
         _, double, _ = run(one, sources, blocks, 2)
         few = sources.errors(sources.draw(0, 1000, seed=1))
         T = np.repeat(posture.transforms[None], len(few), axis=0)
@@ -86,7 +86,7 @@ def main() -> None:
         minimise_energies(posture.robot, T, few)
         batch = len(few) / (time.process_time() - start)
         print(
-            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {slower:6.4f}  "
+            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {fallback:8.4f}  "
             f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}  "
             f"{batch:18.0f}"
         )
