@@ -50,7 +50,6 @@ OWNERS = {
     "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
     "defusedxml": ("assembly/exchange/xml_file.py",),
-    "yaml": ("assembly/exchange/loops_file.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # of use to sweeps, statistics, files and drawings, not to one posture

@@ -177,7 +177,7 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
                 joints.append(Joint(tip.name, "fixed", name, tip.name, at))
                 name = tip.name
             ends.append(name)
-        loops.append(Loop(loop.name, *ends))
+        loops.append(Loop(loop.name, ends[0], ends[1]))
     return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from assembly.effects import apply_effects
 from assembly.exchange.xml_file import counted
 from assembly.kinematics.posture import Posture
@@ -39,7 +41,7 @@ def with_calibration(home: Posture) -> Robot:
             T = T @ off
             turn = rotation_vector(T[:3, :3])
             frame = replace(
-                frame, translation=T[:3, 3], rotation=turn, geometric_error=[0.0] * 6
+                frame, translation=T[:3, 3], rotation=turn, geometric_error=np.zeros(6)
             )
         frames.append(frame)
     return replace(robot, frames=tuple(frames), effects={})

@@ -249,8 +249,8 @@ def _built_in(answer: Conversion) -> tuple[Conversion, Placed]:
     after, held = loop_residual(mechanism, home), answer.drives_held
     if after >= CLOSED:  # errors pull the loops apart
         home, after, held = nearest_closed(mechanism, 0)
-        joints = zip(mechanism.joints, home, strict=True)
-        joints = tuple(replace(j, position=float(q)) for j, q in joints)
+        pairs = zip(mechanism.joints, home, strict=True)
+        joints = tuple(replace(j, position=float(q)) for j, q in pairs)
         placed = replace(placed, mechanism=replace(mechanism, joints=joints))
     if after >= 1e-6:
         left_out.append(

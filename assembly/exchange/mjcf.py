@@ -76,15 +76,15 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     if world is None:
         raise root.bad("worldbody", "missing")
     _walk(world, WORLD, np.eye(4), "main", reading)
-    _keep_keys(root, reading)
     joints, mimics = _coupled(root, reading)
     base, order = parents_first(joints, reading.bodies, str(path))
     mechanism = Mechanism(
         name=root.text("model", Path(path).stem), root=base, bodies=reading.bodies,
         joints=order,
     )  # fmt: skip
-    at_rest = body_poses(mechanism, np.zeros(len(order)))  # motion from qpos0
-    closed = tuple(_loops(root, reading, at_rest))
+    # constraints hold where the file is written, before any key
+    closed = tuple(_loops(root, reading, body_poses(mechanism, mechanism.home)))
+    mechanism = replace(mechanism, joints=_at_key(root, reading, order))
     extra = {k: v for k, v in reading.extra.items() if v}
     left_out = tuple(line for k, v in extra.items() for line in counted(k, v))
     mechanism = replace(mechanism, loops=closed, left_out=left_out + mimics)
@@ -241,8 +241,10 @@ def _pose(node: Node, reading: _Reading) -> NDArray:
     return placed(shift, orientation(node, reading.angles))
 
 
-def _keep_keys(root: Node, reading: _Reading) -> None:
-    """Joint positions of the key named home."""
+def _at_key(
+    root: Node, reading: _Reading, joints: tuple[Joint, ...]
+) -> tuple[Joint, ...]:
+    """Joints at the positions of the key named home."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     for key in keys:
         if key.text("name", "") != "home" or not key.has("qpos"):
@@ -253,10 +255,11 @@ def _keep_keys(root: Node, reading: _Reading) -> None:
         at = dict(zip(reading.coordinates, np.cumsum([0, *counts[:-1]]), strict=False))
         if 4 in counts:
             reading.extra.setdefault("ball joints' turn in the key", []).append("home")
-        reading.joints = [
+        joints = tuple(
             replace(j, position=float(values[at[j.name]])) if j.name in at else j
-            for j in reading.joints
-        ]
+            for j in joints
+        )
+    return joints
 
 
 def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...]]:

@@ -113,7 +113,8 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
         axis = np.array([0.0, 0.0, 1.0])
         if kind != "fixed":
             axis = _axis(node, "axis", np.array([1.0, 0.0, 0.0]))
-        return [Joint(name, _ONE_FREEDOM[kind], *ends, placement, axis)], []
+        one = _ONE_FREEDOM[kind]
+        return [Joint(name, one, ends[0], ends[1], placement, axis)], []
     freedoms = ball()
     if kind == "floating":
         freedoms = slides() + ball()
