@@ -19,7 +19,8 @@ FLOORS = (
     "assembly/sweeps",
     "assembly/statistics",
     "validation/html", "validation/multibody", "validation/crosscheck",
-    "validation/assumptions", "validation/campaign", "validation/synthetic",
+    "validation/assumptions", "validation/campaign", "validation/exchange",
+    "validation/standards", "validation/synthetic",
     "validation/diagnosis", "validation/inspection", "validation/study",
     "forcefit/commands",
 )  # fmt: skip
