@@ -15,10 +15,12 @@ FLOORS = (
     "stiffness/mesh", "stiffness/fem", "stiffness/report",
     "assembly/solvers", "assembly/model", "assembly/kinematics", "assembly/linear",
     "assembly/batch", "assembly/exact", "assembly/report", "assembly/measurement",
-    "assembly/effects", "assembly/files", "assembly/robots", "assembly/sweeps",
+    "assembly/effects", "assembly/files", "assembly/robots", "assembly/exchange",
+    "assembly/sweeps",
     "assembly/statistics",
     "validation/html", "validation/multibody", "validation/crosscheck",
-    "validation/assumptions", "validation/campaign", "validation/synthetic",
+    "validation/assumptions", "validation/campaign", "validation/exchange",
+    "validation/standards", "validation/synthetic",
     "validation/diagnosis", "validation/inspection", "validation/study",
     "forcefit/commands",
 )  # fmt: skip
@@ -47,6 +49,7 @@ OWNERS = {
     "pandas": ("assembly/model/tables.py",),
     "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
+    "defusedxml": ("assembly/exchange/xml_file.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # of use to sweeps, statistics, files and drawings, not to one posture

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands import assembly, stiffness, validation
+from forcefit.commands.convert import convert
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, one_line
@@ -21,6 +22,7 @@ app = typer.Typer(
 app.add_typer(stiffness.app, name="stiffness", help="How stiff is a link?")
 app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
 app.add_typer(validation.app, name="validation", help="Is it true?")
+app.command()(convert)
 
 
 def _print_version(asked: bool) -> None:

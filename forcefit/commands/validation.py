@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from forcefit.commands.diagnose import diagnose
+from forcefit.commands.exchange import import_, iso
 from forcefit.commands.generate import generate
 from forcefit.commands.inspect import inspect
 from forcefit.commands.options import (
@@ -35,6 +36,8 @@ app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
+app.command("import")(import_)
+app.command()(iso)
 
 
 @app.callback()

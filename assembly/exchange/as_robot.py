@@ -1,0 +1,263 @@
+"""A mechanism as a robot of frames, and back.
+
+A moving joint is a frame of the joint's name; what a fixed joint carries is a frame of
+that body's name.  A body on a moving joint gets a frame of its own where it has a mass,
+ends a chain, or is met in a loop: its axes need not be the joint's.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import (
+    HERE,
+    Body,
+    Joint,
+    Loop,
+    Mechanism,
+    ball,
+    body_poses,
+    chain,
+)
+from assembly.exchange.orientation import onto
+from assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
+from forcefit.inputs.errors import BadInput
+from stiffness.beam.sections import declared_section
+from stiffness.screws import rotation_vector, transform
+
+Places = Mapping[str, tuple[str, NDArray]]
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A robot beside the mechanism it is.
+
+    Attributes:
+        robot: of frames.
+        mechanism: of bodies.
+        places: where each body stands: on which frame, after that frame's motion, and
+            (4, 4) how; ``"base"`` for the root.
+    """
+
+    robot: Robot
+    mechanism: Mechanism
+    places: Places
+
+
+def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
+    """Loops that meet in a point only get a ball joint, at rest in the home pose.
+
+    Args:
+        mechanism: of n joints.
+        home: (n,) [rad or m] coordinates at which its loops close.
+
+    Returns:
+        The mechanism at home, every loop of it holding all six directions.
+    """
+    poses = body_poses(mechanism, home)
+    bodies = dict(mechanism.bodies)
+    joints = [
+        replace(joint, position=float(q))
+        for joint, q in zip(mechanism.joints, home, strict=True)
+    ]
+    loops = []
+    for loop in mechanism.loops:
+        if loop.point:
+            first = poses[loop.first] @ loop.at_first
+            second = poses[loop.second] @ loop.at_second
+            turned = transform(np.zeros(3), second[:3, :3].T @ first[:3, :3])
+            tip = Body(f"{loop.name}.tip")
+            parts, between = chain(
+                loop.name, loop.first, tip.name, loop.at_first, HERE, ball()
+            )
+            joints += parts
+            bodies |= {body.name: body for body in [*between, tip]}
+            loop = replace(
+                loop, first=tip.name, at_first=HERE, at_second=loop.at_second @ turned,
+                point=False,
+            )  # fmt: skip
+        loops.append(loop)
+    return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
+
+
+def robot_of_mechanism(mechanism: Mechanism) -> Placed:
+    """The robot that a mechanism is.
+
+    Args:
+        mechanism: at home, all its loops holding six directions.
+
+    Returns:
+        The robot, its places beside it.
+
+    Raises:
+        BadInput: no body can be the platform.
+    """
+    platform = mechanism.platform or guess_platform(mechanism)
+    mechanism = _with_ends(replace(mechanism, platform=platform))
+    carriers = {joint.parent for joint in mechanism.joints}
+    met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
+    taken = {BASE, *(j.name for j in mechanism.joints if j.kind != "fixed")}
+    frames: list[Frame] = []
+    places: dict[str, tuple[str, NDArray]] = {mechanism.root: (BASE, np.eye(4))}
+
+    def add(name: str, parent: str, T: NDArray, **rest: object) -> str:
+        turn = rotation_vector(T[:3, :3])
+        frames.append(Frame(name, parent, T[:3, 3], turn, **rest))  # type: ignore[arg-type]
+        return name
+
+    def own(body: Body) -> str:
+        name = body.name
+        while name in taken:
+            name += ".link"
+        taken.add(name)
+        return name
+
+    for joint in mechanism.joints:
+        parent, at = places[joint.parent]
+        body = mechanism.bodies[joint.child]
+        mass = {"mass": body.mass, "centre_of_mass": body.centre} if body.mass else {}
+        T = at @ joint.placement
+        if joint.kind == "fixed":
+            name = add(own(body), parent, T @ joint.after, **mass)
+            places[body.name] = name, np.eye(4)
+            continue
+        turn = transform(np.zeros(3), onto(joint.axis))
+        motion = {"joint": joint.kind, "actuated": joint.actuated}
+        name = joint.name if joint.name != BASE else f"{BASE}.joint"
+        add(name, parent, T @ turn, position=joint.position, **motion)
+        after = turn.T @ joint.after
+        seen = body.mass or body.name in met or body.name not in carriers
+        if seen or body.name == platform:
+            name = add(own(body), name, after, **mass)
+            after = np.eye(4)
+        places[body.name] = name, after
+    closures = tuple((places[k.first][0], places[k.second][0]) for k in mechanism.loops)
+    robot = Robot(mechanism.name, places[platform][0], tuple(frames), closures)
+    return Placed(robot, mechanism, places)
+
+
+def guess_platform(mechanism: Mechanism) -> str:
+    """The body at the end of the longest chain that no loop takes further.
+
+    Args:
+        mechanism: any.
+
+    Returns:
+        The name of a body that carries none; of two alike, the first.
+
+    Raises:
+        BadInput: the mechanism has no joint.
+    """
+    depth = {mechanism.root: 0}
+    for joint in mechanism.joints:
+        depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
+    if len(depth) == 1:
+        raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
+    carriers = {joint.parent for joint in mechanism.joints}
+    met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
+    ends = [name for name in depth if name not in carriers]
+    free = [name for name in ends if name not in met]
+    return max(free or ends, key=lambda name: depth[name])
+
+
+def _with_ends(mechanism: Mechanism) -> Mechanism:
+    """Every loop's place becomes a body that carries nothing."""
+    bodies, joints, loops = dict(mechanism.bodies), list(mechanism.joints), []
+    for loop in mechanism.loops:
+        ends = []
+        for end, name, at in (
+            ("first", loop.first, loop.at_first),
+            ("second", loop.second, loop.at_second),
+        ):
+            if name == mechanism.root or not np.array_equal(at, np.eye(4)):
+                tip = Body(f"{loop.name}.{end}")
+                bodies[tip.name] = tip
+                joints.append(Joint(tip.name, "fixed", name, tip.name, at))
+                name = tip.name
+            ends.append(name)
+        loops.append(Loop(loop.name, ends[0], ends[1]))
+    return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
+
+
+def mechanism_of_robot(robot: Robot, home: NDArray) -> Placed:
+    """The mechanism that a robot is: rigid, without play, its errors left aside.
+
+    Args:
+        robot: of n frames.
+        home: (n,) [rad or m] coordinates at home.
+
+    Returns:
+        The mechanism; a fixed frame's body has its name, a moving one's ends in
+        ``.link``.
+    """
+    names = {f.name for f in robot.frames}
+    root = _unlike(BASE, names)
+    on = {BASE: root}
+    bodies = {root: Body(root)}
+    joints, places = [], {root: (BASE, np.eye(4))}
+    carriers = {frame.parent for frame in robot.frames}
+    for frame, T, q in zip(robot.frames, robot.fixed_transforms, home, strict=True):
+        fixed = frame.joint == "fixed"
+        child = frame.name if fixed else _unlike(f"{frame.name}.link", names)
+        name = _unlike(f"{frame.name}.joint", names) if fixed else frame.name
+        joints.append(
+            Joint(
+                name, frame.joint, on[frame.parent], child, T,
+                position=float(q), actuated=frame.actuated,
+            )
+        )  # fmt: skip
+        on[frame.name] = child
+        bodies[child] = Body(child)
+        places[child] = frame.name, np.eye(4)
+    for parent in carriers:
+        children = [f for f in robot.frames if f.parent == parent]
+        bodies[on[parent]] = _lumped(on[parent], children)
+    mechanism = Mechanism(
+        name=robot.name,
+        root=root,
+        bodies=bodies,
+        joints=tuple(joints),
+        loops=tuple(
+            Loop(f"loop{i}", on[a], on[b]) for i, (a, b) in enumerate(robot.closures, 1)
+        ),
+        platform=on[robot.platform],
+    )
+    return Placed(robot, mechanism, places)
+
+
+def _unlike(name: str, taken: set[str]) -> str:
+    """The name, lengthened until nobody has it."""
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _lumped(name: str, frames: list[Frame]) -> Body:
+    """The rigid body of all that stands on one joint: masses, and beams as rods."""
+    masses, centres, spans = [], [], []
+    for frame in frames:
+        T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]
+        if frame.mass:
+            masses.append(frame.mass)
+            centres.append(T[:3, :3] @ frame.centre_of_mass + T[:3, 3])
+            spans.append(np.zeros(3))
+        link = frame.link
+        if isinstance(link, BeamLink) and link.density:
+            length, axis = beam_axis(frame)
+            span = T[:3, :3] @ axis * length
+            area = declared_section(link.section, link.poisson).area
+            masses.append(link.density * area * length)
+            centres.append(T[:3, 3] - span / 2)
+            spans.append(span)
+    if not masses:
+        return Body(name)
+    total = sum(masses)
+    centre = np.average(centres, axis=0, weights=masses)
+    inertia = np.zeros((3, 3))
+    for mass, at, span in zip(masses, centres, spans, strict=True):
+        arm = at - centre
+        for v, factor in ((arm, 1.0), (span, 1 / 12)):  # a slender rod: m L^2 / 12
+            inertia += mass * factor * (v @ v * np.eye(3) - np.outer(v, v))
+    return Body(name, total, centre, inertia)

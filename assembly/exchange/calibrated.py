@@ -1,0 +1,64 @@
+"""A robot with what is known of its geometry built in, for programs without errors."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.effects import apply_effects
+from assembly.exchange.xml_file import counted
+from assembly.kinematics.posture import Posture
+from assembly.measurement.conditions import as_declared
+from assembly.model.robot import BeamLink, MatrixLink, Robot
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+
+# effects that are the same at every pose, temperature and load
+CONSTANT = ("encoder_offset", "link_length")
+
+
+def with_calibration(home: Posture) -> Robot:
+    """The robot whose nominal geometry is the calibrated one.
+
+    Args:
+        home: of the declared robot, its geometric errors and effects with it.
+
+    Returns:
+        The robot with geometric errors and constant effects in its frames' places, and
+        with neither left.
+
+    Raises:
+        BadInput: an effect breaks a rule of its own.
+    """
+    robot = home.robot
+    constant = {k: v for k, v in robot.effects.items() if k in CONSTANT}
+    plain = replace(home, robot=replace(robot, effects={}))
+    errors = apply_effects(as_declared(plain, None), constant).errors[0]
+    frames = []
+    for frame, T, error in zip(
+        robot.frames, robot.fixed_transforms, errors, strict=True
+    ):
+        if error.any():
+            off = transform(error[3:], rotation_matrix(error[:3]))
+            T = T @ off
+            turn = rotation_vector(T[:3, :3])
+            frame = replace(
+                frame, translation=T[:3, 3], rotation=turn, geometric_error=np.zeros(6)
+            )
+        frames.append(frame)
+    return replace(robot, frames=tuple(frames), effects={})
+
+
+def not_rigid(robot: Robot) -> tuple[str, ...]:
+    """What a robot file says and a rigid robot without play cannot hold, in words."""
+    frames = robot.frames
+    kinds = {
+        "elastic links": [f.name for f in frames if f.link is not None],
+        "joint stiffnesses": [f.name for f in frames if f.joint_stiffness is not None],
+        "clearances": [f.name for f in frames if f.clearance is not None],
+        "masses of links that are no beams": [
+            f.name
+            for f in frames
+            if not isinstance(f.link, BeamLink | MatrixLink | None)
+        ],
+        "effects": [name for name in robot.effects if name not in CONSTANT],
+    }
+    return tuple(line for what, names in kinds.items() for line in counted(what, names))

@@ -1,0 +1,282 @@
+"""``forcefit convert``: robots of other programs in and out, each proved after writing.
+
+============  ==========================================================  ==========
+kind          read                                                        written
+============  ==========================================================  ==========
+``.toml``     robot file                                                  yes
+``.urdf``     URDF and its loops (``robot.yaml``, ``closed_loop``)        both files
+``.xml``      MJCF with connect and weld                                  yes
+``.sdf``      SDF of one model, whose joints may close loops              no
+============  ==========================================================  ==========
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from assembly.exchange.as_robot import (
+    Placed,
+    mechanism_of_robot,
+    points_as_joints,
+    robot_of_mechanism,
+)
+from assembly.exchange.calibrated import not_rigid, with_calibration
+from assembly.exchange.fidelity import FAITHFUL, largest_difference
+from assembly.exchange.home_pose import (
+    CLOSED,
+    close_loops,
+    loop_residual,
+    nearest_closed,
+)
+from assembly.exchange.loops_file import (
+    LoopsFile,
+    find_loops_file,
+    loops_text,
+    read_loops,
+)
+from assembly.exchange.mechanism import Mechanism
+from assembly.exchange.mjcf import read_mjcf
+from assembly.exchange.mjcf_writing import mjcf_text
+from assembly.exchange.overlay import lay_over
+from assembly.exchange.sdf import read_sdf
+from assembly.exchange.urdf import read_urdf
+from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
+from assembly.files.robot_file import read_robot, robot_of, robot_table, write_robot
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Robot
+from assembly.robots import load_robot
+from forcefit.inputs.errors import BadInput, quoted
+from forcefit.inputs.table import Table
+from forcefit.inputs.writing import ROBOT, Kind, check_writable, write_text
+
+_READERS = {".urdf": read_urdf, ".xml": read_mjcf, ".sdf": read_sdf}
+_BEGINS = (XML_MARK.lower().encode(),)
+_KINDS = {
+    ".toml": ROBOT,
+    ".urdf": Kind("a URDF written by forcefit", (".urdf",), _BEGINS),
+    ".xml": Kind("an MJCF file written by forcefit", (".xml",), _BEGINS),
+}
+_LOOPS = Kind(
+    "a loops file written by forcefit", (".yaml",), (b"# written by forcefit",)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """What became of a robot.
+
+    Attributes:
+        robot: as it stands in the robot file, or as it was read from one.
+        files: written.
+        open_before: [rad, m] what the loops leave open where the file's own home is.
+        open_after: [rad, m] likewise in the home that was found.
+        drives_held: whether the drives stand where the file has them.
+        difference: largest of any body's pose in 100 random postures, read back.
+        left_out: what the new file cannot hold, in words.
+    """
+
+    robot: Robot
+    files: tuple[Path, ...]
+    open_before: float
+    open_after: float
+    drives_held: bool
+    difference: float
+    left_out: tuple[str, ...]
+
+    def table(self) -> dict[str, Any]:
+        """Plain values for ``--json``."""
+        return {
+            "robot": self.robot.name,
+            "platform": self.robot.platform,
+            "frames": len(self.robot.frames),
+            "closures": len(self.robot.closures),
+            "files": [str(path) for path in self.files],
+            "home": {
+                "open_before": self.open_before,
+                "open_after": self.open_after,
+                "drives_held": self.drives_held,
+            },
+            "largest_difference": self.difference,
+            "left_out": list(self.left_out),
+        }
+
+    def text(self) -> str:
+        """A few lines for people."""
+        robot = self.robot
+        count = len(robot.closures)
+        lines = [
+            f"{robot.name}: {len(robot.frames)} frames, "
+            f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
+            f"read back in 100 random postures: bodies within {self.difference:.1e}",
+        ]
+        if count:
+            moved = "" if self.drives_held else "; the drives had to move"
+            lines.append(
+                f"home: loops open by {self.open_before:.2g} rad or m in the file's "
+                f"own, {self.open_after:.1e} in the one found{moved}"
+            )
+        lines += [f"left out: {line}" for line in self.left_out]
+        return "\n".join([*lines, f"written: {', '.join(map(str, self.files))}"])
+
+
+def convert(
+    source: Path | str,
+    target: Path | str,
+    loops: Path | str | None = None,
+    overlay: Path | str | None = None,
+) -> Conversion:
+    """Convert a robot between a robot file and the files of other programs.
+
+    Args:
+        source: a ``.urdf``, ``.xml`` (MJCF), ``.sdf`` or ``.toml`` file, or the name of
+            a built-in robot.
+        target: a ``.toml``, ``.urdf`` or ``.xml`` file.
+        loops: YAML with ``closed_loop``, for files that have it not beside them.
+        overlay: TOML with elasticity, clearances, errors of frames by name.
+
+    Returns:
+        What was written and how well it is what was read.
+
+    Raises:
+        BadInput: a file breaks a rule, a loop cannot close, or what was written is not
+            the same robot; nothing is written then.
+    """
+    source, target = Path(source), Path(target)
+    ending = target.suffix.lower()
+    if ending not in _KINDS:
+        found = f"the ending {quoted(target.suffix)}" if target.suffix else "no ending"
+        raise BadInput(f"{target}: found {found}, expected {' or '.join(_KINDS)}")
+    beside = target.with_suffix(".yaml") if ending == ".urdf" else None
+    check_writable(target, _KINDS[ending])
+    if beside is not None:
+        check_writable(beside, _LOOPS)
+    if source.suffix.lower() in _READERS:
+        answer, placed = _from_others(source, loops, overlay)
+    elif loops is not None:
+        raise BadInput(f"--loops: found one beside {source}, which says its own loops")
+    else:
+        answer, placed = _declared(source, overlay), None
+    return _written(answer, placed, target)
+
+
+def _from_others(
+    source: Path, loops: Path | str | None, overlay: Path | str | None
+) -> tuple[Conversion, Placed]:
+    """The robot of a file of another program."""
+    ending = source.suffix.lower()
+    if loops is None and ending == ".urdf":
+        loops = find_loops_file(source)
+    beside = None if loops is None else read_loops(loops)
+    mechanism = _READERS[ending](source, beside)
+    before = loop_residual(mechanism, mechanism.home)
+    home, held = mechanism.home, True
+    if mechanism.loops:
+        home, held = close_loops(mechanism, str(source))
+    mechanism = points_as_joints(mechanism, home)
+    placed = robot_of_mechanism(mechanism)
+    content = robot_table(placed.robot)
+    root = (
+        Table(content, str(source), "")
+        if overlay is None
+        else lay_over(content, overlay)
+    )
+    robot = robot_of(root, source.stem)
+    weight = mechanism.bodies[mechanism.root].mass
+    left_out = list(mechanism.left_out)
+    if weight:
+        left_out.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
+    if mechanism.platform is None:
+        left_out.append(
+            f"no platform is named: {robot.platform} was taken, the end of the longest "
+            "chain (an overlay's platform says another)"
+        )
+    after = home_posture(robot).mismatch
+    conversion = Conversion(robot, (), before, after, held, 0.0, tuple(left_out))
+    return conversion, placed
+
+
+def _declared(source: Path, overlay: Path | str | None) -> Conversion:
+    """The robot of a robot file, or a built-in one."""
+    robot = load_robot(source)
+    if overlay is not None:
+        content = robot_table(robot, Path(overlay).parent)
+        robot = robot_of(lay_over(content, overlay), robot.name)
+    mismatch = home_posture(robot).mismatch
+    return Conversion(robot, (), mismatch, mismatch, True, 0.0, ())
+
+
+def _written(answer: Conversion, placed: Placed | None, target: Path) -> Conversion:
+    """Write, read back and compare in a folder of its own, then where it belongs."""
+    ending, robot = target.suffix.lower(), answer.robot
+    with TemporaryDirectory() as folder:
+        trial = Path(folder) / target.name
+        if ending == ".toml":
+            write_robot(robot, trial)
+            if placed is None:
+                home = home_posture(robot).coordinates
+                placed = mechanism_of_robot(robot, home)
+            difference = largest_difference(replace(placed, robot=read_robot(trial)))
+            texts: dict[Path, str] = {}
+        else:
+            answer, built = _built_in(answer)
+            texts = _texts(built.mechanism, target)
+            for path, text in texts.items():
+                write_text(text, trial.with_suffix(path.suffix))
+            back = _read_back(trial)
+            difference = largest_difference(replace(built, mechanism=back))
+    if not difference <= FAITHFUL:
+        raise BadInput(
+            f"{target}: what was written is another robot: bodies are off by "
+            f"{difference:.2g}, expected at most {FAITHFUL:g}; nothing is written"
+        )
+    if not texts:
+        write_robot(robot, target)
+    for path, text in texts.items():
+        write_text(text, path)
+    files = tuple(texts) or (target,)
+    return replace(answer, files=files, difference=difference)
+
+
+def _built_in(answer: Conversion) -> tuple[Conversion, Placed]:
+    """The rigid mechanism of a robot, its calibration built in, its loops closed."""
+    posture = home_posture(answer.robot)
+    robot = with_calibration(posture)
+    home = posture.coordinates
+    placed = mechanism_of_robot(robot, home)
+    mechanism = placed.mechanism
+    left_out = [*answer.left_out, *not_rigid(answer.robot)]
+    after, held = loop_residual(mechanism, home), answer.drives_held
+    if after >= CLOSED:  # errors pull the loops apart
+        home, after, held = nearest_closed(mechanism, 0)
+        pairs = zip(mechanism.joints, home, strict=True)
+        joints = tuple(replace(j, position=float(q)) for j, q in pairs)
+        placed = replace(placed, mechanism=replace(mechanism, joints=joints))
+    if after >= 1e-6:
+        left_out.append(
+            f"loops stay open by {after:.2g} rad or m with the calibrated geometry: "
+            "rigid bodies cannot close them, forced assembly does"
+        )
+    positions = dict(zip((f.name for f in robot.frames), home, strict=True))
+    frames = (replace(f, position=float(positions[f.name])) for f in robot.frames)
+    placed = replace(placed, robot=replace(robot, frames=tuple(frames)))
+    answer = replace(
+        answer, open_after=after, drives_held=held, left_out=tuple(left_out)
+    )
+    return answer, placed
+
+
+def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
+    """Text of each file to be written."""
+    if target.suffix.lower() == ".xml":
+        return {target: mjcf_text(mechanism)}
+    beside: LoopsFile = loops_of(mechanism)
+    return {target: urdf_text(mechanism),
+            target.with_suffix(".yaml"): loops_text(beside)}  # fmt: skip
+
+
+def _read_back(path: Path) -> Mechanism:
+    """The mechanism of files just written."""
+    if path.suffix.lower() == ".xml":
+        return read_mjcf(path)
+    return read_urdf(path, read_loops(path.with_suffix(".yaml")))

@@ -1,0 +1,100 @@
+"""What a loops file adds to a robot's own: loops, drives, ball joints, a home."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from assembly.exchange.loops_file import LoopsFile, unknown_name
+from assembly.exchange.mechanism import Joint, Loop, Mechanism, ball, chain
+from assembly.exchange.xml_file import counted
+from forcefit.inputs.errors import BadInput
+
+
+def with_loops(
+    mechanism: Mechanism, loops: LoopsFile | None, parts: Mapping[str, Sequence[str]],
+    driven: set[str],
+) -> Mechanism:  # fmt: skip
+    """The mechanism with loops, drives, platform and home of a loops file.
+
+    Args:
+        mechanism: as its own file has it.
+        loops: None without such a file.
+        parts: the file's joints, each with the names of the joints it was made of.
+        driven: joints that the robot's own file names as driven.
+
+    Returns:
+        The mechanism.  Drives are those that the loops file names, else ``driven``,
+        else, in a robot without loops, every joint.
+
+    Raises:
+        BadInput: a name that the robot does not have.
+    """
+    loops = loops or LoopsFile()
+    for name in (*loops.turns, *loops.home, *(loops.drives or ())):
+        key = "joint_name" if name in loops.turns else "name_mot"
+        key = "home" if name in loops.home else key
+        if name not in parts:
+            raise BadInput(unknown_name(loops, key, name, list(parts)))
+    mechanism, parts = _retyped(mechanism, loops.turns, parts)
+    ends = {name: name for name in mechanism.bodies}
+    children = {joint.name: joint.child for joint in mechanism.joints}
+    # a joint of several freedoms ends at its last part
+    ends |= {name: children[several[-1]] for name, several in parts.items()}
+    # links of fixed joints may share the joint's name: both are the same place
+    count, closed = len(mechanism.loops), list(mechanism.loops)
+    for i, (pair, point) in enumerate(zip(loops.pairs, loops.points, strict=True), 1):
+        for name in pair:
+            if name not in ends:
+                key = f"closed_loop[{i}]"
+                raise BadInput(unknown_name(loops, key, name, list(ends)))
+        first, second = (ends[name] for name in pair)
+        closed.append(Loop(f"loop{count + i}", first, second, point=point))
+    platform = loops.platform
+    if platform is not None and platform not in ends:
+        raise BadInput(unknown_name(loops, "platform", platform, list(ends)))
+    if loops.drives is not None:
+        driven = set(loops.drives)
+    elif not driven and not closed:
+        driven = set(parts)
+    drives = {part for name in driven & set(parts) for part in parts[name]}
+    joints = tuple(
+        replace(
+            joint,
+            actuated=joint.kind != "fixed" and (joint.actuated or joint.name in drives),
+            position=loops.home.get(joint.name, joint.position),
+        )
+        for joint in mechanism.joints
+    )
+    left_out = list(mechanism.left_out)
+    left_out += counted("keys of the loops file", list(loops.passed_over))
+    if not any(joint.actuated for joint in joints):
+        left_out.append("no drive is named (name_mot): every joint is passive")
+    return replace(
+        mechanism,
+        joints=joints,
+        loops=tuple(closed),
+        platform=mechanism.platform if platform is None else ends[platform],
+        left_out=tuple(left_out),
+    )
+
+
+def _retyped(
+    mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
+) -> tuple[Mechanism, dict[str, list[str]]]:
+    """Joints that a CAD export wrote as one turn, as what they really are."""
+    bodies, joints = dict(mechanism.bodies), list[Joint]()
+    now = {name: list(several) for name, several in parts.items()}
+    for joint in mechanism.joints:
+        axes = turns.get(joint.name)
+        if axes is None:
+            joints.append(joint)
+        elif not axes:
+            joints.append(replace(joint, kind="fixed"))
+        else:
+            several, between = chain(
+                joint.name, joint.parent, joint.child, joint.placement, joint.after,
+                ball(axes),
+            )  # fmt: skip
+            joints += several
+            bodies |= {body.name: body for body in between}
+            now[joint.name] = [one.name for one in several]
+    return replace(mechanism, bodies=bodies, joints=tuple(joints)), now

@@ -1,0 +1,65 @@
+"""Whether what was written is what was meant: random postures compared."""
+
+import numpy as np
+
+from assembly.exchange.as_robot import Placed
+from assembly.exchange.mechanism import body_poses
+from assembly.model.robot import BASE, JOINTS
+from forcefit.inputs.errors import BadInput
+from stiffness.screws import rotation_matrix, transform
+
+FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
+_POSTURES = 100
+
+
+def largest_difference(placed: Placed) -> float:
+    """Where bodies stand, by the mechanism and by the robot, in random postures.
+
+    All joints of the trees are moved, within 1 rad or m of home: loops need not close.
+
+    Args:
+        placed: the two, one of them read back from a file.
+
+    Returns:
+        Largest difference of any entry of any body's transform, lengths over the
+        largest distance from the base where that is above 1 m.
+
+    Raises:
+        BadInput: one of the two has joints that the other lacks.
+    """
+    from assembly.kinematics.compiled_continuation import forward
+
+    robot, mechanism = placed.robot, placed.mechanism
+    moving = [joint.name for joint in mechanism.joints if joint.kind != "fixed"]
+    rows = {f.name: i for i, f in enumerate(robot.frames) if f.joint != "fixed"}
+    lost = sorted(set(rows) ^ set(moving))
+    if lost:
+        raise BadInput(f"{robot.name}: joint {lost[0]} was lost in conversion")
+    random, worst = np.random.default_rng(0), 0.0
+    kinds = np.array([JOINTS.index(f.joint) for f in robot.frames])
+    for _ in range(_POSTURES):
+        shift = random.uniform(-1, 1, len(robot.frames))
+        q = np.where(kinds > 0, robot.positions + shift, 0.0)
+        R, p = forward(robot.parents, kinds, robot.fixed_transforms, q)
+        after = [_after(frame.joint, q[i]) for i, frame in enumerate(robot.frames)]
+        frames = {
+            f.name: transform(p[i], R[i]) @ after[i] for i, f in enumerate(robot.frames)
+        }
+        given = [q[rows[j.name]] if j.name in rows else 0.0 for j in mechanism.joints]
+        poses = body_poses(mechanism, np.array(given))
+        reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
+        scale = np.array([[1.0, 1.0, 1.0, 1 / reach]])
+        for name, (frame, at) in placed.places.items():
+            if frame == BASE:  # the root, whatever its name
+                continue
+            gap = (poses[name] - frames[frame] @ at)[:3] * scale
+            worst = max(worst, float(np.abs(gap).max()))
+    return worst
+
+
+def _after(joint: str, q: float) -> np.ndarray:
+    """(4, 4) motion of a frame's joint about or along z."""
+    along = np.array([0.0, 0.0, q])
+    if joint == "revolute":
+        return transform(np.zeros(3), rotation_matrix(along))
+    return transform(along if joint == "prismatic" else np.zeros(3), np.eye(3))

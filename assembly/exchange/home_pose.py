@@ -1,0 +1,245 @@
+"""A home pose in which loops close, where the one of the file is open."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import Mechanism
+from assembly.exchange.orientation import onto
+from assembly.model.robot import JOINTS
+from forcefit.inputs.errors import BadInput, quoted
+from stiffness.screws import rotation_vector, transform
+
+CLOSED = 1e-10  # [rad, m] what a closed loop may leave open
+_SCREWED_TIGHT = 1e-14  # scaled residual at which nothing is left but rounding
+_STARTS = 20  # random starts, farther and farther from the file's own
+_STARTS_ALONE = 12  # of one loop, to find the one at fault
+_STEPS = 200  # of one start
+_LONGEST_STEP = 0.3  # [rad or lengths]
+_STALLED = 0.999  # the sum of squares after ten steps over what it was before
+
+
+def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
+    """[rad, m] largest component that any loop leaves open."""
+    residual = _Loops(mechanism, 1.0).equations(coordinates)[0]
+    return float(np.abs(residual).max(initial=0.0))
+
+
+def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
+    """Coordinates near the file's own at which all loops close.
+
+    The drives are held first; where that does not close they move too; then random
+    starts (always the same) follow, each farther away.
+
+    Args:
+        mechanism: of n joints.
+        file: for messages.
+
+    Returns:
+        (n,) [rad or m] the coordinates, and whether the drives stand where the file
+        has them.
+
+    Raises:
+        BadInput: no start closes; the loop at fault is named with what it leaves open.
+    """
+    coordinates, residual, held = nearest_closed(mechanism, 0)
+    if residual >= CLOSED:
+        for loop in mechanism.loops:
+            _check_alone(replace(mechanism, loops=(loop,)), file)
+        coordinates, residual, held = nearest_closed(mechanism, _STARTS)
+    if residual >= CLOSED:
+        raise BadInput(
+            f"{file}: its {len(mechanism.loops)} loops cannot close together: at best "
+            f"they are open by {residual:.3g} rad or m"
+        )
+    return coordinates, held
+
+
+def _check_alone(mechanism: Mechanism, file: str) -> None:
+    """Refuse a loop that does not close even if the others stay open."""
+    (loop,) = mechanism.loops
+    residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
+    if residual >= CLOSED:
+        ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
+        raise BadInput(
+            f"{file}: {loop.name} {ends} cannot close, not even alone: at best it is "
+            f"open by {residual:.3g} rad or m; expected more joints, or type 3d"
+        )
+
+
+def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
+    """Coordinates near the file's own that leave the loops least open.
+
+    Args:
+        mechanism: of n joints.
+        starts: random ones, beside the file's own.
+
+    Returns:
+        (n,) [rad or m] the coordinates, what they leave open [rad, m], and whether the
+        drives stand where the file has them.
+    """
+    loops = _Loops(mechanism, _size(mechanism))
+    coordinates, residual, held = mechanism.home, np.inf, True
+    for attempt, hold in _attempts(mechanism, starts):
+        tried = _solve(loops, attempt, hold)
+        left = loop_residual(mechanism, tried)
+        if left < 0.5 * residual:
+            coordinates, residual, held = tried, left, hold
+        if residual < CLOSED:
+            break
+    return coordinates, residual, held
+
+
+def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool]]:
+    """Starts, and whether the drives are held."""
+    start = mechanism.home
+    yield start, True
+    yield start, False
+    random = np.random.default_rng(0)
+    kinds = np.array([joint.kind for joint in mechanism.joints])
+    reach = np.where(kinds == "revolute", np.pi, _size(mechanism))
+    for count in range(1, starts + 1):
+        spread = reach * random.uniform(-1, 1, len(start)) * count / starts
+        yield start + spread, False
+
+
+def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
+    """Levenberg-Marquardt from one start: the coordinates where it ends."""
+    free = loops.moving & loops.concerned & ~(hold & loops.actuated)
+    unit = np.where(loops.kinds == 2, loops.size, 1.0)
+    q, damping = start.astype(float), 1e-3
+    r, J = loops.equations(q)
+    before = np.inf
+    for step in range(_STEPS):
+        if np.abs(r).max(initial=0.0) < _SCREWED_TIGHT or not free.any():
+            break
+        if step % 10 == 0:
+            if r @ r > _STALLED * before:
+                break
+            before = r @ r
+        A = (J * unit)[:, free]
+        # rows added below, so that the condition is not squared
+        damped = np.vstack([A, np.sqrt(damping) * np.eye(A.shape[1])])
+        x = np.linalg.lstsq(damped, np.append(r, np.zeros(A.shape[1])), rcond=None)[0]
+        x *= min(1.0, _LONGEST_STEP / max(np.abs(x).max(initial=0.0), 1e-300))
+        tried = q.copy()
+        tried[free] -= x * unit[free]
+        r_tried, J_tried = loops.equations(tried)
+        if r_tried @ r_tried < r @ r:
+            q, r, J = tried, r_tried, J_tried
+            damping = max(damping / 10, 1e-20)
+        elif damping > 1e6:
+            break
+        else:
+            damping *= 10
+    return q
+
+
+def _size(mechanism: Mechanism) -> float:
+    """[m] longest distance between neighbouring joints, 1 if all are points."""
+    lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
+    return float(max(lengths, default=0.0)) or 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Loops:
+    """The loops' equations; every joint turns about or slides along its own z here."""
+
+    mechanism: Mechanism
+    size: float
+
+    @cached_property
+    def kinds(self) -> NDArray:
+        """(n,) 0 fixed, 1 revolute, 2 prismatic."""
+        return np.array([JOINTS.index(j.kind) for j in self.mechanism.joints], int)
+
+    @property
+    def moving(self) -> NDArray:
+        """(n,) bool."""
+        return self.kinds > 0
+
+    @cached_property
+    def actuated(self) -> NDArray:
+        """(n,) bool."""
+        return np.array([j.actuated for j in self.mechanism.joints], dtype=bool)
+
+    @cached_property
+    def tree(self) -> tuple[NDArray, NDArray, dict[str, tuple[int, NDArray]]]:
+        """Parents (n,), frames in them (n, 4, 4); each body's joint and place on it."""
+        on: dict[str, tuple[int, NDArray]] = {self.mechanism.root: (-1, np.eye(4))}
+        parents, fixed = [], []
+        for row, joint in enumerate(self.mechanism.joints):
+            parent, at = on[joint.parent]
+            turn = transform(np.zeros(3), onto(joint.axis))
+            parents.append(parent)
+            fixed.append(at @ joint.placement @ turn)
+            on[joint.child] = row, turn.T @ joint.after
+        count = len(parents)
+        return np.array(parents, int), np.array(fixed).reshape(count, 4, 4), on
+
+    @cached_property
+    def ends(self) -> list[tuple[tuple[int, NDArray], tuple[int, NDArray], NDArray]]:
+        """Each loop's two places: joint, place on it; and which rows it asks for."""
+        on, places = self.tree[2], []
+        for loop in self.mechanism.loops:
+            (i, A), (j, B) = on[loop.first], on[loop.second]
+            rows = np.arange(3 if loop.point else 0, 6)
+            places.append(((i, A @ loop.at_first), (j, B @ loop.at_second), rows))
+        return places
+
+    @cached_property
+    def carried(self) -> NDArray:
+        """(n + 1, n) which joints move what stands on a joint; last row: the root."""
+        parents = self.tree[0]
+        marks = np.zeros((len(parents) + 1, len(parents)))
+        for i, parent in enumerate(parents):
+            marks[i] = marks[parent]
+            marks[i, i] = 1.0
+        return marks
+
+    @cached_property
+    def concerned(self) -> NDArray:
+        """(n,) bool: joints on one side of a loop and not on the other."""
+        marks = np.zeros(len(self.kinds), dtype=bool)
+        for (i, _), (j, _), _ in self.ends:
+            marks |= self.carried[i] != self.carried[j]
+        return marks
+
+    def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
+        """What is open, translations over the size, and its derivatives by q."""
+        from assembly.kinematics.compiled_continuation import forward
+
+        parents, fixed, _ = self.tree
+        R, p = forward(parents, self.kinds, fixed, q)
+        z = R[:, :, 2] * self.moving[:, None]
+        turning = (self.kinds == 1)[:, None]
+        scale = np.array([1, 1, 1, *[1 / self.size] * 3])
+        residuals, rows = [np.zeros(0)], [np.zeros((0, len(q)))]
+        for *places, asked in self.ends:
+            poses, moved = [], []
+            for joint, place in places:
+                T = self._after(R, p, q, joint) @ place
+                arm = np.where(turning, np.cross(z, T[:3, 3] - p), z)
+                screws = np.concatenate([z * turning, arm], axis=1)
+                poses.append(T)
+                moved.append(screws.T * self.carried[joint])
+            A, B = poses
+            turn = rotation_vector(A[:3, :3] @ B[:3, :3].T)
+            r = np.concatenate([turn, A[:3, 3] - B[:3, 3]]) * scale
+            residuals.append(r[asked])
+            rows.append(((moved[0] - moved[1]) * scale[:, None])[asked])
+        return np.concatenate(residuals), np.vstack(rows)
+
+    def _after(self, R: NDArray, p: NDArray, q: NDArray, joint: int) -> NDArray:
+        """(4, 4) what stands on a joint, after the joint's motion."""
+        if joint < 0:
+            return np.eye(4)
+        c, s = np.cos(q[joint]), np.sin(q[joint])
+        if self.kinds[joint] == 1:
+            turn = R[joint] @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+            return transform(p[joint], turn)
+        slid = q[joint] if self.kinds[joint] == 2 else 0.0
+        return transform(p[joint] + slid * R[joint, :, 2], R[joint])

@@ -1,0 +1,199 @@
+"""``robot.yaml``: what stands beside a URDF that cannot say it, loops and drives.
+
+The convention of the example_parallel_robots: ``closed_loop`` pairs names of joints or
+links that coincide, ``type`` says ``6d`` or ``3d`` (only the points), ``name_mot``
+names the drives; ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a
+UJOINT_XY, _YZ, _ZX, which CAD exports write as one turn.  ``home`` (coordinates by
+joint) and ``platform`` are ours; other readers pass over them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
+from forcefit.inputs.table import Table, read_text
+
+_KNOWN = (
+    "closed_loop", "type", "name_mot", "joint_name", "joint_type", "home", "platform",
+)  # fmt: skip
+TURNS = {"FIXED": "", "SPHERICAL": "xyz", "UJOINT_XY": "xy", "UJOINT_YZ": "yz",
+         "UJOINT_ZX": "zx"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LoopsFile:
+    """What a loops file says.
+
+    Attributes:
+        file: its name, for messages.
+        pairs: names of joints or links that meet.
+        points: for each pair, whether only the points meet.
+        drives: names of the driven joints; None where the file does not say.
+        turns: axes, such as ``"xyz"``, about which a joint really turns, by joint.
+        home: [rad or m] coordinates at home by joint.
+        platform: name of a link, or None.
+        passed_over: keys that mean nothing here.
+    """
+
+    file: str = ""
+    pairs: tuple[tuple[str, str], ...] = ()
+    points: tuple[bool, ...] = ()
+    drives: tuple[str, ...] | None = None
+    turns: Mapping[str, str] = field(default_factory=dict)
+    home: Mapping[str, float] = field(default_factory=dict)
+    platform: str | None = None
+    passed_over: tuple[str, ...] = ()
+
+
+def find_loops_file(robot: Path) -> Path | None:
+    """The loops file that belongs to a robot: of its name, or ``robot.yaml`` beside."""
+    for path in (robot.with_suffix(".yaml"), robot.parent / "robot.yaml"):
+        if path.is_file():
+            return path
+    return None
+
+
+def read_loops(path: Path | str) -> LoopsFile:
+    """Read a loops file.
+
+    Args:
+        path: a YAML file.
+
+    Returns:
+        What it says.
+
+    Raises:
+        BadInput: it is not YAML, or a key holds something else than it should.
+    """
+    table = Table(_yaml(path), str(path), "")
+    given = _list(table, "closed_loop")
+    pairs = tuple(_pair(table, i, pair) for i, pair in enumerate(given, 1))
+    kinds = _list(table, "type") if table.has("type") else ["6d"] * len(pairs)
+    if len(kinds) != len(pairs):
+        message = f"found {len(kinds)}, expected one for each of {len(pairs)} loops"
+        raise table.bad("type", message)
+    for kind in kinds:
+        if str(kind).lower() not in {"6d", "3d"}:
+            raise table.bad("type", f'found {describe(kind)}, expected "6d" or "3d"')
+    home = table.get("home") or {}
+    if not isinstance(home, dict):
+        raise table.bad("home", f"found {describe(home)}, expected a table")
+    positions = Table({str(k): v for k, v in home.items()}, str(path), "home")
+    return LoopsFile(
+        file=str(path),
+        pairs=pairs,
+        points=tuple(str(kind).lower() == "3d" for kind in kinds),
+        drives=_names(table, "name_mot") if table.has("name_mot") else None,
+        turns=_turns(table),
+        home={k: positions.number(k, "rad or m") for k in positions.content},
+        platform=table.text("platform") if table.has("platform") else None,
+        passed_over=tuple(str(k) for k in table.content if k not in _KNOWN),
+    )
+
+
+def loops_text(loops: LoopsFile) -> str:
+    """A loops file's text, every number with all its digits."""
+    rows = [f"[{_word(a)}, {_word(b)}]" for a, b in loops.pairs]
+    kinds = ["3d" if point else "6d" for point in loops.points]
+    lines = [
+        "# Written by forcefit.",
+        f"closed_loop: [{', '.join(rows)}]",
+        f"type: [{', '.join(map(_word, kinds))}]",
+        f"name_mot: [{', '.join(map(_word, loops.drives or ()))}]",
+    ]
+    if loops.platform is not None:
+        lines.append(f"platform: {_word(loops.platform)}")
+    if loops.home:
+        lines.append("home:")
+        lines += [f"  {_word(k)}: {_number(q)}" for k, q in loops.home.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _yaml(path: Path | str) -> dict[str, Any]:
+    """Root mapping of a YAML file."""
+    import yaml
+
+    text = read_text(path)
+    try:
+        content = yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise BadInput(f"{path}: not valid YAML: {one_line(str(error), 200)}") from None
+    if not isinstance(content, dict):
+        found = describe(content)
+        raise BadInput(f"{path}: found {found}, expected keys such as closed_loop")
+    content = {str(k): v for k, v in content.items()}
+    if "closed_loop" not in content:
+        hint = nearest("closed_loop", content)
+        hint = hint if "did you mean" in hint else ""
+        raise BadInput(f"{path}: closed_loop: missing; expected pairs of names{hint}")
+    return content
+
+
+def _list(table: Table, key: str) -> list[Any]:
+    """A list, which may be empty."""
+    value = table.get(key)
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise table.bad(key, f"found {describe(value)}, expected a list")
+    return value
+
+
+def _names(table: Table, key: str) -> tuple[str, ...]:
+    """A list of names."""
+    values = _list(table, key)
+    for value in values:
+        if not isinstance(value, str):
+            raise table.bad(key, f"found {describe(value)}, expected names of joints")
+    return tuple(values)
+
+
+def _turns(table: Table) -> dict[str, str]:
+    """``joint_name`` and ``joint_type``, one type for each name."""
+    names, kinds = _names(table, "joint_name"), _names(table, "joint_type")
+    if len(names) != len(kinds):
+        message = f"found {len(kinds)}, expected one for each of {len(names)} joints"
+        raise table.bad("joint_type", message)
+    for kind in kinds:
+        if kind not in TURNS:
+            hint = nearest(kind, TURNS)
+            raise table.bad("joint_type", f"found {describe(kind)}{hint}")
+    return {name: TURNS[kind] for name, kind in zip(names, kinds, strict=True)}
+
+
+def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
+    """Two names that differ."""
+    names = pair if isinstance(pair, list) else []
+    names = [name for name in names if isinstance(name, str)]
+    if len(names) != 2 or pair != names or names[0] == names[1]:
+        message = f"found {describe(pair)}, expected two different names"
+        raise table.bad(f"closed_loop[{index}]", message)
+    return names[0], names[1]
+
+
+def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str:
+    """The message for a name that the robot does not have."""
+    return (
+        f"{loops.file}: {key}: found {quoted(name)}, expected a joint or link of the "
+        f"robot{nearest(name, valid)}"
+    )
+
+
+def _word(text: str) -> str:
+    """A text between double quotes, as YAML and JSON both read it."""
+    import json
+
+    return json.dumps(text)
+
+
+def _number(value: float) -> str:
+    """A number that YAML reads as one: an exponent needs a point before it."""
+    text = repr(float(value))
+    mantissa, e, exponent = text.partition("e")
+    if e and "." not in mantissa:
+        mantissa += ".0"
+    if e and exponent[0] not in "+-":
+        exponent = f"+{exponent}"
+    return mantissa + e + exponent

@@ -1,0 +1,231 @@
+"""What URDF, MJCF and SDF have in common: bodies, joints of one freedom, loops.
+
+A joint carries its child: the child stands at ``placement @ motion @ after`` in its
+parent, where the motion is about or along ``axis``.  Joints of several freedoms are
+chains of these, with bodies of no mass between them.  All in metres, radians, kg.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, nearest, quoted
+from stiffness.screws import rotation_matrix, transform
+
+HERE = np.eye(4)
+HERE.setflags(write=False)
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: unique among bodies.
+        mass: [kg].
+        centre: (3,) [m] of mass, in the body's axes.
+        inertia: (3, 3) [kg m^2] about that centre, in the body's axes.
+    """
+
+    name: str
+    mass: float = 0.0
+    centre: NDArray = field(default_factory=lambda: np.zeros(3))
+    inertia: NDArray = field(default_factory=lambda: np.zeros((3, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """What holds a body to its parent; see the head of this module.
+
+    Attributes:
+        name: unique among joints.
+        kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``.
+        parent: name of the body it stands on.
+        child: name of the body it carries.
+        placement: (4, 4) of the joint, seen from the parent.
+        axis: (3,) unit vector in the joint's axes.
+        after: (4, 4) of the child, seen from the joint after its motion.
+        position: [rad or m] coordinate at home.
+        actuated: whether a drive holds it.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    placement: NDArray = field(default_factory=lambda: HERE)
+    axis: NDArray = field(default_factory=lambda: np.array(_AXES["z"]))
+    after: NDArray = field(default_factory=lambda: HERE)
+    position: float = 0.0
+    actuated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Two places of two bodies that meet.
+
+    Attributes:
+        name: of the loop.
+        first: name of the one body.
+        second: name of the other.
+        at_first: (4, 4) the place, seen from the first body.
+        at_second: (4, 4) likewise from the second.
+        point: only the origins meet, the axes are free: a ball joint.
+    """
+
+    name: str
+    first: str
+    second: str
+    at_first: NDArray = field(default_factory=lambda: HERE)
+    at_second: NDArray = field(default_factory=lambda: HERE)
+    point: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A tree of bodies from its root, and loops.
+
+    Attributes:
+        name: of the robot.
+        root: name of the body that stands still.
+        bodies: by name; the root is one of them.
+        joints: parents first.
+        loops: pairs of places that meet.
+        platform: name of a body, None where the file does not say.
+        left_out: what the file says and a mechanism cannot hold, in words.
+    """
+
+    name: str
+    root: str
+    bodies: Mapping[str, Body]
+    joints: tuple[Joint, ...]
+    loops: tuple[Loop, ...] = ()
+    platform: str | None = None
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def home(self) -> NDArray:
+        """(joints,) [rad or m] coordinates at home."""
+        return np.array([joint.position for joint in self.joints])
+
+
+def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
+    tuple[str, tuple[Joint, ...]]
+):  # fmt: skip
+    """The root of a tree, and its joints sorted so that parents come first.
+
+    Args:
+        joints: in any order.
+        bodies: all of them.
+        file: for messages.
+
+    Returns:
+        Name of the root, and the joints.
+
+    Raises:
+        BadInput: a body is missing, has two parents, or hangs on no root or on several.
+    """
+    carried: dict[str, Joint] = {}
+    below: dict[str, list[Joint]] = {name: [] for name in bodies}
+    for joint in joints:
+        for name in (joint.parent, joint.child):
+            if name not in bodies:
+                where = f"{file}: joint {quoted(joint.name)}"
+                raise BadInput(
+                    f"{where}: found {quoted(name)}, expected the name of a link"
+                    f"{nearest(name, bodies)}"
+                )
+        if joint.child in carried:
+            raise BadInput(
+                f"{file}: link {quoted(joint.child)}: found two joints that carry it, "
+                f"{quoted(carried[joint.child].name)} and {quoted(joint.name)}; "
+                "expected one, and the other as a loop"
+            )
+        carried[joint.child] = joint
+        below[joint.parent].append(joint)
+    roots = [name for name in bodies if name not in carried]
+    if len(roots) != 1:
+        found = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
+        raise BadInput(f"{file}: found as root {found}, expected exactly one link")
+    order, waiting = [], list(reversed(below[roots[0]]))
+    while waiting:
+        joint = waiting.pop()
+        order.append(joint)
+        waiting += reversed(below[joint.child])
+    if len(order) != len(joints):
+        reached = {joint.name for joint in order}
+        lost = next(joint for joint in joints if joint.name not in reached)
+        raise BadInput(
+            f"{file}: joint {quoted(lost.name)}: found a ring of parents, expected "
+            f"them to lead to {quoted(roots[0])}"
+        )
+    return roots[0], tuple(order)
+
+
+def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]:
+    """Where every body stands.
+
+    Args:
+        mechanism: of n joints.
+        coordinates: (n,) [rad or m] of all joints, in their order.
+
+    Returns:
+        (4, 4) seen from the root, by the body's name.
+    """
+    poses = {mechanism.root: np.eye(4)}
+    for joint, q in zip(mechanism.joints, coordinates, strict=True):
+        at = poses[joint.parent] @ joint.placement
+        poses[joint.child] = at @ motion(joint, float(q)) @ joint.after
+    return poses
+
+
+def motion(joint: Joint, coordinate: float) -> NDArray:
+    """(4, 4) what a joint does at a coordinate [rad or m]."""
+    along = coordinate * joint.axis
+    if joint.kind == "revolute":
+        return transform(np.zeros(3), rotation_matrix(along))
+    return transform(along if joint.kind == "prismatic" else np.zeros(3), np.eye(3))
+
+
+def chain(
+    name: str, parent: str, child: str, placement: NDArray, after: NDArray,
+    freedoms: Sequence[tuple[str, str, NDArray]],
+) -> tuple[list[Joint], list[Body]]:  # fmt: skip
+    """A joint of several freedoms as joints of one, through bodies without mass.
+
+    Args:
+        name: of the whole; each part adds its own to it.
+        parent: body it stands on.
+        child: body it carries.
+        placement: (4, 4) seen from the parent.
+        after: (4, 4) of the child, seen from the last part after its motion.
+        freedoms: for each part its own name, kind and axis (3,).
+
+    Returns:
+        The joints and the bodies between them.
+    """
+    between = [Body(f"{name}.after_{part}") for part, _, _ in freedoms[:-1]]
+    ends = [parent, *(body.name for body in between), child]
+    joints = [
+        Joint(
+            f"{name}.{part}", kind, ends[i], ends[i + 1],
+            placement=placement if i == 0 else HERE,
+            axis=axis,
+            after=after if i == len(freedoms) - 1 else HERE,
+        )
+        for i, (part, kind, axis) in enumerate(freedoms)
+    ]  # fmt: skip
+    return joints, between
+
+
+def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
+    """Freedoms of a ball joint as three turns, singular only far from home."""
+    return [(f"r{axis}", "revolute", np.array(_AXES[axis])) for axis in turns]
+
+
+def slides() -> list[tuple[str, str, NDArray]]:
+    """Freedoms of a shift in space as three slides."""
+    return [(f"t{axis}", "prismatic", np.array(_AXES[axis])) for axis in "xyz"]

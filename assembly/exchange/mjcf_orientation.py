@@ -1,0 +1,81 @@
+"""Orientations of MJCF: five ways to write one, in degrees or radians."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.orientation import from_euler, from_quaternion, onto
+from assembly.exchange.xml_file import Node
+from stiffness.screws import rotation_matrix
+
+
+@dataclass(frozen=True)
+class Angles:
+    """How a file writes angles.
+
+    Attributes:
+        unit: [rad] of its unit.
+        sequence: axes of its Euler angles; capitals stand still.
+    """
+
+    unit: float
+    sequence: str
+
+    @staticmethod
+    def of(root: Node) -> "Angles":
+        """As the file's compilers say."""
+        unit, sequence = "degree", "xyz"
+        for compiler in root.children("compiler"):
+            unit = compiler.choice("angle", ("degree", "radian"), unit)
+            sequence = compiler.text("eulerseq", sequence)
+            if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
+                raise compiler.bad("eulerseq", "expected three of x, y, z")
+            if compiler.text("coordinate", "local") != "local":
+                raise compiler.bad("coordinate", "expected local")
+        return Angles(1.0 if unit == "radian" else math.pi / 180, sequence)
+
+    @staticmethod
+    def quaternion(q: NDArray) -> NDArray:
+        """(3, 3) of ``[w x y z]``."""
+        return from_quaternion(q)
+
+
+def orientation(node: Node, angles: Angles) -> NDArray:
+    """(3, 3) orientation of an element; none if it says nothing of it.
+
+    Args:
+        node: with one of quat, axisangle, euler, xyaxes, zaxis.
+        angles: how its file writes them.
+
+    Returns:
+        The rotation.
+
+    Raises:
+        BadInput: a direction of no length, or not as many numbers as asked for.
+    """
+    if node.has("quat"):
+        q = node.numbers("quat", 4, "-")
+        if not q.any():
+            raise node.bad("quat", "found zero, expected a rotation")
+        return from_quaternion(q)
+    if node.has("axisangle"):
+        x, y, z, angle = node.numbers("axisangle", 4, "-, angle")
+        axis = np.array([x, y, z])
+        if not axis.any():
+            raise node.bad("axisangle", "found no axis, expected a direction")
+        return rotation_matrix(angle * angles.unit * axis / np.linalg.norm(axis))
+    if node.has("euler"):
+        given = node.numbers("euler", 3, "angle") * angles.unit
+        return from_euler(given, angles.sequence)
+    if node.has("xyaxes"):
+        given = node.numbers("xyaxes", 6, "-")
+        z = np.cross(given[:3], given[3:])
+        if not z.any():
+            raise node.bad("xyaxes", "found parallel axes, expected two directions")
+        x, z = given[:3] / np.linalg.norm(given[:3]), z / np.linalg.norm(z)
+        return np.stack([x, np.cross(z, x), z], axis=1)
+    if node.has("zaxis"):
+        return onto(node.unit_vector("zaxis"))
+    return np.eye(3)

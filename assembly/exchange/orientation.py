@@ -1,0 +1,80 @@
+"""Orientations as other programs write them: roll-pitch-yaw, quaternions, Euler angles.
+
+Sources:
+    Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle computed
+    with the first one given, so that nothing is lost where the second is a right angle.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiffness.screws import rotation_matrix, rotation_vector
+
+_UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def from_roll_pitch_yaw(angles: ArrayLike) -> NDArray:
+    """(3, 3) rotation about the fixed x, then y, then z by (3,) angles [rad]."""
+    roll, pitch, yaw = np.asarray(angles, dtype=float)
+    return _about("z", yaw) @ _about("y", pitch) @ _about("x", roll)
+
+
+def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
+    """Angles [rad] of a (3, 3) rotation; the inverse of the above to rounding."""
+    roll = math.atan2(R[2, 1], R[2, 2])
+    c, s = math.cos(roll), math.sin(roll)
+    pitch = math.atan2(-R[2, 0], s * R[2, 1] + c * R[2, 2])
+    yaw = math.atan2(s * R[0, 2] - c * R[0, 1], c * R[1, 1] - s * R[1, 2])
+    return roll, pitch, yaw
+
+
+def from_quaternion(q: ArrayLike) -> NDArray:
+    """(3, 3) rotation of a quaternion ``[w x y z]`` of any length but zero."""
+    w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def to_quaternion(R: NDArray) -> tuple[float, float, float, float]:
+    """Unit quaternion ``[w x y z]`` of a (3, 3) rotation."""
+    turn = rotation_vector(R)
+    angle = float(np.linalg.norm(turn))
+    half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(a / 2) along the axis
+    return math.cos(angle / 2), float(half[0]), float(half[1]), float(half[2])
+
+
+def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
+    """(3, 3) rotation by three angles [rad] about axes such as ``"xyz"``.
+
+    Args:
+        angles: (3,) in the order of the sequence.
+        sequence: three letters; small ones turn with the body, capitals stand still.
+
+    Returns:
+        The rotation.
+    """
+    R = np.eye(3)
+    for axis, angle in zip(sequence, np.asarray(angles, dtype=float), strict=True):
+        turn = _about(axis.lower(), float(angle))
+        R = R @ turn if axis.islower() else turn @ R
+    return R
+
+
+def onto(axis: ArrayLike) -> NDArray:
+    """(3, 3) smallest rotation that brings z onto a unit vector."""
+    x, y, z = np.asarray(axis, dtype=float)
+    sine = math.hypot(x, y)
+    if sine == 0.0:
+        return np.diag([1.0, 1.0 if z > 0 else -1.0, 1.0 if z > 0 else -1.0])
+    angle = math.atan2(sine, z)
+    return rotation_matrix([-y / sine * angle, x / sine * angle, 0.0])
+
+
+def _about(axis: str, angle: float) -> NDArray:
+    """(3, 3) turn about a coordinate axis."""
+    return rotation_matrix(angle * np.array(_UNIT[axis]))

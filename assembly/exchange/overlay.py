@@ -1,0 +1,58 @@
+"""A small TOML laid over a converted robot: elasticity, clearances, tolerances.
+
+The robot's own file may then be made anew, by a CAD program say, and what was measured
+or looked up stays where it is.
+"""
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from forcefit.inputs.errors import nearest, quoted
+from forcefit.inputs.table import Table, read_toml
+
+_PLACED = ("parent", "translation", "rotation", "dh", "joint")  # the robot's own file's
+_WHOLE = ("name", "description", "platform", "effect", "frame")
+
+
+def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
+    """A robot's table with an overlay's keys added or replaced.
+
+    Args:
+        robot: as :func:`assembly.files.robot_file.robot_table` gives it, its paths
+            leading from the overlay's folder.
+        overlay: the file: ``[[frame]]`` with a ``name`` (``*`` stands for any letters)
+            and any keys of a frame but those that place it; ``platform``,
+            ``description``, ``[[effect]]`` of the whole.
+
+    Returns:
+        The root table, ready to be read; its mistakes name the overlay.
+
+    Raises:
+        BadInput: the overlay is not TOML, names a frame that the robot lacks, or
+            places one.
+    """
+    given = read_toml(overlay)
+    content = dict(robot)
+    for key in _WHOLE[:-1]:
+        if given.has(key):
+            content[key] = given.content[key]
+    frames = {frame["name"]: dict(frame) for frame in robot["frame"]}
+    for table in given.tables("frame"):
+        pattern = table.text("name", expected="the name of a frame")
+        names = [
+            name for name in frames if name == pattern or fnmatchcase(name, pattern)
+        ]
+        if not names:
+            hint = nearest(pattern, frames)
+            raise table.bad("name", f"found {quoted(pattern)}, no frame{hint}")
+        for key, value in table.content.items():
+            if key in _PLACED:
+                raise table.bad(key, "found it in an overlay, which places no frame")
+            if key != "name":
+                for name in names:
+                    frames[name][key] = value
+    given.finish()
+    content["frame"] = list(frames.values())
+    return Table(content, str(overlay), "")

@@ -1,0 +1,86 @@
+"""URDF out, and its loops file: numbers keep all their digits."""
+
+from xml.sax.saxutils import quoteattr
+
+from numpy.typing import NDArray
+
+from assembly.exchange.loops_file import LoopsFile
+from assembly.exchange.mechanism import Body, Joint, Mechanism
+from assembly.exchange.orientation import to_roll_pitch_yaw
+
+XML_MARK = "<!-- Written by forcefit. -->"
+
+
+def urdf_text(mechanism: Mechanism) -> str:
+    """A URDF's text.
+
+    Args:
+        mechanism: whose children stand in their joints' own frames (``after`` is no
+            motion), as those of robots of frames do.
+
+    Returns:
+        The text; its loops, drives and home are :func:`loops_of`.
+    """
+    lines = [XML_MARK, f"<robot name={quoteattr(mechanism.name)}>"]
+    for body in mechanism.bodies.values():
+        lines += _link(body)
+    for joint in mechanism.joints:
+        lines += _joint(joint)
+    return "\n".join([*lines, "</robot>"]) + "\n"
+
+
+def loops_of(mechanism: Mechanism) -> LoopsFile:
+    """What stands beside the URDF of a mechanism."""
+    moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
+    return LoopsFile(
+        pairs=tuple((loop.first, loop.second) for loop in mechanism.loops),
+        points=tuple(loop.point for loop in mechanism.loops),
+        drives=tuple(joint.name for joint in moving if joint.actuated),
+        home={joint.name: joint.position for joint in moving},
+        platform=mechanism.platform,
+    )
+
+
+def numbers(values: NDArray | tuple[float, ...]) -> str:
+    """Numbers between blanks, all their digits kept."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _link(body: Body) -> list[str]:
+    """``<link>`` with its inertial, if it has a mass."""
+    name = quoteattr(body.name)
+    if not body.mass:
+        return [f"  <link name={name}/>"]
+    J = body.inertia
+    entries = {"ixx": J[0, 0], "ixy": J[0, 1], "ixz": J[0, 2],
+               "iyy": J[1, 1], "iyz": J[1, 2], "izz": J[2, 2]}  # fmt: skip
+    inertia = " ".join(f'{key}="{float(v)!r}"' for key, v in entries.items())
+    return [
+        f"  <link name={name}>",
+        "    <inertial>",
+        f'      <origin xyz="{numbers(body.centre)}" rpy="0 0 0"/>',
+        f'      <mass value="{float(body.mass)!r}"/>',
+        f"      <inertia {inertia}/>",
+        "    </inertial>",
+        "  </link>",
+    ]
+
+
+def _joint(joint: Joint) -> list[str]:
+    """``<joint>``; one that turns has no limits, so it is continuous."""
+    kind = {"revolute": "continuous"}.get(joint.kind, joint.kind)
+    T = joint.placement
+    turn = to_roll_pitch_yaw(T[:3, :3])
+    lines = [
+        f'  <joint name={quoteattr(joint.name)} type="{kind}">',
+        f'    <origin xyz="{numbers(T[:3, 3])}" rpy="{numbers(turn)}"/>',
+        f"    <parent link={quoteattr(joint.parent)}/>",
+        f"    <child link={quoteattr(joint.child)}/>",
+    ]
+    if joint.kind != "fixed":
+        lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
+    if joint.kind == "prismatic":  # the format asks for limits here
+        lines.append(
+            '    <limit lower="-1e3" upper="1e3" effort="1e6" velocity="1e3"/>'
+        )
+    return [*lines, "  </joint>"]

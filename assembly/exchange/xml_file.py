@@ -1,0 +1,191 @@
+"""XML files read: no entities, no other file, and every mistake one message."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.largest import LARGEST_LENGTH
+from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
+from forcefit.inputs.table import read_text
+from stiffness.screws import transform
+
+_DEEPEST = 200  # elements inside elements
+
+
+@dataclass(frozen=True)
+class Node:
+    """An element of an XML file, with where it stands for messages.
+
+    Attributes:
+        element: of :mod:`xml.etree.ElementTree`.
+        file: its file's name.
+    """
+
+    element: Any
+    file: str
+
+    @property
+    def tag(self) -> str:
+        """Its name."""
+        return str(self.element.tag)
+
+    @property
+    def place(self) -> str:
+        """Its name and its own ``name``, for messages."""
+        name = self.element.get("name")
+        return self.tag if name is None else f"{self.tag} {quoted(name)}"
+
+    def bad(self, key: str, message: str) -> BadInput:
+        """The error for an attribute of this element, to be raised by the caller."""
+        place = f"{self.place}.{key}" if key else self.place
+        return BadInput(f"{self.file}: {place}: {message}")
+
+    def children(self, *tags: str) -> Iterator["Node"]:
+        """Elements inside of these names; of all names if none is given."""
+        for element in self.element:
+            if not tags or element.tag in tags:
+                yield Node(element, self.file)
+
+    def child(self, tag: str) -> "Node | None":
+        """The first element inside of this name, None without one."""
+        return next(self.children(tag), None)
+
+    def has(self, key: str) -> bool:
+        """Whether an attribute is there."""
+        return self.element.get(key) is not None
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """An attribute's text.
+
+        Args:
+            key: its name.
+            default: taken where it is absent; absent is an error without one.
+
+        Returns:
+            The text without blanks around it.
+
+        Raises:
+            BadInput: absent without a default, or empty.
+        """
+        value = self.element.get(key, default)
+        if value is None or not (value.strip() or value == default):
+            raise self.bad(key, "missing; expected a text")
+        return str(value).strip()
+
+    def choice(self, key: str, valid: tuple[str, ...], default: str) -> str:
+        """An attribute that is one of a few words."""
+        value = self.text(key, default)
+        if value not in valid:
+            names = " | ".join(valid)
+            hint = nearest(value, valid)
+            hint = hint if "did you mean" in hint else ""
+            raise self.bad(key, f"found {describe(value)}, expected {names}{hint}")
+        return value
+
+    def numbers(
+        self, key: str, count: int, unit: str, default: NDArray | None = None
+    ) -> NDArray:
+        """Finite numbers of an attribute, between blanks.
+
+        Args:
+            key: its name; empty for the element's own text.
+            count: how many.
+            unit: for the message.
+            default: taken where it is absent; absent is an error without one.
+
+        Returns:
+            (count,) numbers.
+
+        Raises:
+            BadInput: absent without a default, another count, not finite or huge.
+        """
+        text = self.element.get(key) if key else self.element.text or ""
+        expected = f"expected {count} finite number{'s' * (count > 1)} [{unit}]"
+        if text is None:
+            if default is None:
+                raise self.bad(key, f"missing; {expected}")
+            return default
+        try:
+            values = np.array([float(part) for part in text.split()])
+        except ValueError:
+            values = np.empty(0)
+        if values.shape != (count,) or not (np.abs(values) <= LARGEST_LENGTH).all():
+            raise self.bad(key, f"found {describe(text.strip())}, {expected}")
+        return values
+
+    def number(self, key: str, unit: str, default: float | None = None) -> float:
+        """One finite number of an attribute; see :meth:`numbers`."""
+        given = None if default is None else np.array([default])
+        return float(self.numbers(key, 1, unit, given)[0])
+
+    def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
+        """(3,) direction of an attribute, of length 1."""
+        vector = self.numbers(key, 3, "-", default)
+        length = float(np.linalg.norm(vector))
+        if length < 1e-9:
+            raise self.bad(key, f"found {describe(vector.tolist())}, not a direction")
+        # what is of length 1 to rounding stays as it is written
+        return vector if abs(length - 1.0) < 1e-15 else vector / length
+
+
+def read_xml(path: Path | str, root: str) -> Node:
+    """Root element of an XML file.
+
+    Args:
+        path: the file.
+        root: name that its root element must have.
+
+    Returns:
+        The element.
+
+    Raises:
+        BadInput: the file cannot be read, is not XML, declares entities or a document
+            type, or is something else.
+    """
+    from xml.etree.ElementTree import ParseError
+
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    text = read_text(path)
+    try:
+        element = fromstring(text, forbid_dtd=True)
+    except ParseError as error:  # its text ends with line and column
+        reason = one_line(str(error), 200)
+        raise BadInput(f"{path}: not valid XML: {reason}") from None
+    except DefusedXmlException:
+        raise BadInput(
+            f"{path}: found a document type or an entity, expected neither: what they "
+            "name would be read too"
+        ) from None
+    except ValueError as error:
+        raise BadInput(f"{path}: not valid XML: {one_line(str(error), 200)}") from None
+    if element.tag != root:
+        found = quoted(str(element.tag))
+        raise BadInput(f"{path}: found the root element {found}, expected {root}")
+    layer, depth = [element], 0
+    while layer:
+        layer, depth = [inner for outer in layer for inner in outer], depth + 1
+        if depth > _DEEPEST:
+            raise BadInput(f"{path}: elements stand more than {_DEEPEST} deep")
+    return Node(element, str(path))
+
+
+def placed(translation: NDArray, rotation: NDArray) -> NDArray:
+    """(4, 4) read-only transform."""
+    T = transform(translation, rotation)
+    T.setflags(write=False)
+    return T
+
+
+def counted(what: str, names: list[str]) -> tuple[str, ...]:
+    """One line that says how many things are left out, with the first names."""
+    if not names:
+        return ()
+    named = [name for name in names if name]
+    few = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
+    return (f"{what}: {len(names)}{f' ({few})' if few else ''}",)

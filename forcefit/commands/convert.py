@@ -1,0 +1,45 @@
+"""The command ``forcefit convert``: robots of other programs, in and out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import JsonOption
+from forcefit.inputs.writing import write_json
+
+
+def convert(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="IN", help=".urdf, .xml (MJCF), .sdf or .toml; or a built-in name."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help=".toml, .urdf or .xml (MJCF).")
+    ],
+    loops: Annotated[
+        Path | None,
+        typer.Option(
+            help="Loops and drives of a URDF (YAML, closed_loop); without it the file "
+            "of the URDF's name, or robot.yaml beside it."
+        ),
+    ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(help="Elasticity, clearances and errors by frame (TOML)."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Convert a robot from or to URDF, MJCF and SDF.
+
+    A home pose is found where the file's own leaves loops open.  What is written is
+    read back and compared in 100 random postures; what it cannot hold is listed.
+    """
+    from assembly.exchange.convert import convert as convert_robot
+
+    answer = convert_robot(source, output, loops, overlay)
+    write_json(answer.table(), json)
+    if json != "-":
+        print(answer.text())

@@ -1,0 +1,306 @@
+"""``forcefit convert``: the example robots close, the built-in ones come back."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.exchange.convert import convert
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.load import weights
+from assembly.robots import BUILT_IN
+from forcefit.inputs.errors import BadInput
+from tests.examples_for_tests import example
+
+NAMES = ("5bar_linkage", "5bar_linkage_iso3d", "5bar_linkage_iso6d", "cassie_like",
+         "digit_like", "disney_like", "robot_delta", "talos_like",
+         "wl16_like")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_example_robots_convert_and_close(name, tmp_path):
+    answer = convert(example(name), tmp_path / "robot.toml")
+    assert answer.difference < 1e-12
+    assert answer.open_after < 1e-9
+    posture = home_posture(read_robot(tmp_path / "robot.toml"))
+    assert posture.mismatch < 1e-9
+
+
+def test_a_loop_that_cannot_close_is_named_and_nothing_is_written(tmp_path):
+    """Kangaroo's file says 6d where a rod needs a ball: three turns cannot close it."""
+    target = tmp_path / "robot.toml"
+    with pytest.raises(BadInput, match=r"loop2 .* cannot close, not even alone"):
+        convert(example("kangaroo_like"), target)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_kangaroo_closes_with_the_loops_that_its_rods_need(tmp_path):
+    """A later file of the same authors has balls (3d) at the ends of these rods."""
+    path = example("kangaroo_like")
+    text = path.with_suffix(".yaml").read_text()
+    loops = tmp_path / "loops.yaml"
+    loops.write_text(text.replace("'6d'", "'3d'"))
+    answer = convert(path, tmp_path / "robot.toml", loops=loops)
+    assert answer.open_after < 1e-9
+    assert answer.difference < 1e-12
+
+
+@pytest.mark.parametrize("ending", ["urdf", "xml"])
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_built_in_robots_come_back(name, ending, tmp_path):
+    """Drives, platform, and every frame of the same name, at home and elsewhere."""
+    there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
+    assert convert(name, there).difference < 1e-12
+    assert convert(there, back).difference < 1e-12
+    robot, again = BUILT_IN[name](), read_robot(back)
+    assert again.platform == robot.platform
+    drives = {f.name: f.position + 0.02 for f in robot.frames if f.actuated}
+    assert drives == pytest.approx(
+        {f.name: f.position + 0.02 for f in again.frames if f.actuated}, abs=1e-12
+    )
+    for joints in (None, drives):
+        old, new = place_robot(robot, joints=joints), place_robot(again, joints=joints)
+        # rods may spin about themselves; followed to 1e-10 of the robot's size
+        assert new.platform == pytest.approx(old.platform, abs=1e-9)
+    rows = [again.index(frame.name) for frame in robot.frames]
+    home = home_posture(again).transforms[rows]
+    assert home == pytest.approx(home_posture(robot).transforms, abs=1e-12)
+
+
+def weight_on_the_ground(robot):
+    """(6,) [N m, N] of all weights together, at the base's origin."""
+    posture = home_posture(robot)
+    bodies, carried = weights(posture, [1.0, 2.0, 3.0])
+    wrenches = bodies + carried
+    arms = np.cross(posture.transforms[:, :3, 3], wrenches[:, 3:])
+    return np.concatenate([wrenches[:, :3] + arms, wrenches[:, 3:]], axis=1).sum(axis=0)
+
+
+@pytest.mark.parametrize("ending", ["urdf", "xml"])
+def test_masses_come_back(ending, tmp_path):
+    """Beams of a density return as masses: the same weight at the same place."""
+    there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
+    convert("arm6", there)
+    convert(there, back)
+    expected = weight_on_the_ground(BUILT_IN["arm6"]())
+    assert np.linalg.norm(expected[3:]) > 10
+    found = weight_on_the_ground(read_robot(back))
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-10)
+
+
+@pytest.mark.parametrize("ending", ["urdf", "xml"])
+def test_calibrated_geometry_is_built_in(ending, tmp_path):
+    """A four-bar with a longer crank and a longer rocker, which must close again."""
+    robot = BUILT_IN["four_bar"]()
+    source = tmp_path / "robot.toml"
+    errors = np.zeros((len(robot.frames), 6))
+    errors[robot.index("end_rocker"), 3] = 1e-3
+    longer = {"link_length": {"crank_pin": 2e-3}, "encoder_offset": {"crank": 0.01}}
+    write_robot(replace(robot.with_errors(errors), effects=longer), source)
+    there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
+    convert(source, there)
+    convert(there, back)
+    posture = home_posture(read_robot(back))
+    assert posture.mismatch < 1e-9
+    names = [frame.name for frame in posture.robot.frames]
+    places = dict(zip(names, posture.transforms[:, :3, 3], strict=True))
+    angle = robot.frame("crank").position + 0.01
+    crank = [0.102 * np.cos(angle), 0.102 * np.sin(angle), 0]
+    assert places["crank_pin"] == pytest.approx(crank, abs=1e-12)
+    rocker = places["end_rocker"] - places["rocker"]
+    assert np.linalg.norm(rocker) == pytest.approx(0.251, abs=1e-12)
+    assert places["end_rocker"] == pytest.approx(places["end_coupler"], abs=1e-9)
+
+
+def test_errors_that_no_rigid_robot_closes_are_said(tmp_path):
+    """The paper's robot is overconstrained: a longer link leaves its loops open."""
+    robot = BUILT_IN["irsbot2"]()
+    errors = np.zeros((len(robot.frames), 6))
+    errors[robot.index("leg1.link_a")] = [1e-3, 0, 0, 1e-3, 0, 0]
+    source = tmp_path / "robot.toml"
+    write_robot(robot.with_errors(errors), source)
+    answer = convert(source, tmp_path / "robot.urdf")
+    assert answer.difference < 1e-12
+    assert any("forced assembly" in line for line in answer.left_out)
+
+
+def test_an_overlay_adds_what_a_urdf_cannot_hold(tmp_path):
+    overlay = tmp_path / "overlay.toml"
+    overlay.write_text(
+        'platform = "effector"\n[[frame]]\nname = "free*"\n'
+        "clearance = { radial = 1e-5, tilt = 1e-4 }\n"
+        '[[frame]]\nname = "free1"\n'
+        "link = { beam = { radius = 0.02 }, young = 7e10, poisson = 0.3 }\n"
+    )
+    convert(example("5bar_linkage"), tmp_path / "robot.toml", overlay=overlay)
+    robot = read_robot(tmp_path / "robot.toml")
+    assert robot.platform == "effector"
+    assert [f.clearance.radial for f in robot.frames if f.clearance] == [1e-5, 1e-5]
+    assert robot.frame("free1").link.section == {"radius": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            '[[frame]]\nname = "fre1"\nmass = 1\n',
+            'found "fre1", no frame; did you mean',
+        ),
+        ('[[frame]]\nname = "free1"\ntranslation = [0, 0, 1]\n', "places no frame"),
+        ('[[frame]]\nname = "free1"\nmas = 1\n', 'unknown key "mas"'),
+        ("[[link]]\n", 'unknown key "link"'),
+        ('platform = "efector"\n', 'did you mean "effector"?'),
+    ],
+)
+def test_what_no_overlay_may_say(run, text, message, tmp_path):
+    overlay = tmp_path / "overlay.toml"
+    overlay.write_text(text)
+    status, out, err = run(
+        "convert", example("5bar_linkage"), "-o", tmp_path / "robot.toml",
+        "--overlay", overlay,
+    )  # fmt: skip
+    assert (status, out) == (2, "")
+    assert message in err
+    assert "overlay.toml" in err
+    assert not (tmp_path / "robot.toml").exists()
+
+
+URDF = """<robot name="r"><link name="a"/><link name="b"/>{links}
+<joint name="j" type="{kind}"><parent link="a"/><child link="{child}"/>{more}</joint>
+{joints}</robot>"""
+
+
+def urdf(kind="revolute", child="b", more="", links="", joints=""):
+    """A URDF of two links, or one with something wrong."""
+    return URDF.format(kind=kind, child=child, more=more, links=links, joints=joints)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (urdf(kind="revolut"), "joint \"j\".type: found 'revolut', expected rev"),
+        (urdf(child="c"), 'joint "j": found "c", expected the name of a link'),
+        (urdf(child="a"), "found a ring of parents"),
+        (urdf(links='<link name="c"/>'), 'found as root "a" and "c"'),
+        (urdf(more='<origin xyz="0 0"/>'), "xyz: found '0 0', expected 3 finite"),
+        (urdf(more='<origin xyz="0 0 nan"/>'), "expected 3 finite numbers [m]"),
+        (urdf(more='<axis xyz="0 0 0"/>'), "not a direction"),
+        (urdf(more='<mimic joint="k"/>'), 'mimic.joint: found "k"'),
+        (urdf(links='<link name="b"/>'), "found it twice"),
+        ("<robot><link/></robot>", "link.name: missing"),
+        ("<robot/>", "link: missing; expected at least one"),
+        ("<robott/>", 'found the root element "robott", expected robot'),
+        ("<robot>", "not valid XML"),
+        ("", "not valid XML"),
+        (
+            '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
+            "found a document type or an entity",
+        ),
+        (f"<robot>{'<a>' * 300}{'</a>' * 300}</robot>", "stand more than 200 deep"),
+    ],
+)
+def test_a_wrong_urdf_is_one_line(run, text, message, tmp_path):
+    source = tmp_path / "robot.urdf"
+    source.write_text(text)
+    status, out, err = run("convert", source, "-o", tmp_path / "out.toml")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert "robot.urdf" in err
+    assert not (tmp_path / "out.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("closed_loop: [[b]]", "closed_loop[1]: found ['b'], expected two different"),
+        ("closed_loop: [[b, bb]]", 'found "bb", expected a joint or link'),
+        ("closed_loop: [[a, b]]\ntype: [5d]", 'expected "6d" or "3d"'),
+        ("closed_loop: [[a, b]]\ntype: []", "type: found 0, expected one for each"),
+        (
+            "closed_lop: []",
+            'missing; expected pairs of names; did you mean "closed_lop"',
+        ),
+        ("closed_loop: []\nname_mot: [k]", 'name_mot: found "k"'),
+        ("closed_loop: []\nhome: {k: 1}", 'home: found "k"'),
+        (
+            "closed_loop: []\nhome: {j: x}",
+            "home.j: found 'x', expected a finite number",
+        ),
+        ("closed_loop: []\nplatform: k", 'platform: found "k"'),
+        ("closed_loop: []\njoint_name: [j]", "joint_type: found 0, expected one for"),
+        ("closed_loop: []\njoint_name: [j]\njoint_type: [BALL]", "found 'BALL'"),
+        ("[1", "not valid YAML"),
+        ("- 1", "expected keys such as closed_loop"),
+        ("!!python/object/apply:os.getcwd []", "not valid YAML"),
+    ],
+)
+def test_a_wrong_loops_file_is_one_line(run, text, message, tmp_path):
+    source = tmp_path / "robot.urdf"
+    source.write_text(urdf())
+    (tmp_path / "robot.yaml").write_text(text)
+    status, out, err = run("convert", source, "-o", tmp_path / "out.toml")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert not (tmp_path / "out.toml").exists()
+
+
+def test_another_program_s_file_is_not_overwritten(run, tmp_path):
+    target = tmp_path / "robot.urdf"
+    target.write_text(urdf())
+    status, _, err = run("convert", "arm6", "-o", target)
+    assert status == 2
+    assert "it is not overwritten" in err
+    assert target.read_text() == urdf()
+    status, _, err = run("convert", "arm6", "-o", tmp_path / "robot.sdf")
+    assert status == 2
+    assert "expected .toml or .urdf or .xml" in err
+
+
+def test_joints_of_several_freedoms_and_mimics(tmp_path):
+    """A ball is three turns, a mimic a drive of its own; what is left out is said."""
+    source = tmp_path / "robot.urdf"
+    joint = (
+        '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}'
+        "</joint>"
+    )
+    source.write_text(
+        '<robot name="r">' + "".join(f'<link name="{n}"/>' for n in "abcde")
+        + joint.format("ball", "spherical", "a", "b", '<origin xyz="0 0 1"/>')
+        + joint.format("cardan", "universal", "b", "c", '<axis xyz="1 0 0"/>')
+        + joint.format("first", "continuous", "c", "d", '<axis xyz="0 -2 0"/>')
+        + joint.format("second", "prismatic", "d", "e",
+                       '<mimic joint="first" multiplier="2" offset="0.1"/>')
+        + "<gazebo/></robot>"
+    )  # fmt: skip
+    answer = convert(source, tmp_path / "robot.toml")
+    robot = read_robot(tmp_path / "robot.toml")
+    turns = [f.name for f in robot.frames if f.joint == "revolute"]
+    assert turns == ["ball.rx", "ball.ry", "ball.rz", "cardan.first", "cardan.second",
+                     "first"]  # fmt: skip
+    assert robot.frame("second").position == 0.1
+    assert robot.frame("second").actuated
+    assert any(
+        line.startswith("mimic: second = 2 * first + 0.1") for line in answer.left_out
+    )
+    assert "element gazebo: 1" in answer.left_out
+    # y minus turned is the axis of "first": a quarter turn brings z below x
+    place = place_robot(robot, joints={"first": np.pi / 2})
+    R = place.transforms[robot.index("e")][:3, :3]
+    assert R @ [0, 0, 1] == pytest.approx([-1, 0, 0], abs=1e-12)
+
+
+def test_the_command_says_what_it_did(run, tmp_path):
+    target = tmp_path / "robot.toml"
+    status, out, _ = run("convert", "delta", "-o", tmp_path / "d.urdf", "--json", "-")
+    table = json.loads(out)
+    assert status == 0
+    assert table["largest_difference"] < 1e-12
+    assert [Path(name).name for name in table["files"]] == ["d.urdf", "d.yaml"]
+    status, out, _ = run("convert", tmp_path / "d.urdf", "-o", target)
+    assert status == 0
+    assert "read back in 100 random postures" in out
+    assert f"written: {target}" in out

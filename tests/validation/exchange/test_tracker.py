@@ -1,0 +1,283 @@
+"""A tracker's files to a campaign: the device's own place is known to the tests."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.campaigns_for_tests import ARM
+from validation.campaign.campaign import Campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.exchange.device_table import Writing, parse_time
+
+TARGETS = {"A": (0.0, 0.0, 0.1), "B": (0.1, 0.02, 0.0), "C": (0.0, 0.07, 0.03)}
+ANGLES = [(0.1 * k, 0.3 + 0.17 * k) for k in range(-6, 7)]
+TURN = Rotation.from_rotvec([0.4, -1.1, 2.0])  # where the device stands
+SHIFT = np.array([2.0, -3.0, 0.7])
+
+
+def attained(angles, place):
+    """(3,) [m] a target of the planar arm, from its closed form."""
+    one, two = angles
+    turn = Rotation.from_euler("z", one + two)
+    elbow = np.array([np.cos(one), np.sin(one), 0.0])
+    return elbow + turn.apply(np.array([0.8, 0, 0]) + place)
+
+
+def seen(angles, name):
+    """(3,) [m] the same in the device's axes."""
+    return TURN.inv().apply(attained(angles, TARGETS[name]) - SHIFT)
+
+
+class Lab:
+    """A folder in which files for an import are written."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / "robot.toml").write_text(ARM)
+        self.targets()
+        self.commands()
+
+    def targets(self, names="ABC", **keys):
+        """Write the targets file."""
+        keys = {"robot": '"robot.toml"', "noise": 1e-5, "unit": '"mm"'} | keys
+        lines = [f"{k} = {v}" for k, v in keys.items() if v is not None]
+        lines += ["[targets]", *(f"{n} = {list(TARGETS[n])}" for n in names)]
+        (self.folder / "smr.toml").write_text("\n".join(lines) + "\n")
+
+    def commands(self, times=None, head="id,q.one,q.two"):
+        """Write the table of commands."""
+        rows = [f"p{k},{a!r},{b!r}" for k, (a, b) in enumerate(ANGLES)]
+        if times is not None:
+            pairs = zip(rows, times, strict=True)
+            head, rows = f"{head},time", [f"{row},{time}" for row, time in pairs]
+        (self.folder / "commands.csv").write_text("\n".join([head, *rows]) + "\n")
+
+    def export(self, text, name="export.txt"):
+        """Write a device's file."""
+        (self.folder / name).write_text(text)
+
+    def words(self, *files):
+        """The command's words."""
+        f = self.folder
+        paths = [f / name for name in files or ("export.txt",)]
+        return ["validation", "import", *paths, "--targets", f / "smr.toml",
+                "--commands", f / "commands.csv", "-o", f / "campaign"]  # fmt: skip
+
+    def table(self):
+        """Columns of the campaign that was written."""
+        with (self.folder / "campaign" / "measurements.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        return {k: [row[k] for row in rows] for k in rows[0]}
+
+
+@pytest.fixture
+def lab(tmp_path):
+    return Lab(tmp_path)
+
+
+def points(names="ABC", line="{name}", change=lambda k, name, p: p):
+    """Lines of an export: one for each command and target; lengths in mm."""
+    for k, angles in enumerate(ANGLES):
+        for name in names:
+            x, y, z = (1e3 * change(k, name, seen(angles, name))).tolist()
+            yield line.format(k=k, name=name, x=x, y=y, z=z)
+
+
+SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
+
+
+def test_spatial_analyzer_text_joined_by_name(lab, run):
+    """Perfect readings: deviations are rounding, and the device is found again."""
+    lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
+    status, out, err = run(*lab.words(), "--json", "-")
+    assert (status, err) == (0, "")
+    table = json.loads(out)
+    assert table["joined_by"] == "name"
+    assert (table["rows"], table["readings"], table["left_out"]) == (13, 39, [])
+    assert table["device"]["rotation"] == pytest.approx(TURN.as_matrix(), abs=1e-12)
+    assert table["device"]["shift"] == pytest.approx(SHIFT, abs=1e-12)
+    columns = lab.table()
+    for name in "ABC":
+        for axis in "xyz":
+            values = np.array(columns[f"meas.{name}.t{axis}"], dtype=float)
+            assert np.abs(values).max() < 1e-12
+    declared = (lab.folder / "campaign" / "campaign.toml").read_text()
+    assert '[points]\n"A" = [0.0, 0.0, 0.1]' in declared
+    assert 'registration = "unknown"' in declared
+    assert 'robot = "../robot.toml"' in declared
+
+
+@pytest.mark.skipif(
+    "points" not in Campaign.__dataclass_fields__, reason="campaigns have no points yet"
+)
+def test_several_targets_are_points_of_the_campaign(lab, run):
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
+    assert run(*lab.words())[0] == 0
+    assert len(read_campaign(lab.folder / "campaign")) == 39
+
+
+def test_a_german_table_with_times_and_uncertainty(lab, run):
+    """Semicolons, decimal commas, dates with dots; U95 is two standard deviations."""
+    lab.targets("A", unit=None, noise=None, decimal='","')
+    lab.commands([f"22.11.2026 10:{k:02d}:00" for k in range(13)])
+    text = (lab.folder / "commands.csv").read_text().replace(",", ";")
+    (lab.folder / "commands.csv").write_text(text.replace(".", ",").replace(
+        "q,", "q.").replace("22,11,2026", "22.11.2026"))  # fmt: skip
+    rows = ["Punkt-ID;Name;X [mm];Y [mm];Z [mm];U95 X [um];U95 Y [um];U95 Z [um];Datum"]
+    rows[0] = rows[0].replace("Punkt-ID;", "").replace("Datum", "Timestamp")
+    for line in points("A", "{name};{x!r};{y!r};{z!r};30,0;40,0;50,0;{k}"):
+        cells, _, k = line.replace(".", ",").rpartition(";")
+        rows.append(f"{cells};2026-11-22T10:{int(k):02d}:02")
+    lab.export("\n".join(rows))
+    status, out, err = run(*lab.words(), "--json", "-")
+    assert (status, err) == (0, "")
+    assert json.loads(out)["joined_by"] == "time"
+    campaign = read_campaign(lab.folder / "campaign")
+    assert campaign.reference_point == pytest.approx(TARGETS["A"])
+    assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
+    # a variance along a base axis: the device's, turned
+    variance = TURN.as_matrix() ** 2 @ (np.array([15e-6, 20e-6, 25e-6]) ** 2)
+    assert campaign.sigma[:, 3:] == pytest.approx(
+        np.tile(np.sqrt(variance), (13, 1)), rel=1e-9
+    )
+    assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
+
+
+def test_known_registration_gives_the_deviations_themselves(lab, run):
+    lab.targets("B", registration='"known"', unit='"m"')
+    lines = [
+        "B\t{}\t{}\t{}".format(*(attained(a, TARGETS["B"]) + [1e-4, 2e-4, k * 1e-6]))
+        for k, a in enumerate(ANGLES)
+    ]
+    lab.export("\n".join(lines))
+    assert run(*lab.words())[0] == 0
+    campaign = read_campaign(lab.folder / "campaign")
+    expected = [[1e-4, 2e-4, k * 1e-6] for k in range(13)]
+    assert campaign.measured[:, 3:] == pytest.approx(np.array(expected), abs=1e-14)
+
+
+def test_exchanged_targets_and_blunders_are_named_and_left_out(lab, run, rng):
+    """At p3 A and B are taken for each other, at p7 C is 30 mm off."""
+
+    def change(k, name, p):
+        if k == 3 and name in "AB":
+            p = seen(ANGLES[k], "BA"["AB".index(name)])
+        return p + (k == 7 and name == "C") * np.array([0, 0.03, 0])
+
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
+    status, out, _ = run(*lab.words(), "--json", "-")
+    left_out = json.loads(out)["left_out"]
+    assert status == 0
+    assert len(left_out) == 3
+    assert '"Main::p3::A"): command "p3": it is "B", exchanged' in left_out[0]
+    assert 'command "p3": it is "A", exchanged' in left_out[1]
+    assert 'command "p7": 30 mm off' in left_out[2]
+    columns = lab.table()
+    row = columns["id"].index("p3")
+    assert columns["meas.A.tx"][row] == columns["meas.B.tx"][row] == ""
+    assert columns["meas.C.tx"][row] != ""
+
+
+def test_targets_exchanged_in_every_row_are_refused(lab, run):
+    lines = [line.translate(str.maketrans("AB", "BA"))
+             for line in points(line=SPATIAL_ANALYZER)]  # fmt: skip
+    lab.export("\n".join(lines))
+    status, _, err = run(*lab.words())
+    assert status == 2
+    assert "fit far better exchanged, in every row: A is B, B is A" in err
+    assert not (lab.folder / "campaign").exists()
+
+
+def test_readings_joined_by_order_and_read_twice(lab, run):
+    """Two files: the second has every point again; a name alone says no command."""
+    lab.export("\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
+    assert run(*lab.words())[0] == 0
+    lab.folder.joinpath("campaign/measurements.csv").unlink()
+    lab.folder.joinpath("campaign/campaign.toml").unlink()
+    named = "\n".join(points(line="p{k}::{name} {x!r} {y!r} {z!r}"))
+    lab.export(named)
+    lab.export(named, "again.txt")
+    assert run(*lab.words("export.txt", "again.txt"))[0] == 0
+    assert lab.table()["id"][:4] == ["p0", "p0.2", "p1", "p1.2"]
+
+
+@pytest.mark.parametrize(
+    ("text", "targets", "message"),
+    [
+        ("name x y\nA 1 2", {}, "found no column z"),
+        ("name;x;y;z\nA;1;2;3", {"unit": None}, "found no unit of lengths"),
+        ("name;x [furlong];y;z\nA;1;2;3", {}, 'found the unit "furlong"'),
+        ("name;x;y;z\nA;1,5;2;3", {}, "if that is a decimal mark say decimal"),
+        ("name;x;y;z\nA;1;2", {}, "found 3 cells, expected 4"),
+        ("name;x;y;z\nD;1;2;3", {}, 'the name of one target in it: "A", "B", "C"'),
+        ("A 1 2 3\nA 1 2 4", {}, 'found 2 readings of "A" for 13 commands'),
+        ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
+        ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
+        ("name;x;y;z;U95 x\nA;1;2;3;0", {}, "found 0, expected > 0"),
+        ("", {}, "empty; expected a table"),
+        ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
+        ("A 1 2 3", {"robot": None}, "robot: missing"),
+        ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
+    ],
+)
+def test_wrong_files_are_one_line(lab, run, text, targets, message):
+    lab.targets(**targets)
+    lab.export(text)
+    status, out, err = run(*lab.words())
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert not (lab.folder / "campaign").exists()
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("id,q.one,q.to", 'unknown column "q.to"; did you mean "q.two"?'),
+        ("id,q.one,cov.a", "expected a column for every drive"),
+        ("id,q.one,q.two [grad]", 'found the unit "grad"'),
+        ("ids,q.one,q.two", 'unknown column "ids"'),
+    ],
+)
+def test_wrong_commands_are_one_line(lab, run, head, message):
+    lab.commands(head=head)
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
+    status, _, err = run(*lab.words())
+    assert (status, err.count("\n")) == (2, 1)
+    assert message in err
+
+
+def test_what_is_there_is_not_written_over(lab, run):
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
+    assert run(*lab.words())[0] == 0
+    status, _, err = run(*lab.words())
+    assert status == 2
+    assert "expected a new folder" in err
+
+
+def test_readings_far_from_any_command_are_named(lab, run):
+    lab.targets("A", window=3)
+    lab.commands(range(0, 130, 10))
+    lines = [f"{line};{10 * k + 1 + 3 * (k == 5)}" for k, line in enumerate(
+        points("A", "{name};{x!r};{y!r};{z!r}"))]  # fmt: skip
+    lab.export("name;x;y;z;time\n" + "\n".join(lines))
+    status, out, _ = run(*lab.words(), "--json", "-")
+    table = json.loads(out)
+    assert status == 0
+    assert table["readings"] == 12
+    assert "no command near it in time" in table["left_out"][0]
+
+
+@pytest.mark.parametrize(
+    ("text", "dates"),
+    [
+        ("2026-11-22T10:30:00", None), ("2026-11-22 10:30:00.000", None),
+        ("20261122103000", None), ("22.11.2026 10:30:00", None),
+        ("11/22/2026 10:30:00 AM", "month_first"), ("22/11/2026 10:30:00", "day_first"),
+        ("2026-11-22T11:30:00+01:00", None), ("1795343400", None),
+    ],
+)  # fmt: skip
+def test_times_are_read_as_they_are_written(text, dates):
+    assert parse_time("", text, Writing(dates=dates)) == 1795343400.0

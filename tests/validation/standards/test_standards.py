@@ -1,0 +1,127 @@
+"""ISO 9283 and ISO 230-2 against the standards' formulas, worked by hand."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.campaigns_for_tests import write_campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.standards.figures import standard_figures
+from validation.standards.iso230 import axis_figures
+from validation.standards.iso9283 import (
+    accuracy_drift,
+    distance_accuracy,
+    orientation_accuracy,
+    orientation_repeatability,
+    position_accuracy,
+    position_repeatability,
+)
+
+
+def test_pose_accuracy_and_repeatability_worked_by_hand():
+    """Barycentre (3, 4, 0): AP = 5; l = 1, 1, 2, 2: mean 1.5, S = sqrt(1/3)."""
+    d = np.array([[4, 4, 0], [2, 4, 0], [3, 6, 0], [3, 2, 0]], dtype=float)
+    assert position_accuracy(d) == pytest.approx(5.0, rel=1e-15)
+    expected = 1.5 + 3 * np.sqrt(1 / 3)
+    assert position_repeatability(d) == pytest.approx(expected, rel=1e-14)
+
+
+def test_orientation_figures_worked_by_hand():
+    angles = np.array([[1, 0, 5], [3, 0, 5], [5, 3, 5]], dtype=float)
+    assert orientation_accuracy(angles) == pytest.approx([3, 1, 5], rel=1e-15)
+    expected = [3 * 2, 3 * np.sqrt(3), 0]
+    assert orientation_repeatability(angles) == pytest.approx(expected, rel=1e-14)
+
+
+def test_distance_accuracy_worked_by_hand():
+    """Distances 5, 7, 6 for 5.5 asked: AD = 0.5, S = 1."""
+    first = np.zeros((3, 3))
+    second = [[3, 4, 0], [0, 0, 7], [6, 0, 0]]
+    accuracy, repeatability = distance_accuracy(first, second, 5.5)
+    assert accuracy == pytest.approx(0.5, rel=1e-14)
+    assert repeatability == pytest.approx(3.0, rel=1e-14)
+
+
+def test_drift_is_the_largest_change_from_the_first_block():
+    d = np.zeros((35, 3))
+    d[:10, 0], d[10:20, 0], d[20:30, 1], d[30:, 0] = 1, 1.5, 4, 99
+    assert accuracy_drift(d) == pytest.approx(3.0, rel=1e-15)
+    assert accuracy_drift(d[:19]) is None
+
+
+def test_reversal_and_repeatability_worked_by_hand():
+    """Two positions, three approaches a side; s = 1 and 2 up, 1 and 0 down.
+
+    Means up 1, 4; down 0, 6.  B_i = 1, -2: B = 2, mean -0.5.  R up = 4 x 2, down 4 x 1;
+    R_1 = max(2 + 2 + 1, 4, 4) = 5, R_2 = max(4 + 0 + 2, 8, 0) = 8.  E = 6 - 0,
+    M = 5 - 0.5, A = max(3, 8, 2, 6) - min(-1, 0, -2, 6).
+    """
+    figures = axis_figures([[0, 1, 2], [2, 4, 6]], [[-1, 0, 1], [6, 6, 6]])
+    assert figures.reversal == pytest.approx(2)
+    assert figures.mean_reversal == pytest.approx(-0.5)
+    assert figures.repeatability_forward == pytest.approx(8)
+    assert figures.repeatability_backward == pytest.approx(4)
+    assert figures.repeatability == pytest.approx(8)
+    assert figures.systematic_deviation == pytest.approx(6)
+    assert figures.mean_deviation == pytest.approx(4.5)
+    assert figures.accuracy == pytest.approx(8 - (-2))
+
+
+HEAD = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.time,cov.approach"
+
+
+def campaign(tmp_path, rows):
+    """A folder of the two-joint arm with these rows."""
+    return write_campaign(tmp_path / "lab", head=HEAD, rows=rows)
+
+
+def test_a_campaign_s_figures(run, tmp_path):
+    """The arm of 1 m and 0.8 m, stretched along x and along y: 1.8 sqrt(2) m apart."""
+    quarter = repr(np.pi / 2)
+    rows = [
+        f"{name}{k}{side},{angle},0,{x + side * 1e-5 + k * 1e-6},0,0,{t},{side}"
+        for t, (k, name, angle, x, side) in enumerate(
+            (k, name, angle, x, side)
+            for k in range(3)
+            for name, angle, x in (("a", "0", 1e-4), ("b", quarter, 2e-4))
+            for side in (1, -1)
+        )
+    ]
+    status, out, _ = run("validation", "iso", campaign(tmp_path, rows), "--json", "-")
+    table = json.loads(out)
+    assert status == 0
+    poses = {pose["label"]: pose for pose in table["iso_9283"]["poses"]}
+    assert set(poses) == {"a01", "a0-1", "b01", "b0-1"}
+    assert poses["a01"]["accuracy"] == pytest.approx(1e-4 + 1e-5 + 1e-6, rel=1e-9)
+    # l = 1, 0, 1 um: mean 2/3, S = sqrt(1/3)
+    spread = (2 / 3 + 3 * np.sqrt(1 / 3)) * 1e-6
+    assert poses["a01"]["repeatability"] == pytest.approx(spread, rel=1e-6)
+    pair = next(
+        p for p in table["iso_9283"]["distances"] if p["labels"] == ["a01", "b01"]
+    )
+    assert pair["commanded"] == pytest.approx(1.8 * np.sqrt(2), rel=1e-12)
+    # b moves by 1e-4 in x away from a's own shift: towards a along the line by cosine
+    assert pair["accuracy"] == pytest.approx(-1e-4 / np.sqrt(2), rel=1e-3)
+    axis = table["iso_230_2"]["tx"]
+    assert axis["reversal"] == pytest.approx(2e-5, rel=1e-9)
+    assert axis["repeatability"] == pytest.approx(2e-5 + 4e-6, rel=1e-9)
+    assert axis["systematic_deviation"] == pytest.approx(1e-4 + 2e-5, rel=1e-9)
+
+
+def test_figures_need_repeats(run, tmp_path):
+    folder = campaign(tmp_path, ["a,0,0,0,0,0,0,1", "b,0.1,0,0,0,0,1,1"])
+    status, _, err = run("validation", "iso", folder)
+    assert status == 2
+    assert "found no command that was measured twice" in err
+
+
+def test_where_the_device_stands_does_not_matter_to_repeatability(tmp_path, rng):
+    """A law: turned and shifted readings have the same RP and distances."""
+    d = rng.normal(size=(30, 3))
+    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    assert position_repeatability(d @ Q + 5) == pytest.approx(position_repeatability(d))
+    folder = campaign(tmp_path, ["a,0,0,1e-5,0,0,0,1", "b,0,0,2e-5,0,0,1,1"])
+    (pose,) = standard_figures(read_campaign(folder)).poses
+    assert pose.accuracy == pytest.approx(1.5e-5)
+    assert pose.angles is None

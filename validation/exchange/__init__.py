@@ -1,0 +1,4 @@
+"""Measuring devices' own files, made into campaigns.
+
+Begin at ``tracker.py``.
+"""

@@ -1,0 +1,146 @@
+"""Where the device stood, targets exchanged, and readings that are blunders.
+
+Sources:
+    Kabsch (1976), A solution for the best rotation to relate two sets of vectors, Acta
+    Crystallographica A32, 922.
+    Rousseeuw, Croux (1993), Alternatives to the median absolute deviation: 1.4826 MAD
+    is one standard deviation of Gaussian scatter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_GROSS = 20.0  # times the scatter of all readings: no machine does that in one place
+_BETTER = 0.25  # of the misfit must be left for an exchange to be believed
+_MOST = 6  # targets whose exchanges are all tried: 720
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceFrame:
+    """Base axes seen from where the device stood: base = rotation @ device + shift.
+
+    Attributes:
+        rotation: (3, 3).
+        shift: (3,) [m].
+    """
+
+    rotation: NDArray
+    shift: NDArray
+
+    def to_base(self, points: NDArray) -> NDArray:
+        """(..., 3) [m] points of the device in base axes."""
+        return points @ self.rotation.T + self.shift
+
+
+def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
+    """The frame that brings measured points nearest to nominal ones.
+
+    Args:
+        measured: (N, 3) [m] device axes.
+        nominal: (N, 3) [m] base axes.
+
+    Returns:
+        The frame of least squares.
+    """
+    a, b = measured.mean(axis=0), nominal.mean(axis=0)
+    U, _, Vt = np.linalg.svd((measured - a).T @ (nominal - b))
+    sign = np.sign(np.linalg.det(Vt.T @ U.T))
+    R = Vt.T @ np.diag([1.0, 1.0, sign]) @ U.T
+    return DeviceFrame(R, b - R @ a)
+
+
+def spans_a_plane(points: NDArray) -> bool:
+    """Whether (N, 3) points are not all on one line, so that they fix a frame."""
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
+
+
+def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
+    """The frame with gross readings left aside, and the scatter about it.
+
+    Args:
+        measured: (N, 3) [m] device axes.
+        nominal: (N, 3) [m] base axes.
+
+    Returns:
+        The frame, and [m] the scatter of one component.
+    """
+    kept = np.ones(len(measured), dtype=bool)
+    for _ in range(20):
+        frame = fit_frame(measured[kept], nominal[kept])
+        gaps = np.linalg.norm(frame.to_base(measured) - nominal, axis=1)
+        scatter = scatter_of(gaps)
+        now = gaps <= _GROSS * scatter
+        if np.array_equal(now, kept) or not spans_a_plane(nominal[now]):
+            break
+        kept = now
+    return frame, scatter
+
+
+def scatter_of(gaps: NDArray) -> float:
+    """[m] robust scatter of (N,) distances; rounding where all are zero."""
+    # the median length of a Gaussian vector in space is 1.538 of one component's sigma
+    return float(np.median(gaps)) / 1.538 + 1e-12
+
+
+def is_gross(gap: float, scatter: float) -> bool:
+    """Whether a distance [m] is beyond any scatter [m]."""
+    return gap > _GROSS * scatter
+
+
+def exchanged_throughout(
+    measured: Sequence[NDArray], nominal: Sequence[NDArray]
+) -> tuple[int, ...] | None:
+    """An order of the targets that fits far better than the one they are named in.
+
+    Args:
+        measured: for each target (R, 3) [m] device axes, NaN where not read.
+        nominal: likewise in base axes.
+
+    Returns:
+        For each target the number of the one it really is; None if the names are right.
+    """
+    count = len(measured)
+    if not 2 <= count <= _MOST:
+        return None
+    misfits = {}
+    for order in permutations(range(count)):
+        a = np.concatenate(list(measured))
+        b = np.concatenate([nominal[k] for k in order])
+        read = np.isfinite(a).all(axis=1)
+        frame = fit_frame(a[read], b[read])
+        gaps = np.linalg.norm(frame.to_base(a[read]) - b[read], axis=1)
+        misfits[order] = float(np.median(gaps))
+    best = min(misfits, key=lambda order: misfits[order])
+    own = misfits[tuple(range(count))]
+    return best if misfits[best] < _BETTER * own else None
+
+
+def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
+    tuple[int, ...] | None
+):  # fmt: skip
+    """Targets of one row that were taken for each other.
+
+    Args:
+        measured: (k, 3) [m] base axes already.
+        nominal: (k, 3) [m].
+        scatter: [m] of all readings.
+
+    Returns:
+        For each target the number of the one it is; None if none was.
+    """
+    count = len(measured)
+    own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)
+    if not 2 <= count <= _MOST or not is_gross(float(own), scatter):
+        return None
+    orders = list(permutations(range(count)))
+    gaps = [
+        np.linalg.norm(measured - nominal[list(order)], axis=1).max()
+        for order in orders
+    ]
+    best = int(np.argmin(gaps))
+    return orders[best] if gaps[best] < _BETTER * own else None

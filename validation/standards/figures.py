@@ -1,0 +1,209 @@
+"""Figures of ISO 9283 and ISO 230-2 from a campaign's repeats."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, quoted
+from validation.campaign.campaign import READING, Campaign, number_rows
+from validation.standards.iso230 import AxisFigures, axis_figures
+from validation.standards.iso9283 import (
+    accuracy_drift,
+    distance_accuracy,
+    orientation_accuracy,
+    orientation_repeatability,
+    position_accuracy,
+    position_repeatability,
+)
+
+_MOST_PAIRS = 2000  # of positions whose distances are looked at
+
+
+@dataclass(frozen=True)
+class PoseFigures:
+    """ISO 9283 at one pose, load and side of approach; None where not measured.
+
+    Attributes:
+        label: id of its first row.
+        cycles: n.
+        accuracy: AP_P [m].
+        repeatability: RP_l [m].
+        angles: AP_a, AP_b, AP_c [rad].
+        angle_repeatability: RP_a, RP_b, RP_c [rad].
+        drift: of AP_P [m].
+    """
+
+    label: str
+    cycles: int
+    accuracy: float | None
+    repeatability: float | None
+    angles: tuple[float, ...] | None
+    angle_repeatability: tuple[float, ...] | None
+    drift: float | None
+
+
+@dataclass(frozen=True)
+class DistanceFigures:
+    """ISO 9283 of the distance between two poses.
+
+    Attributes:
+        labels: of the poses.
+        commanded: [m] between them.
+        accuracy: AD_P [m], with its sign.
+        repeatability: RD [m].
+    """
+
+    labels: tuple[str, str]
+    commanded: float
+    accuracy: float
+    repeatability: float
+
+
+@dataclass(frozen=True)
+class StandardFigures:
+    """All figures of a campaign.
+
+    Attributes:
+        campaign: its name.
+        poses: repeated at least once.
+        distances: between them.
+        axes: ISO 230-2 of each reading approached from both sides, by its name.
+    """
+
+    campaign: str
+    poses: tuple[PoseFigures, ...]
+    distances: tuple[DistanceFigures, ...]
+    axes: dict[str, AxisFigures]
+
+    def table(self) -> dict[str, Any]:
+        """Plain values for ``--json``."""
+        return {
+            "campaign": self.campaign,
+            "iso_9283": {
+                "poses": [asdict(pose) for pose in self.poses],
+                "distances": [asdict(pair) for pair in self.distances],
+            },
+            "iso_230_2": {name: asdict(axis) for name, axis in self.axes.items()},
+        }
+
+    def text(self) -> str:
+        """A table for people, the worst of each in the last line."""
+        lines = [f"{self.campaign}: ISO 9283, {len(self.poses)} poses with repeats",
+                 "pose              cycles  AP [um]  RP [um]  drift [um]"]  # fmt: skip
+        for pose in self.poses:
+            values = (pose.accuracy, pose.repeatability, pose.drift)
+            shown = "  ".join(_micro(value) for value in values)
+            lines.append(f"{pose.label[:16]:16}  {pose.cycles:6}  {shown}")
+        if self.distances:
+            worst = max(self.distances, key=lambda pair: abs(pair.accuracy))
+            a, b = worst.labels
+            lines.append(
+                f"distance accuracy, worst of {len(self.distances)}: "
+                f"{1e6 * worst.accuracy:.4g} um of {worst.commanded:.4g} m, {a} to "
+                f"{b}; repeatability {1e6 * worst.repeatability:.4g} um"
+            )
+        for name, axis in self.axes.items():
+            unit = "urad" if name.startswith("r") else "um"
+            lines.append(
+                f"ISO 230-2 {name} [{unit}]: B {1e6 * axis.reversal:.4g}, "
+                f"R {1e6 * axis.repeatability:.4g}, E "
+                f"{1e6 * axis.systematic_deviation:.4g}, A {1e6 * axis.accuracy:.4g}"
+            )
+        return "\n".join(lines)
+
+
+def _micro(value: float | None) -> str:
+    """A length in um, in eight characters."""
+    return f"{'-':>7}" if value is None else f"{1e6 * value:7.4g}"
+
+
+def standard_figures(campaign: Campaign) -> StandardFigures:
+    """Figures of ISO 9283 and ISO 230-2 of a campaign.
+
+    Args:
+        campaign: with rows measured more than once.
+
+    Returns:
+        The figures; sides of approach are apart in ISO 9283, as its cycles are.
+
+    Raises:
+        BadInput: no row is repeated.
+    """
+    side = campaign.covariates.get("approach", np.ones(len(campaign)))
+    group = number_rows(campaign.repeat, side)
+    sets = [np.flatnonzero(group == k) for k in range(int(group.max()) + 1)]
+    sets = [_in_time(campaign, rows) for rows in sets if len(rows) > 1]
+    if not sets:
+        raise BadInput(
+            f"campaign {quoted(campaign.name)}: found no command that was measured "
+            "twice; expected repeats, from which the standards' figures are made"
+        )
+    return StandardFigures(
+        campaign.name,
+        tuple(_pose(campaign, rows) for rows in sets),
+        tuple(_distances(campaign, sets)),
+        dict(_axes(campaign)),
+    )
+
+
+def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
+    """Rows in the order measured."""
+    time = campaign.covariates.get("time")
+    return rows if time is None else rows[np.argsort(time[rows], kind="stable")]
+
+
+def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
+    """ISO 9283 of one set of repeats."""
+    turns, shifts = campaign.measured[rows, :3], campaign.measured[rows, 3:]
+    turns, shifts = (d[np.isfinite(d).all(axis=1)] for d in (turns, shifts))
+    placed, turned = len(shifts) > 1, len(turns) > 1
+    return PoseFigures(
+        label=campaign.ids[rows[0]],
+        cycles=len(rows),
+        accuracy=position_accuracy(shifts) if placed else None,
+        repeatability=position_repeatability(shifts) if placed else None,
+        angles=tuple(orientation_accuracy(turns).tolist()) if turned else None,
+        angle_repeatability=(
+            tuple(orientation_repeatability(turns).tolist()) if turned else None
+        ),
+        drift=accuracy_drift(shifts) if placed else None,
+    )
+
+
+def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
+    """ISO 9283 of distances, cycle by cycle, between poses that differ."""
+    robot, point = campaign.robot, campaign.reference_point
+    T = campaign.transforms[:, robot.index(robot.platform)]
+    nominal = T[:, :3, 3] + T[:, :3, :3] @ point
+    attained = nominal + campaign.measured[:, 3:]
+    for a, b in list(combinations(sets, 2))[:_MOST_PAIRS]:
+        commanded = float(np.linalg.norm(nominal[a[0]] - nominal[b[0]]))
+        count = min(len(a), len(b))
+        first, second = attained[a[:count]], attained[b[:count]]
+        read = np.isfinite(first + second).all(axis=1)
+        if commanded > 0 and read.sum() > 1:
+            ids = campaign.ids[a[0]], campaign.ids[b[0]]
+            figures = distance_accuracy(first[read], second[read], commanded)
+            yield DistanceFigures(ids, commanded, *figures)
+
+
+def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
+    """ISO 230-2 of each reading taken at least twice from both sides."""
+    side = campaign.covariates.get("approach")
+    if side is None:
+        return
+    for k, name in enumerate(READING):
+        values = campaign.measured[:, k]
+        forward, backward = [], []
+        for number in range(int(campaign.repeat.max()) + 1):
+            here = (campaign.repeat == number) & np.isfinite(values)
+            up, down = values[here & (side > 0)], values[here & (side < 0)]
+            if len(up) > 1 and len(down) > 1:
+                forward.append(up)
+                backward.append(down)
+        if forward:
+            yield name, axis_figures(forward, backward)

@@ -1,0 +1,75 @@
+"""Reversal and repeatability of ISO 230-2, by its formulas.
+
+Sources:
+    ISO 230-2:2014, Test code for machine tools, part 2: determination of accuracy and
+    repeatability of positioning of numerically controlled axes; clause 3 defines the
+    figures, coverage factor 2.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True)
+class AxisFigures:
+    """Figures of one component over m positions [m or rad].
+
+    Attributes:
+        reversal: B, the largest reversal in size.
+        mean_reversal: B-bar, with its sign.
+        repeatability_forward: R up.
+        repeatability_backward: R down.
+        repeatability: R, both directions.
+        systematic_deviation: E, both directions.
+        mean_deviation: M, range of the mean of both directions.
+        accuracy: A, both directions.
+    """
+
+    reversal: float
+    mean_reversal: float
+    repeatability_forward: float
+    repeatability_backward: float
+    repeatability: float
+    systematic_deviation: float
+    mean_deviation: float
+    accuracy: float
+
+
+def axis_figures(
+    forward: Sequence[ArrayLike], backward: Sequence[ArrayLike]
+) -> AxisFigures:
+    """Figures of ISO 230-2 from repeated approaches to m positions.
+
+    Args:
+        forward: for each position the deviations [m or rad], approached from below;
+            at least two.
+        backward: likewise from above.
+
+    Returns:
+        The figures.
+    """
+    (mean_up, s_up), (mean_down, s_down) = _moments(forward), _moments(backward)
+    reversal = mean_up - mean_down
+    both = 2 * s_up + 2 * s_down + np.abs(reversal)
+    each = np.maximum.reduce([both, 4 * s_up, 4 * s_down])
+    means = np.concatenate([mean_up, mean_down])
+    spread = 2 * np.concatenate([s_up, s_down])
+    return AxisFigures(
+        reversal=float(np.abs(reversal).max()),
+        mean_reversal=float(reversal.mean()),
+        repeatability_forward=float(4 * s_up.max()),
+        repeatability_backward=float(4 * s_down.max()),
+        repeatability=float(each.max()),
+        systematic_deviation=float(np.ptp(means)),
+        mean_deviation=float(np.ptp((mean_up + mean_down) / 2)),
+        accuracy=float((means + spread).max() - (means - spread).min()),
+    )
+
+
+def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
+    """(m,) means and (m,) standard deviations."""
+    rows = [np.asarray(row, dtype=float) for row in positions]
+    return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])
