@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.conic import cone_sizes, minimise_energy
 
-_AT_RIM = 1e-5  # [-] below size 1 within which a cone counts as at its rim
+AT_RIM = 1e-5  # [-] below size 1 within which a cone counts as at its rim
 _INNER = 15  # steps along the rims
 _STILL = 1e-6  # [-] size of the last, in sizes of the cones
 _NO_FORCE = 1e-11  # of the largest on a rim: pulls as small do not leave it
@@ -69,7 +69,7 @@ class PlayProblem:
 def rim_forces(u: NDArray, pull: NDArray, group: NDArray) -> NDArray:
     """(cones,) [J] outward force on cones at their rims, from the energy's gradient."""
     force = -np.bincount(group, weights=pull * u)
-    return np.where(cone_sizes(u, group) >= 1.0 - _AT_RIM, np.maximum(force, 0.0), 0.0)
+    return np.where(cone_sizes(u, group) >= 1.0 - AT_RIM, np.maximum(force, 0.0), 0.0)
 
 
 def across_rims(u: NDArray, rim: NDArray, group: NDArray) -> NDArray:

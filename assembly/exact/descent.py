@@ -33,7 +33,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh, svd
 
-from assembly.exact.contact_qp import PlayProblem, across_rims, move_play, rim_forces
+from assembly.exact.contact_qp import (
+    AT_RIM,
+    PlayProblem,
+    across_rims,
+    move_play,
+    rim_forces,
+)
 from assembly.exact.dead_load import (
     DeadLoads,
     curvature_of,
@@ -48,6 +54,7 @@ from assembly.solvers.conic import SolverFailed, cone_sizes, into_cones
 CLOSED = 1e-12  # [rad, reference lengths] what an answer may leave open
 LONGEST = 1.0  # [rad, reference lengths] of a step
 _MISFIT = 1e-9  # [rad, reference lengths] whose forces count as none
+_ROUNDED = 1e-5  # of that misfit, which is rounding of an angle
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _LEAST_DAMPING = 1e-9  # of the largest closure wrench: holds what nothing else holds
 _DAMPING = 1e-8  # the same, where damping starts once it is needed
@@ -336,18 +343,38 @@ def least_curvature(local: Expansion) -> float:
         closures, and the rims pressed on, per squared rad and reference length of all
         screws together; positive at a strict minimum, inf if nothing can move.
     """
+    D, H = tangent_space(local)
+    if not D.shape[1]:
+        return np.inf
+    metric = D.T @ local.here.model.metric @ D
+    return float(eigh(H, metric, eigvals_only=True)[0])
+
+
+def tangent_space(
+    local: Expansion, hold_touching: bool = False
+) -> tuple[NDArray, NDArray]:
+    """Motions near an equilibrium that keep closures, and the rims pressed on.
+
+    Args:
+        local: the expansion there.
+        hold_touching: whether clearances at their rim that carry no force keep it too.
+
+    Returns:
+        (N, k) a basis of them, and (k, k) [J] the potential's second derivative there.
+    """
     model, nu = local.here.model, len(local.here.model.joints.group)
     u, group = local.here.x[model.bounded], model.joints.group
     left = local.gradient - local.here.rows.T @ local.multipliers
     force = rim_forces(u, left[model.bounded], group)
-    rim = force > 1e-9 * force.max(initial=0.0)
+    bound = np.sqrt(np.bincount(group, weights=np.diag(model.metric)[model.bounded]))
+    rounding = _ROUNDED * local.small_wrench * bound
+    rim = force > np.maximum(1e-9 * force.max(initial=0.0), rounding)
+    if hold_touching:
+        rim |= cone_sizes(u, group) >= 1.0 - AT_RIM
     B = local.basis
     C = np.hstack([across_rims(u, rim, group), local.rigid_rows.T])
     C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
-    Z = np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
-    if not Z.size:
-        return np.inf
+    D = B @ np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
     H = local.hessian.copy()
     H[~local.loose, ~local.loose] += force[group]
-    D = B @ Z
-    return float(eigh(D.T @ H @ D, D.T @ model.metric @ D, eigvals_only=True)[0])
+    return D, D.T @ H @ D

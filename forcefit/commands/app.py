@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-import forcefit.commands.statistics  # adds its commands
+import forcefit.commands.platform_stiffness  # adds its command
+import forcefit.commands.statistics  # likewise
 import forcefit.commands.sweep  # likewise
 from forcefit.commands import assembly, stiffness, validation
 from forcefit.commands.options import JsonOption
