@@ -11,6 +11,7 @@ from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
+    Side,
     contacts,
     in_contact,
     without_clearance,
@@ -90,7 +91,9 @@ def _in_contact(
     """The tangent of (22): one, or two where a clearance just touches its bound."""
     answer = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(answer)
-    sides = ("holding", "letting go") if touching.any() else ("holding",)
+    sides: list[Side] = ["holding"]
+    if touching.any():
+        sides.append("letting go")
     return [
         {"side": side, "contacts": int(pressed.sum()), "touching": int(touching.sum())}
         | stiffness_values(in_contact(answer, side), point, length)

@@ -10,6 +10,7 @@ name = "slider"
 platform = "tip"
 [[frame]]
 name = "slide"
+parent = "base"
 joint = "prismatic"
 translation = [0.5, 0.0, 0.0]
 link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
@@ -21,7 +22,8 @@ parent = "slide"
 
 def test_the_matrices_are_where_machines_expect_them(run):
     status, out, _ = run(
-        "assembly", "stiffness", "orthoglide", "--pose", "tx=0.01", "--at", "0,0,0.05",
+        "assembly", "stiffness", "orthoglide", "--pose", "tx=0.01,ty=0,tz=0",
+        "--at", "0,0,0.05",
         "--json", "-",
     )  # fmt: skip
     answer = json.loads(out)
