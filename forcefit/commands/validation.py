@@ -109,6 +109,13 @@ def crosscheck(
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Keep the joints' play on both sides.")
     ] = False,
+    stiffness: Annotated[
+        bool,
+        typer.Option(
+            "--stiffness",
+            help="Compare the platform's stiffness with load steps instead.",
+        ),
+    ] = False,
     grid: Annotated[
         str | None,
         typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
@@ -132,21 +139,26 @@ def crosscheck(
     from validation.crosscheck.crosscheck import Crosscheck, attempt
     from validation.crosscheck.crosscheck import crosscheck as compare_tight
     from validation.crosscheck.playcheck import PlayCheck, playcheck
+    from validation.crosscheck.stiffness_check import StiffnessCheck, check_stiffness
 
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
+    if stiffness and (clearances or figure is not None or grid is not None):
+        raise BadInput("--stiffness: not with --clearances, --figure or --grid")
     if figure is not None:
         check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare(posture: "Posture") -> Crosscheck | PlayCheck:
+    def compare(posture: "Posture") -> Crosscheck | PlayCheck | StiffnessCheck:
         given = _with_errors(posture, errors, seed)
         acting = act(given, wrench, g, covariates)
         at, pushes = acting.posture, acting.load.tolist()
         weight = None if acting.gravity is None else acting.gravity.tolist()
+        if stiffness:
+            return check_stiffness(at, pushes, links, weight, time_limit)
         if clearances:
             return playcheck(at, scales, pushes, links, weight, time_limit)
         return compare_tight(at, scales, pushes, links, weight, time_limit)
