@@ -1,13 +1,13 @@
 """The platform's stiffness against load steps of the multibody simulation.
 
-The simulation is loaded a little along each axis, both ways, at the equilibrium with the
-robot's errors and its load; half the difference of the platform's motions, per unit of
-load, is the compliance.  What is left of finite steps falls with their square, and the
-simulation's own noise grows with their inverse: in between 1e-7 is left.
+The simulation is loaded a little along each axis, both ways, at the equilibrium with
+the robot's errors and its load; half the difference of the platform's motions, per unit
+of load, is the compliance.  What is left of finite steps falls with their square, and
+the simulation's own noise grows with their inverse: in between 1e-7 is left.
 
 Clearances are left out on both sides.  A moment of fixed axes has no potential and the
 exact equilibrium's has one (``docs/exact.md``): the load that is already there may have
-forces alone.  The small steps may be moments, as both are then the same to first order.
+forces alone.  The small steps may be moments: both are then the same to first order.
 """
 
 from dataclasses import dataclass, replace
@@ -35,9 +35,8 @@ from validation.multibody.simulation import (
 )
 
 STEP = 1e-4  # [rad, reference lengths] by which each load step moves the platform
-# of entries over sqrt(C_ii C_jj): springs are the same on both sides, but that the
-# simulation applies K s half-way between a spring's ends, s^2 / 24 apart; beams differ
-# from a spring at their end by more of that square
+# of entries over sqrt(C_ii C_jj), where no spring is bent; a bent one is applied by the
+# simulation half-way between its ends, and differs by the order of its turn squared
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 
 
@@ -80,7 +79,7 @@ class StiffnessCheck:
     @property
     def tolerance(self) -> float:
         """[-] of the exact tangent's difference; see the head of this module."""
-        return TOLERANCE[self.links] + self.turned**2 / 24
+        return TOLERANCE[self.links] + self.turned**2
 
     @property
     def passed(self) -> bool:
