@@ -51,7 +51,9 @@ from assembly.exact.descent import (
     whose,
 )
 from assembly.exact.placement import LINK, PLAY, SPRING, FiniteRobot, Placement
+from assembly.kinematics.pieces import CutRobot, cut_beams
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.se3 import inverse, logarithm
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.model.clearance import (
@@ -61,7 +63,7 @@ from assembly.model.clearance import (
 )
 from assembly.solvers.conic import into_cones
 from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
-from stiffness.screws import screw_map
+from stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:
     import pandas
@@ -101,12 +103,16 @@ class ExactAssembly:
     is a local minimum ``least_curvature`` says; that none is lower is not proved.
 
     Attributes:
+        whole: where the robot stands nominally, its beams not cut.
+        cut: its frames and those of its beams' pieces.
         linear: the linear model's answer from which this one was reached.
         expansion: where everything is, with the multipliers of the scaled closures.
         stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
         iterations: steps taken.
     """
 
+    whole: Posture
+    cut: CutRobot
     linear: Assembly
     expansion: Expansion
     stationarity: float
@@ -165,7 +171,7 @@ class ExactAssembly:
     @property
     def posture(self) -> Posture:
         """Where the robot stands nominally."""
-        return self.placement.model.posture
+        return self.whole
 
     @property
     def energy(self) -> float:
@@ -185,24 +191,39 @@ class ExactAssembly:
     @property
     def transforms(self) -> NDArray:
         """(n, 4, 4) frames seen from the base, before their joint's coordinate."""
-        return self.placement.transforms
+        return self.placement.transforms[self.cut.last]
 
-    @property
+    @cached_property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the bodies, logarithms."""
-        return self.placement.screws[LINK]
+        """(n, 6) [rad, m] deformations of the bodies, logarithms.
+
+        A beam's in pieces is that of its end against its base.
+        """
+        screws = self.placement.screws[LINK, self.cut.last]
+        pieces = np.bincount(self.cut.owner)
+        for i in np.flatnonzero(pieces > 1):
+            parent = self.whole.robot.parents[i]
+            base = self.placement.carried[self.cut.last[parent]]
+            error = self.whole.robot.errors[i]
+            rigid = self.whole.robot.fixed_transforms[i] @ transform(
+                error[3:], rotation_matrix(error[:3])
+            )
+            rigid = base @ rigid if parent >= 0 else rigid
+            bent = inverse(rigid) @ self.placement.bodies[self.cut.last[i]]
+            screws[i] = logarithm(bent)
+        return screws
 
     @property
     def joint_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the joints, logarithms."""
-        return self.placement.screws[SPRING]
+        return self.placement.screws[SPRING, self.cut.last]
 
     @cached_property
     def clearance_screws(self) -> NDArray:
         """(n, 6) [rad, m] play, and what passive joints move, own row."""
-        play = self.placement.screws[PLAY].copy()
+        play = self.placement.screws[PLAY, self.cut.last]
         axes = [frame.own_axis for frame in self.posture.robot.frames]
-        play[np.arange(len(axes)), axes] += self.placement.own
+        play[np.arange(len(axes)), axes] += self.placement.own[self.cut.last]
         return play
 
     @cached_property
@@ -232,11 +253,12 @@ class ExactAssembly:
     @cached_property
     def _through(self) -> NDArray:
         """(2, n, 6) [N m, N] through bodies and joints."""
-        robot, T = self.posture.robot, self.transforms
+        robot, T = self.cut.robot, self.placement.transforms
         closing = closure_signs(robot).T @ self.closure_wrenches
         held = wrenches_on_frames(self.placement, self.loads)
         readings = screw_map(T[:, :3, 3] - self.posture.platform[:3, 3], T[:, :3, :3])
-        return np.einsum("nji,knj->kni", readings, closing + np.stack(held))
+        through = np.einsum("nji,knj->kni", readings, closing + np.stack(held))
+        return through[:, self.cut.last]
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
@@ -287,26 +309,38 @@ def solve_exact(
         NotConverged: no equilibrium was found; a :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads.
     """
-    loads = dead_loads(posture, load, bodies, gravity, point)
+    cut = cut_beams(posture.robot)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
-    if start is None:
-        start = solve_assembly(posture, wrench, bodies, gravity)
-    elif start.posture is not posture or not start.has_loads(wrench, bodies, gravity):
+    if start is not None and (
+        start.posture is not posture or not start.has_loads(wrench, bodies, gravity)
+    ):
         raise ValueError(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"
         )
-    answer = _search(start.joints, start, loads)
+    there = posture
+    if cut.robot is not posture.robot:
+        there, start = cut.cut(posture), None
+        bodies = None if bodies is None else cut.spread(np.asarray(bodies))
+    loads = dead_loads(there, load, bodies, gravity, point)
+    if start is None:
+        start = solve_assembly(there, wrench, bodies, gravity)
+
+    def search(joints: VirtualJoints) -> ExactAssembly:
+        return ExactAssembly(posture, cut, start, *_search(joints, start, loads))
+
+    answer = search(start.joints)
     if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
         # the bound of a passive joint's own motion was left out, but it matters
-        joints = virtual_joints(posture.robot, bounded_motion=True)
-        answer = _search(joints, start, loads)
+        answer = search(virtual_joints(cut.robot, bounded_motion=True))
     return answer
 
 
-def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactAssembly:
-    """Step after step from the linear answer."""
+def _search(
+    joints: VirtualJoints, linear: Assembly, loads: DeadLoads
+) -> tuple[Expansion, float, int]:
+    """Step after step from the linear answer; where it ends, imbalance and count."""
     model = FiniteRobot(linear.posture, joints)
     here = model.place(_begin(model, linear))
     rigid = np.zeros(len(here.residual))
@@ -323,7 +357,7 @@ def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactA
         if still and here.largest_gap <= CLOSED + linear.posture.mismatch:
             last = expand(here, loads, rigid)
             if imbalance(last) <= _STATIONARY:
-                return ExactAssembly(linear, last, imbalance(last), count)
+                return last, imbalance(last), count
     left = imbalance(expand(here, loads, rigid))
     raise NotConverged(
         whose(here),

@@ -23,7 +23,7 @@ Sources:
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from assembly.exact.dead_load import DeadLoads, resultants, row_loads
 from assembly.exact.placement import along_own
 from assembly.kinematics.nominal import size_of
+from assembly.kinematics.pieces import cut_beams
 from assembly.kinematics.se3 import (
     exponential,
     inverse,
@@ -72,6 +73,7 @@ def solve_rows(here: Conditions, give: NDArray) -> tuple[NDArray, NDArray]:
         (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the origin, base
         axes, and (R,) where they are found; elsewhere nothing is claimed.
     """
+    here = _in_pieces(here)
     screws, found = np.full((len(here), 6), np.nan), np.zeros(len(here), dtype=bool)
     distinct, which = in_groups(here.postures)
     flexible = flexibility(distinct)
@@ -85,6 +87,18 @@ def solve_rows(here: Conditions, give: NDArray) -> tuple[NDArray, NDArray]:
         batch = _Rows(some, flexible, which[rows], give[rows])
         screws[rows], found[rows] = _come_to_rest(batch)
     return screws, found
+
+
+def _in_pieces(here: Conditions) -> Conditions:
+    """The same situations with a frame for every piece of a beam."""
+    cut = cut_beams(here.robot)
+    if cut.robot is here.robot:
+        return here
+    there = cut.cut(here.postures)
+    return replace(
+        here, robot=cut.robot, coordinates=there.coordinates,
+        transforms=there.transforms, errors=cut.spread(here.errors),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,11 @@ from assembly.exact.descent import Expansion, tangent_space
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.platform_stiffness.linear_tangent import Side, owners
-from assembly.platform_stiffness.matrices import PlatformStiffness, unit_screws
+from assembly.platform_stiffness.matrices import (
+    Part,
+    PlatformStiffness,
+    unit_screws,
+)
 
 _FLAT = 1e-12  # of the largest curvature: what less counts as none
 
@@ -53,9 +57,19 @@ def exact_tangent(answer: ExactAssembly, side: Side = "holding") -> PlatformStif
     moves, length = _platform_moves(local), model.size
     return PlatformStiffness(
         answer.posture, "exact", here.platform[:3, 3].copy(), length, moves @ bent,
-        np.sign(curvature[~flat]), bent[model.springs], tuple(owners(model.joints)),
+        np.sign(curvature[~flat]), bent[model.springs], _owners(answer),
         unit_screws(moves @ modes[:, flat], length),
     )  # fmt: skip
+
+
+def _owners(answer: ExactAssembly) -> tuple[Part, ...]:
+    """Whose springs they are; pieces belong to their beam."""
+    cut, frames = answer.cut, answer.posture.robot.frames
+    parts = owners(answer.expansion.here.model.joints)
+    rows = [cut.owner[cut.robot.index(part.frame)] for part in parts]
+    return tuple(
+        Part(frames[row].name, part.kind) for row, part in zip(rows, parts, strict=True)
+    )
 
 
 def _platform_moves(local: Expansion) -> NDArray:
