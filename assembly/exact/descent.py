@@ -364,13 +364,9 @@ def tangent_space(
     """
     model, nu = local.here.model, len(local.here.model.joints.group)
     u, group = local.here.x[model.bounded], model.joints.group
-    left = local.gradient - local.here.rows.T @ local.multipliers
-    force = rim_forces(u, left[model.bounded], group)
-    bound = np.sqrt(np.bincount(group, weights=np.diag(model.metric)[model.bounded]))
-    rounding = _ROUNDED * local.small_wrench * bound
-    rim = force > np.maximum(1e-9 * force.max(initial=0.0), rounding)
+    rim, force = pressed_rims(local)
     if hold_touching:
-        rim |= cone_sizes(u, group) >= 1.0 - AT_RIM
+        rim = rim | (cone_sizes(u, group) >= 1.0 - AT_RIM)
     B = local.basis
     C = np.hstack([across_rims(u, rim, group), local.rigid_rows.T])
     C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
@@ -378,3 +374,21 @@ def tangent_space(
     H = local.hessian.copy()
     H[~local.loose, ~local.loose] += force[group]
     return D, D.T @ H @ D
+
+
+def pressed_rims(local: Expansion) -> tuple[NDArray, NDArray]:
+    """Clearances that carry a force at an equilibrium.
+
+    Args:
+        local: the expansion there.
+
+    Returns:
+        (cones,) bool, and (cones,) [J] the force on each bound times the bound.
+    """
+    model = local.here.model
+    u, group = local.here.x[model.bounded], model.joints.group
+    left = local.gradient - local.here.rows.T @ local.multipliers
+    force = rim_forces(u, left[model.bounded], group)
+    bound = np.sqrt(np.bincount(group, weights=np.diag(model.metric)[model.bounded]))
+    rounding = _ROUNDED * local.small_wrench * bound
+    return force > np.maximum(1e-9 * force.max(initial=0.0), rounding), force

@@ -286,6 +286,7 @@ def solve_exact(
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
+    near: ExactAssembly | None = None,
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear answer.
 
@@ -299,6 +300,8 @@ def solve_exact(
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
         point: (3,) [m] of the platform, in its axes; the force goes with it.
+        near: an equilibrium of the same posture under another load, from which to
+            start instead.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -328,7 +331,9 @@ def solve_exact(
         start = solve_assembly(there, wrench, bodies, gravity)
 
     def search(joints: VirtualJoints) -> ExactAssembly:
-        return ExactAssembly(posture, cut, start, *_search(joints, start, loads))
+        known = near is not None and len(near.placement.x) == _count(joints)
+        first = near.placement.x if near is not None and known else None
+        return ExactAssembly(posture, cut, start, *_search(joints, start, loads, first))
 
     answer = search(start.joints)
     if answer.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
@@ -337,12 +342,17 @@ def solve_exact(
     return answer
 
 
+def _count(joints: VirtualJoints) -> int:
+    """Number of unknowns."""
+    return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
+
+
 def _search(
-    joints: VirtualJoints, linear: Assembly, loads: DeadLoads
+    joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None
 ) -> tuple[Expansion, float, int]:
-    """Step after step from the linear answer; where it ends, imbalance and count."""
+    """Step after step from a first guess; where it ends, imbalance and count."""
     model = FiniteRobot(linear.posture, joints)
-    here = model.place(_begin(model, linear))
+    here = model.place(_begin(model, linear) if first is None else first)
     rigid = np.zeros(len(here.residual))
     penalty, damping, near = 0.0, 0.0, False
     for count in range(1, _STEPS + 1):

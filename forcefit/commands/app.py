@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-import forcefit.commands.platform_stiffness  # adds its command
+import forcefit.commands.deflection  # adds its command
+import forcefit.commands.platform_stiffness  # likewise
 import forcefit.commands.statistics  # likewise
 import forcefit.commands.sweep  # likewise
 from forcefit.commands import assembly, stiffness, validation
