@@ -30,7 +30,7 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, numbers, short_repr
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
-_JUMP = 10.0  # times what the tangents on both sides explain
+_JUMP = 5.0  # times what the tangents on both sides explain
 _BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
 _NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
 
@@ -137,7 +137,7 @@ def load_deflection(
         before = points[-1] if points else None
         point = at(float(value), before)
         if before is not None:
-            events += _events(before, point, at)
+            events += _events(before, point, at, component)
         points.append(point)
     screws, open_ = zip(
         *(_settled(p, largest, rest, gravity) for p in points), strict=True
@@ -159,7 +159,7 @@ def _solve(
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity)
         names = clearance_names(linear.joints, contacts(linear)[0])
-        return _Point(value, linear, in_contact(linear), names)
+        return _Point(value, linear, in_contact(linear, "letting go"), names)
     start = near.answer if near and isinstance(near.answer, ExactAssembly) else None
     try:
         answer = solve_exact(posture, wrench, gravity=gravity, near=start)
@@ -169,7 +169,7 @@ def _solve(
         answer = solve_exact(posture, wrench, gravity=gravity)
     rims, _ = pressed_rims(answer.expansion)
     names = clearance_names(answer.expansion.here.model.joints, rims)
-    return _Point(value, answer, exact_tangent(answer), names)
+    return _Point(value, answer, exact_tangent(answer, "letting go"), names)
 
 
 def _settled(
@@ -202,7 +202,7 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
     return frozenset(names)
 
 
-def _events(before: _Point, after: _Point, at: _Solver) -> list[Event]:
+def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[Event]:
     """What changed between two neighbouring loads, and at which load."""
     events = []
     if before.pressed != after.pressed:
@@ -217,17 +217,18 @@ def _events(before: _Point, after: _Point, at: _Solver) -> list[Event]:
             if names
         ]
         if high.load != after.load and high.pressed != after.pressed:
-            return events + _events(high, after, at)
+            return events + _events(high, after, at, component)
     if before.tangent.stable != after.tangent.stable:
         stable = before.tangent.stable
         low, high = _bracket(before, after, at, lambda p: p.tangent.stable == stable)
         events.append(Event(high.load, "critical", _mode(high if stable else low)))
-    elif not events and _jumps(before, after):
+    elif not events and _jumps(before, after, component):
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
-        way = numbers(high.answer.platform_screw - low.answer.platform_screw)
-        events.append(Event(high.load, "jump", f"by {way} rad, m"))
+        if _jumps(low, high, component):  # else it was but soft on the way
+            way = numbers(high.answer.platform_screw - low.answer.platform_screw)
+            events.append(Event(high.load, "jump", f"by {way} rad, m"))
     return events
 
 
@@ -250,16 +251,15 @@ def _apart(one: _Point, other: _Point) -> float:
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
 
-def _jumps(before: _Point, after: _Point) -> bool:
+def _jumps(before: _Point, after: _Point, component: int) -> bool:
     """Whether the platform moves much farther than either tangent says."""
-    if before.tangent.free.shape[1] or after.tangent.free.shape[1]:
-        return False
-    step = abs(after.load - before.load)
-    scale = np.repeat([before.tangent.length, 1.0], 3)[:, None]
-    softest = max(
-        float(np.linalg.norm(scale * p.tangent.compliance, 2)) for p in (before, after)
+    scale = np.repeat([before.tangent.length, 1.0], 3)
+    farthest = max(
+        float(np.linalg.norm(scale * p.tangent.compliance[component]))
+        for p in (before, after)
     )
-    return _apart(before, after) > _JUMP * step * softest
+    step = abs(after.load - before.load)
+    return _apart(before, after) > _JUMP * step * farthest  # never if one is free
 
 
 def _mode(point: _Point) -> str:

@@ -89,9 +89,8 @@ def deflection_text(results: dict[str, Any]) -> str:
             + ("  free play" if results["free_play"][i] else "")
         )
     for event in results["events"]:
-        lines.append(
-            f"{event['kind']} at {event['load']:.6g} {units[0]}: {event['what']}"
-        )
+        at = f"{event['load']:.6g} {units[0]}"
+        lines.append(f"{event['kind']} at {at}: {event['what']}")
     return "\n".join(lines)
 
 
