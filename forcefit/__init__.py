@@ -30,6 +30,9 @@ _OWNERS = {
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
     "assembly.model.random_errors": ("draw_errors",),
+    "assembly.platform_stiffness.deflection": ("load_deflection",),
+    "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
+    "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.conic import cone_sizes, minimise_energy
 
-_AT_BOUNDARY = 1e-5  # [-] below size 1 within which a cone may be active
+AT_BOUNDARY = 1e-5  # [-] below size 1 within which a cone may be active
 _STEPS = 15  # of Newton's method on the active boundaries
 _STILL = 1e-6  # [-] size of the last, in sizes of the cones
 _ZERO_MULTIPLIER = 1e-11  # of the largest: one less negative keeps its cone active
@@ -69,7 +69,7 @@ class ClearanceProblem:
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
     """(cones,) [J] multipliers of the cones, from the gradient of the energy."""
     force = -np.bincount(group, weights=gradient * u)
-    at_boundary = cone_sizes(u, group) >= 1.0 - _AT_BOUNDARY
+    at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
 
 

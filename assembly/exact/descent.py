@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh, svd
 
 from assembly.exact.contact_qp import (
+    AT_BOUNDARY,
     ClearanceProblem,
     boundary_normals,
     clearance_step,
@@ -54,6 +55,7 @@ from assembly.solvers.conic import SolverFailed, cone_sizes, into_cones
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths]
 _SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] whose wrenches count as small
+_ANGLE_ROUNDING = 1e-5  # of that residual: rounding of an angle
 _LEAST_DAMPING = 1e-9  # of the largest closure wrench: resists what nothing else does
 _FIRST_DAMPING = 1e-8  # of the same, where more is needed
 _ATTEMPTS = 40  # at a step, each damped eight times as much
@@ -354,18 +356,53 @@ def least_curvature(local: Expansion) -> float:
         closures and active constraints, per squared rad and reference length of all
         screws together; positive at a strict minimum, inf if nothing can move.
     """
+    D, H = tangent_space(local)
+    if not D.shape[1]:
+        return np.inf
+    metric = D.T @ local.placement.model.metric @ D
+    return float(eigh(H, metric, eigvals_only=True)[0])
+
+
+def tangent_space(
+    local: Expansion, hold_touching: bool = False
+) -> tuple[NDArray, NDArray]:
+    """Motions near an equilibrium that keep closures and active clearances.
+
+    Args:
+        local: the expansion there.
+        hold_touching: whether clearances at their bound that carry no force keep it
+            too.
+
+    Returns:
+        (N, k) a basis of them, and (k, k) [J] the potential's second derivative there.
+    """
+    at, model = local.placement, local.placement.model
+    u, group = at.x[model.bounded], model.joints.group
+    active, force = active_clearances(local)
+    if hold_touching:
+        active = active | (cone_sizes(u, group) >= 1.0 - AT_BOUNDARY)
+    B, nu = local.basis, len(group)
+    C = np.hstack([boundary_normals(u, active, group), local.rigid_rows.T])
+    C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
+    D = B @ np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
+    H = local.hessian.copy()
+    H[~local.unbounded, ~local.unbounded] += force[group]
+    return D, D.T @ H @ D
+
+
+def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
+    """Clearances that carry a force at an equilibrium.
+
+    Args:
+        local: the expansion there.
+
+    Returns:
+        (cones,) bool, and (cones,) [J] the force on each bound times the bound.
+    """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group
     gradient = local.gradient - at.rows.T @ local.multipliers
     force = cone_multipliers(u, gradient[model.bounded], group)
-    active = force > 1e-9 * force.max(initial=0.0)
-    B, nu = local.basis, len(group)
-    C = np.hstack([boundary_normals(u, active, group), local.rigid_rows.T])
-    C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
-    Z = np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
-    if not Z.size:
-        return np.inf
-    H = local.hessian.copy()
-    H[~local.unbounded, ~local.unbounded] += force[group]
-    D = B @ Z
-    return float(eigh(D.T @ H @ D, D.T @ model.metric @ D, eigvals_only=True)[0])
+    bound = np.sqrt(np.bincount(group, weights=np.diag(model.metric)[model.bounded]))
+    rounding = _ANGLE_ROUNDING * local.small_wrench * bound
+    return force > np.maximum(1e-9 * force.max(initial=0.0), rounding), force

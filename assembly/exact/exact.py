@@ -51,7 +51,9 @@ from assembly.exact.descent import (
 )
 from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
 from assembly.exact.placement import Placement, place
+from assembly.kinematics.pieces import CutRobot, cut_beams
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.se3 import inverse, logarithm
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.linear.energy import solve_assembly
@@ -62,7 +64,7 @@ from assembly.model.clearance import (
 )
 from assembly.solvers.conic import into_cones
 from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
-from stiffness.screws import screw_map
+from stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:
     import pandas
@@ -102,12 +104,16 @@ class ExactAssembly:
     is a local minimum ``least_curvature`` says; that none is lower is not proved.
 
     Attributes:
+        whole: where the robot stands nominally, its beams not cut.
+        cut: its frames and those of its beams' pieces.
         linear: the linear model's solution, where the steps began.
         expansion: of the problem here, with the multipliers of the scaled closures.
         stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
         iterations: steps taken.
     """
 
+    whole: Posture
+    cut: CutRobot
     linear: Assembly
     expansion: Expansion
     stationarity: float
@@ -166,7 +172,7 @@ class ExactAssembly:
     @property
     def posture(self) -> Posture:
         """Where the robot stands nominally."""
-        return self.placement.model.posture
+        return self.whole
 
     @property
     def energy(self) -> float:
@@ -186,24 +192,39 @@ class ExactAssembly:
     @property
     def transforms(self) -> NDArray:
         """(n, 4, 4) frames seen from the base, before their joint's coordinate."""
-        return self.placement.transforms
+        return self.placement.transforms[self.cut.last]
 
-    @property
+    @cached_property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the bodies, logarithms."""
-        return self.placement.screws[LINK]
+        """(n, 6) [rad, m] deformations of the bodies, logarithms.
+
+        A beam's in pieces is that of its end against its base.
+        """
+        screws = self.placement.screws[LINK, self.cut.last]
+        pieces = np.bincount(self.cut.owner)
+        for i in np.flatnonzero(pieces > 1):
+            parent = self.whole.robot.parents[i]
+            base = self.placement.carried[self.cut.last[parent]]
+            error = self.whole.robot.errors[i]
+            rigid = self.whole.robot.fixed_transforms[i] @ transform(
+                error[3:], rotation_matrix(error[:3])
+            )
+            rigid = base @ rigid if parent >= 0 else rigid
+            bent = inverse(rigid) @ self.placement.bodies[self.cut.last[i]]
+            screws[i] = logarithm(bent)
+        return screws
 
     @property
     def joint_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the joints, logarithms."""
-        return self.placement.screws[SPRING]
+        return self.placement.screws[SPRING, self.cut.last]
 
     @cached_property
     def clearance_screws(self) -> NDArray:
         """(n, 6) [rad, m] clearances, and motions of passive joints."""
-        screws = self.placement.screws[CLEARANCE].copy()
+        screws = self.placement.screws[CLEARANCE, self.cut.last]
         axes = [frame.own_axis for frame in self.posture.robot.frames]
-        screws[np.arange(len(axes)), axes] += self.placement.own
+        screws[np.arange(len(axes)), axes] += self.placement.own[self.cut.last]
         return screws
 
     @cached_property
@@ -233,11 +254,12 @@ class ExactAssembly:
     @cached_property
     def _through(self) -> NDArray:
         """(2, n, 6) [N m, N] through bodies and joints."""
-        robot, T = self.posture.robot, self.transforms
+        robot, T = self.cut.robot, self.placement.transforms
         closing = closure_signs(robot).T @ self.closure_wrenches
         of_loads = wrenches_on_frames(self.placement, self.loads)
         readings = screw_map(T[:, :3, 3] - self.posture.platform[:3, 3], T[:, :3, :3])
-        return np.einsum("nji,knj->kni", readings, closing + np.stack(of_loads))
+        through = np.einsum("nji,knj->kni", readings, closing + np.stack(of_loads))
+        return through[:, self.cut.last]
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
@@ -265,6 +287,7 @@ def solve_exact(
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
+    near: ExactAssembly | None = None,
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear model.
 
@@ -278,6 +301,8 @@ def solve_exact(
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] base axes; see :mod:`assembly.exact.dead_load` for links.
         point: (3,) [m] of the platform, in its axes; the force goes with it.
+        near: an equilibrium of the same posture under another load, from which to
+            start instead.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -288,28 +313,47 @@ def solve_exact(
         NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
         ValueError: ``start`` belongs to another posture or other loads.
     """
-    loads = dead_loads(posture, load, bodies, gravity, point)
+    cut = cut_beams(posture.robot)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
-    if start is None:
-        start = solve_assembly(posture, wrench, bodies, gravity)
-    elif start.posture is not posture or not start.has_loads(wrench, bodies, gravity):
+    if start is not None and (
+        start.posture is not posture or not start.has_loads(wrench, bodies, gravity)
+    ):
         raise ValueError(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"
         )
-    assembly = _search(start.joints, start, loads)
+    there = posture
+    if cut.robot is not posture.robot:
+        there, start = cut.cut(posture), None
+        bodies = None if bodies is None else cut.spread(np.asarray(bodies))
+    loads = dead_loads(there, load, bodies, gravity, point)
+    if start is None:
+        start = solve_assembly(there, wrench, bodies, gravity)
+
+    def search(joints: VirtualJoints) -> ExactAssembly:
+        known = near is not None and len(near.placement.x) == _count(joints)
+        first = near.placement.x if near is not None and known else None
+        return ExactAssembly(posture, cut, start, *_search(joints, start, loads, first))
+
+    assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
         # the bound of a passive joint's own motion was left out, but it is active
-        joints = virtual_joints(posture.robot, bounded_motion=True)
-        assembly = _search(joints, start, loads)
+        assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
 
-def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactAssembly:
-    """Iterate from the linear solution."""
+def _count(joints: VirtualJoints) -> int:
+    """Number of unknowns."""
+    return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
+
+
+def _search(
+    joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None
+) -> tuple[Expansion, float, int]:
+    """Step after step from a first guess; where it ends, imbalance and count."""
     model = FiniteRobot(linear.posture, joints)
-    current = place(model, _first_guess(model, linear))
+    current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))
     penalty, damping, near = 0.0, 0.0, False
     for count in range(1, _STEPS + 1):
@@ -324,7 +368,7 @@ def _search(joints: VirtualJoints, linear: Assembly, loads: DeadLoads) -> ExactA
         if still and current.largest_gap <= CLOSED + linear.posture.mismatch:
             last = expand(current, loads, rigid)
             if imbalance(last) <= _STATIONARY:
-                return ExactAssembly(linear, last, imbalance(last), count)
+                return last, imbalance(last), count
     unbalanced = imbalance(expand(current, loads, rigid))
     raise NotConverged(
         problem_name(current),

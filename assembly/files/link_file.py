@@ -19,6 +19,7 @@ from forcefit.inputs.table import Table, describe, quoted
 from stiffness.surface.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] below that of any machine
+_MOST_PIECES = 100  # of a beam; 8 leave 1e-4 of a quarter turn
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'
@@ -51,7 +52,7 @@ def read_link(frame: Table) -> Link | None:
         return None
     link = frame.table("link")
     kinds = [kind for kind in _KINDS if link.has(kind)]
-    if not kinds and not set(link.content) <= {*_MATERIAL, "up"}:
+    if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
         link.finish()  # a misspelt kind gets its suggestion
     if len(kinds) != 1:
         given = " and ".join(map(quoted, kinds)) or "none of them"
@@ -84,8 +85,17 @@ def _beam_link(link: Table) -> BeamLink:
     section = _section(beam)
     beam.finish()
     return BeamLink(
-        section, **_material(link), theory=theory, length=length, axis=axis, up=up
-    )
+        section, **_material(link), theory=theory, length=length, axis=axis, up=up,
+        pieces=_pieces(link),
+    )  # fmt: skip
+
+
+def _pieces(link: Table) -> int:
+    """Springs in a row, 1 if not said; a design may give a whole number as 8.0."""
+    count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
+    if count != round(count):
+        raise link.bad("pieces", f"found {count:g}, expected a whole number")
+    return round(count)
 
 
 def _section(beam: Table) -> dict[str, float]:
@@ -239,6 +249,8 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
             inner[name] = list(value) if isinstance(value, tuple) else value
     table = {kind: inner} | {name: getattr(link, name) for name in _MATERIAL}
     table = {key: value for key, value in table.items() if value is not None}
+    if isinstance(link, BeamLink) and link.pieces > 1:
+        table["pieces"] = link.pieces
     up = link.frame_up if isinstance(link, MeshLink) else None
     return {"link": table} if up is None else {"link": table, "up": list(up)}
 

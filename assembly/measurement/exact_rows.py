@@ -23,7 +23,7 @@ Sources:
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
 from assembly.exact.finite_robot import along_own
 from assembly.kinematics.nominal import size_of
+from assembly.kinematics.pieces import cut_beams
 from assembly.kinematics.se3 import (
     exponential,
     inverse,
@@ -74,6 +75,7 @@ def solve_rows(
         (R, 6) [rad, m] rotation vector of R R_nominal^T and shift of the origin, base
         axes, and (R,) whether they converged; the other rows are not to be used.
     """
+    conditions = _in_pieces(conditions)
     screws, converged = (
         np.full((len(conditions), 6), np.nan),
         np.zeros(len(conditions), dtype=bool),
@@ -92,6 +94,18 @@ def solve_rows(
         batch = _Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
         screws[rows], converged[rows] = _solve(batch)
     return screws, converged
+
+
+def _in_pieces(conditions: Conditions) -> Conditions:
+    """The same conditions with a frame for every piece of a beam."""
+    cut = cut_beams(conditions.robot)
+    if cut.robot is conditions.robot:
+        return conditions
+    postures = cut.cut(conditions.postures)
+    return replace(
+        conditions, robot=cut.robot, coordinates=postures.coordinates,
+        transforms=postures.transforms, errors=cut.spread(conditions.errors),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,8 @@ class BeamLink:
         length: [m] if it is not the distance of the origins, else None.
         axis: unit vector from base to tip in the frame's axes, together with length.
         up: direction of the section's height in the frame's axes, or None.
+        pieces: springs in a row that it is for finite motions; for small ones it is one
+            whatever their number.
     """
 
     section: dict[str, float]
@@ -68,6 +70,7 @@ class BeamLink:
     length: float | None = None
     axis: tuple[float, float, float] | None = None
     up: tuple[float, float, float] | None = None
+    pieces: int = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.deflection import deflection
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -23,6 +24,7 @@ from forcefit.commands.options import (
     parse_vector,
     posture_of,
 )
+from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.progress import one_thread
 from forcefit.commands.statistics import statistics, tolerances
 from forcefit.commands.sweep import plot, sweep
@@ -255,5 +257,5 @@ def show(
     plotter.close()
 
 
-for command in (statistics, tolerances, sweep, plot):
+for command in (stiffness, deflection, statistics, tolerances, sweep, plot):
     app.command()(command)

@@ -140,6 +140,33 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     return [given.get(name, 0.0) for name in "xyz"]
 
 
+def parse_point(text: str | None, option: str) -> list[float]:
+    """A point of the platform as ``x,y,z``; its origin if not given.
+
+    Args:
+        text: such as ``"0,0,-0.1"``.
+        option: whose it is, for messages.
+
+    Returns:
+        Three numbers [m].
+
+    Raises:
+        BadInput: not three finite numbers of at most 1e6.
+    """
+    if text is None:
+        return [0.0, 0.0, 0.0]
+    from assembly.model.largest import LARGEST_LENGTH
+    from forcefit.inputs.number_arrays import comma_numbers
+
+    point = comma_numbers(text)
+    if point.shape != (3,) or not (abs(point) <= LARGEST_LENGTH).all():
+        raise BadInput(
+            f"{option}: found {describe(text)}, expected three numbers of size at most "
+            f"{LARGEST_LENGTH:g} [m] such as 0,0,-0.1"
+        )
+    return [float(x) for x in point]
+
+
 def parse_direction(texts: list[str] | None) -> list[float] | None:
     """Direction of a platform screw from ``--direction``, as a unit vector.
 

@@ -115,6 +115,13 @@ def crosscheck(
             "--clearances", help="Keep the joints' clearances in both models."
         ),
     ] = False,
+    stiffness: Annotated[
+        bool,
+        typer.Option(
+            "--stiffness",
+            help="Compare the platform's stiffness with load steps instead.",
+        ),
+    ] = False,
     grid: Annotated[
         str | None,
         typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
@@ -137,19 +144,26 @@ def crosscheck(
     from assembly.effects.robot_effects import apply_robot_effects
     from validation.crosscheck.crosscheck import Crosscheck, attempt
     from validation.crosscheck.crosscheck import crosscheck as compare_models
+    from validation.crosscheck.stiffness_check import StiffnessCheck, check_stiffness
 
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
+    if stiffness and (clearances or figure is not None or grid is not None):
+        raise BadInput("--stiffness: not with --clearances, --figure or --grid")
     if figure is not None:
         check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
-    def compare(posture: "Posture") -> Crosscheck:
+    def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
         with_errors = _with_errors(posture, errors, seed)
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
+        if stiffness:
+            return check_stiffness(
+                applied.posture, applied.load, links, applied.gravity, time_limit
+            )
         return compare_models(
             applied.posture,
             scales,

@@ -56,6 +56,19 @@ def test_together_as_one_by_one(name, rng):
     assert np.abs(predict(here).deviation - linear).max() > 1e-7  # it matters here
 
 
+def test_beams_in_pieces_together_as_one_by_one(rng):
+    here = situations("five_bar", rng)
+    links = {f.name: replace(f.link, pieces=3) for f in here.robot.frames if f.link}
+    cut = replace(here, robot=here.robot.with_links(links))
+    screws, found = solve_rows(cut, np.zeros((len(cut), 0)))
+    assert found.all()
+    for row in range(len(cut)):
+        alone = assemble_row(cut, row).platform_screw
+        np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
+    whole, _ = solve_rows(here, np.zeros((len(here), 0)))
+    assert np.abs(screws - whole).max() > 1e-8  # it matters here
+
+
 def test_a_contact_at_one_drive_settles_as_one_by_one(rng):
     """One by one the secant settles to 1e-5 of the finite part, some 1e-10 here."""
     first = drives(load_robot("arm6"))[0]

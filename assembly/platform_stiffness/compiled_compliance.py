@@ -1,0 +1,172 @@
+r"""The classical compliance of many postures, compiled.
+
+For a unit wrench e on the platform the closures carry lambda = lambda_e + Z' mu: the
+first lets no free motion work, the second makes the springs' energy
+
+    |y|^2 / 2,   y = B e + Y' mu,    Y = Z A_y,   B e = the springs under e and lambda_e
+
+least.  Every spring's y under the six unit wrenches is its part of the compliance,
+C = sum of y y' (Castigliano).  Built from :mod:`assembly.batch.compiled_reduction`, as
+problem (22) is, and as exact: no compliances are added before anything is eliminated.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.compiled_reduction import (
+    Structure,
+    free_columns,
+    grouped_springs,
+    largest_spring,
+    orthogonal_rows,
+    paths_of,
+    spring_rows,
+)
+from assembly.solvers.compiled import kernel
+from assembly.solvers.householder import triangulate, turn, turn_back
+from assembly.solvers.vectors import fill
+
+SOLVED, FREE, RANK = range(3)  # FREE: a motion of the platform that nothing resists
+_RANK = 1e-10  # as in assembly.linear.reduction, and so is the noise floor
+_NOISE = 1e-12
+_STILL = 1e-9  # [-] of a unit wrench's work on a free motion that counts as none
+
+
+@kernel
+def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
+    """Scaled deformation of every spring under a unit wrench.
+
+    Args:
+        s: the robot.
+        P: unit screws of all frames.
+        pull: (np + 1, 6) the closures' wrench on each pattern, and the platform's.
+        out: (ny,) to fill.
+    """
+    for c in range(len(s.springs)):
+        j = s.spring_frame[c]
+        total = 0.0
+        for axis in range(6):
+            weight = s.springs[c, axis]
+            if weight != 0.0:
+                work = 0.0
+                for a in range(6):
+                    through = pull[s.pattern_of[j], a]
+                    through += s.on_path[j] * pull[len(pull) - 1, a]
+                    work += P[j, axis, a] * through
+                total += weight * work
+        out[c] = total
+
+
+@kernel
+def pulls(s: Structure, closing: NDArray, pull: NDArray) -> None:
+    """The closures' wrench on frames of each pattern, into all rows but the last."""
+    for g in range(len(s.patterns)):
+        fill(pull[g], 0.0)
+        for k in range(s.patterns.shape[1]):
+            sign = s.patterns[g, k]
+            if sign != 0.0:
+                for a in range(6):
+                    pull[g, a] += sign * closing[6 * k + a]
+
+
+@kernel
+def hold_free_motions(
+    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
+    order: NDArray, rank: int, row: int, closing: NDArray,
+) -> bool:  # fmt: skip
+    """Closures' wrenches of least size with which a unit wrench moves nothing free.
+
+    Returns:
+        Whether there are any.
+    """
+    fill(closing, 0.0)
+    for i in range(len(F)):
+        j = s.free_frame[order[i]]
+        left = -s.on_path[j] * P[j, s.free_axis[order[i]], row]
+        for l in range(min(i, rank)):
+            left -= F[i, l] * closing[l]
+        if i < rank:
+            closing[i] = left / diagonal[i]
+        elif abs(left) > _STILL:
+            return False
+    turn(F, turns, rank, closing)
+    return True
+
+
+@kernel
+def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
+    """One posture: every spring under six unit wrenches, or why there is no answer.
+
+    Args:
+        s: the robot.
+        T: (n, 4, 4) frames.
+        mismatch: [rad, m] nominal closure error of the frames.
+        out: (6, ny) [sqrt(2 J) per N m and N] to fill, translations and forces scaled.
+
+    Returns:
+        SOLVED, FREE or RANK.
+    """
+    tolerance = _RANK + 30.0 * mismatch
+    P = paths_of(T, s)
+    m, nq, groups = 6 * s.patterns.shape[1], len(s.free_frame), len(s.groups) - 1
+    F = free_columns(s, P, m)
+    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+    free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+    if free < 0:
+        return RANK
+    Z = orthogonal_rows(F, turns, free, m)
+    L = grouped_springs(s, P)
+    Y = spring_rows(s, Z, L)
+    count = len(Z)
+    y_turns, y_diagonal = np.empty(count), np.empty(count)
+    y_order = np.empty(count, np.int64)
+    noise = _NOISE * largest_spring(s, P)
+    rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
+    if rank < 0:
+        return RANK
+    closing, bent, mu = np.empty(m), np.empty(6 * groups), np.empty(count)
+    pull = np.zeros((len(s.patterns) + 1, 6))
+    for row in range(6):
+        if not hold_free_motions(s, P, F, turns, diagonal, order, free, row, closing):
+            return FREE
+        fill(pull[len(pull) - 1], 0.0)
+        pull[len(pull) - 1, row] = 1.0
+        pulls(s, closing, pull)
+        for g in range(groups):
+            for b in range(6):
+                total = 0.0
+                for a in range(6):
+                    through = pull[s.group_pattern[g], a]
+                    through += s.group_on_path[g] * pull[len(pull) - 1, a]
+                    total += L[g, a, b] * through
+                bent[6 * g + b] = total
+        # least squares by the triangle of Y: its rows are those of Z, reordered
+        turn_back(Y, y_turns, rank, bent)
+        for i in range(rank - 1, -1, -1):
+            total = -bent[i]
+            for l in range(i + 1, rank):
+                total -= Y[l, i] * mu[l]
+            mu[i] = total / y_diagonal[i]
+        for i in range(rank):
+            for a in range(m):
+                closing[a] += mu[i] * Z[y_order[i], a]
+        pulls(s, closing, pull)
+        springs_of(s, P, pull, out[row])
+    return SOLVED
+
+
+@kernel
+def comply_all(
+    s: Structure, T: NDArray, mismatch: NDArray, out: NDArray, road: NDArray
+) -> None:
+    """Many postures; see :func:`comply`.
+
+    Args:
+        s: the robot.
+        T: (k, n, 4, 4) frames.
+        mismatch: (k,) [rad, m].
+        out: (k, 6, ny) to fill.
+        road: (k,) to fill.
+    """
+    for point in range(len(T)):
+        road[point] = comply(s, T[point], mismatch[point], out[point])

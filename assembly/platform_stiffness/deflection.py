@@ -1,0 +1,275 @@
+"""Load against deflection: from free play through contacts to elastic, and to buckling.
+
+One component of the load goes through a list of values while the rest stays.  At each
+the equilibrium is found, of problem (22) or with finite motions, the latter from the
+one before, so that a path is followed, forwards or back.  Where the set of pressed
+clearances changes, the curve has a kink; where the least second derivative of the
+potential passes zero, the equilibrium is lost or branches: a critical load; where it is
+lost, the platform jumps to another.  These loads are bracketed by bisection.
+
+The load is what is prescribed: of a path that turns back, only what is stable from one
+side is met, and the jump past the rest is named.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.descent import active_clearances
+from assembly.exact.exact import ExactAssembly, solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import VirtualJoints
+from assembly.linear.energy import Assembly, solve_assembly
+from assembly.linear.nearest_pose import nearest_pose
+from assembly.platform_stiffness.exact_tangent import exact_tangent
+from assembly.platform_stiffness.linear_tangent import contacts, in_contact
+from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import html_table, numbers, short_repr
+
+_HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
+_JUMP = 5.0  # times what the tangents on both sides explain
+_BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
+_NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens on the way.
+
+    Attributes:
+        load: [N or N m] at which, or right after which.
+        kind: ``"contact"``, ``"release"``, ``"critical"`` or ``"jump"``.
+        what: in words: which clearances, which mode, how far.
+    """
+
+    load: float
+    kind: str
+    what: str
+
+
+@dataclass(frozen=True, eq=False)
+class DeflectionCurve:
+    """How the platform follows one component of the load.
+
+    Attributes:
+        posture: where the robot stands nominally.
+        component: of the wrench and of the screw, 0 to 5.
+        loads: (k,) [N m or N] that component, in the order in which it was followed.
+        screws: (k, 6) [rad, m] of the platform at its origin, base axes.
+        energies: (k,) [J] elastic.
+        stiffness: (k,) tangent along the component, the others free.
+        pressed: (k,) names of the clearances that carry a force.
+        open_: (k,) bool, where play leaves the pose undetermined.
+        events: in the order met.
+    """
+
+    posture: Posture
+    component: int
+    loads: NDArray
+    screws: NDArray
+    energies: NDArray
+    stiffness: NDArray
+    pressed: tuple[frozenset[str], ...]
+    open_: NDArray
+    events: tuple[Event, ...]
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def deflection(self) -> NDArray:
+        """(k,) [rad or m] along the component."""
+        return self.screws[:, self.component]
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """An equilibrium on the curve."""
+
+    load: float
+    answer: Assembly | ExactAssembly
+    tangent: PlatformStiffness
+    pressed: frozenset[str]
+
+
+_Solver = Callable[[float, _Point | None], _Point]
+
+
+def load_deflection(
+    posture: Posture,
+    component: int,
+    loads: Sequence[float],
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    exact: bool = False,
+) -> DeflectionCurve:
+    """Follow the platform while one component of the load changes.
+
+    Args:
+        posture: where the robot stands; its errors and clearances count.
+        component: which of ``[mx my mz fx fy fz]``, 0 to 5.
+        loads: [N m or N] its values, in the order in which they act.
+        load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        exact: whether with finite motions, else by problem (22).
+
+    Returns:
+        The curve with its kinks and critical loads.
+
+    Raises:
+        CannotAssemble: the errors cannot be closed.
+        FreeMotion: the load drives a motion that nothing resists.
+        SolverFailed: no equilibrium was found; the load at which is in the message.
+    """
+    rest = np.zeros(6) if load is None else np.array(load, dtype=float)
+    largest = float(np.abs(loads).max(initial=0.0))
+
+    def at(value: float, near: _Point | None) -> _Point:
+        wrench = rest.copy()
+        wrench[component] = value
+        return _solve(posture, value, wrench, gravity, exact, near)
+
+    points: list[_Point] = []
+    events: list[Event] = []
+    for value in loads:
+        before = points[-1] if points else None
+        point = at(float(value), before)
+        if before is not None:
+            events += _events(before, point, at, component)
+        points.append(point)
+    screws, open_ = zip(
+        *(_settled(p, largest, rest, gravity) for p in points), strict=True
+    )
+    axis = np.eye(6)[component]
+    return DeflectionCurve(
+        posture, component, np.array([p.load for p in points]), np.array(screws),
+        np.array([p.answer.energy for p in points]),
+        np.array([p.tangent.along(axis)[0] for p in points]),
+        tuple(p.pressed for p in points), np.array(open_), tuple(events),
+    )  # fmt: skip
+
+
+def _solve(
+    posture: Posture, value: float, wrench: NDArray, gravity: ArrayLike | None,
+    exact: bool, near: _Point | None,
+) -> _Point:  # fmt: skip
+    """The equilibrium under one load."""
+    if not exact:
+        linear = solve_assembly(posture, wrench, gravity=gravity)
+        names = clearance_names(linear.joints, contacts(linear)[0])
+        return _Point(value, linear, in_contact(linear, "letting go"), names)
+    start = near.answer if near and isinstance(near.answer, ExactAssembly) else None
+    try:
+        answer = solve_exact(posture, wrench, gravity=gravity, near=start)
+    except SolverFailed:
+        if start is None:
+            raise
+        answer = solve_exact(posture, wrench, gravity=gravity)
+    active, _ = active_clearances(answer.expansion)
+    names = clearance_names(answer.expansion.placement.model.joints, active)
+    return _Point(value, answer, exact_tangent(answer, "letting go"), names)
+
+
+def _settled(
+    point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None
+) -> tuple[NDArray, bool]:
+    """Platform screw, where play leaves it open the one nearest to nominal."""
+    answer = point.answer
+    idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
+    if idle and isinstance(answer, Assembly):
+        nearest, open_ = nearest_pose(answer, np.zeros(3))
+        return nearest.platform_screw, open_
+    return answer.platform_screw, bool(point.tangent.free.shape[1])
+
+
+def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
+    """Names such as ``"leg1.elbow radial"`` of the clearances marked.
+
+    Args:
+        joints: whose clearances they are.
+        marked: (cones,) bool.
+
+    Returns:
+        The names.
+    """
+    names = set()
+    for k in np.flatnonzero(marked):
+        column = int(np.flatnonzero(joints.group == k)[0])
+        row = int(np.abs(joints.cones[:, column]).argmax())
+        names.add(f"{joints.robot.frames[row // 6].name} {_BOUNDS[row % 6]}")
+    return frozenset(names)
+
+
+def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[Event]:
+    """What changed between two neighbouring loads, and at which load."""
+    events = []
+    if before.pressed != after.pressed:
+        low, high = _bracket(before, after, at, lambda p: p.pressed == before.pressed)
+        changes = (
+            ("contact", high.pressed - low.pressed),
+            ("release", low.pressed - high.pressed),
+        )
+        events = [
+            Event(high.load, kind, ", ".join(sorted(names)))
+            for kind, names in changes
+            if names
+        ]
+        if high.load != after.load and high.pressed != after.pressed:
+            return events + _events(high, after, at, component)
+    if before.tangent.stable != after.tangent.stable:
+        stable = before.tangent.stable
+        low, high = _bracket(before, after, at, lambda p: p.tangent.stable == stable)
+        events.append(Event(high.load, "critical", _mode(high if stable else low)))
+    elif not events and _jumps(before, after, component):
+        low, high = _bracket(
+            before, after, at, lambda p: _apart(before, p) < _apart(p, after)
+        )
+        if _jumps(low, high, component):  # else it was but soft on the way
+            way = numbers(high.answer.platform_screw - low.answer.platform_screw)
+            events.append(Event(high.load, "jump", f"by {way} rad, m"))
+    return events
+
+
+def _bracket(
+    low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
+) -> tuple[_Point, _Point]:
+    """Neighbouring loads between which something changes for the first time."""
+    for _ in range(_HALVINGS):
+        try:
+            middle = at((low.load + high.load) / 2, low)
+        except SolverFailed:
+            break  # as between free play and the least load: that near it is known
+        low, high = (middle, high) if same(middle) else (low, middle)
+    return low, high
+
+
+def _apart(one: _Point, other: _Point) -> float:
+    """[m] between the platforms of two equilibria, rotations times the length."""
+    change = other.answer.platform_screw - one.answer.platform_screw
+    return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
+
+
+def _jumps(before: _Point, after: _Point, component: int) -> bool:
+    """Whether the platform moves much farther than either tangent says."""
+    scale = np.repeat([before.tangent.length, 1.0], 3)
+    farthest = max(
+        float(np.linalg.norm(scale * p.tangent.compliance[component]))
+        for p in (before, after)
+    )
+    step = abs(after.load - before.load)
+    return _apart(before, after) > _JUMP * step * farthest  # never if one is free
+
+
+def _mode(point: _Point) -> str:
+    """The motion of negative stiffness, by the platform and the part that bends."""
+    tangent = point.tangent
+    soft = int(np.flatnonzero(tangent.signs < 0)[0])
+    screw = tangent.root[:, soft] / np.linalg.norm(
+        tangent.root[:, soft] * np.repeat([tangent.length, 1.0], 3)
+    )
+    bent = tangent.springs[:, soft] ** 2
+    part = tangent.parts[int(bent.argmax())]
+    way = numbers(np.where(np.abs(screw) > 1e-6, screw, 0.0))
+    return f"buckles: platform along {way} rad, m; most in {part.frame} {part.kind}"

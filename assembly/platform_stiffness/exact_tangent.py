@@ -1,0 +1,79 @@
+r"""The tangent of the exact equilibrium on SE(3), geometric stiffness included.
+
+Near an equilibrium the unknowns move by Z t along closures and along the bounds that
+are pressed, and the total potential (energy minus the work of loads) by t.Z'HZt / 2,
+H the true second derivative of the Lagrangian: springs, and the forces of assembly and
+load on parts that turn.  A small wrench w more works w.(V Z t), V the platform's small
+motion in base axes from where it stands; its response is C = V Z (Z'HZ)^-1 Z'V'.
+
+The potential is stationary there, so its second derivative depends on no chart of
+SE(3): C and K are symmetric, whatever coordinates the platform is given.  What they do
+depend on is the law by which the load already there follows the motion.  Here its force
+is dead, and its moment m works m . theta, theta the rotation vector from the nominal
+posture.  A moment constant in base axes has no potential: near theta = 0 it adds
+skew(m) / 2, antisymmetric, to the rotational block of K.
+
+Sources:
+    Zefran, Kumar (2002), A geometrical approach to the study of the Cartesian stiffness
+    matrix (charts, connections; symmetry where the potential is stationary).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exact.descent import Expansion, tangent_space
+from assembly.exact.exact import ExactAssembly
+from assembly.kinematics.se3 import turn_jacobian
+from assembly.platform_stiffness.linear_tangent import Side, owners
+from assembly.platform_stiffness.matrices import (
+    Part,
+    PlatformStiffness,
+    unit_screws,
+)
+
+_FLAT = 1e-12  # of the largest curvature: what less counts as none
+
+
+def exact_tangent(answer: ExactAssembly, side: Side = "holding") -> PlatformStiffness:
+    """How stiff the platform is at an exact equilibrium.
+
+    Args:
+        answer: the manipulator assembled with finite motions, under its loads.
+        side: what clearances do that just touch their bound without a force.
+
+    Returns:
+        The stiffness at the platform's origin where it stands there, base axes; modes
+        of negative curvature have the sign -1.
+    """
+    local = answer.expansion
+    model, at = local.placement.model, local.placement
+    D, H = tangent_space(local, hold_touching=side == "holding")
+    Q, R = np.linalg.qr(D / model.units[:, None])
+    back = np.linalg.inv(R)
+    curvature, turned = np.linalg.eigh(back.T @ H @ back)
+    flat = np.abs(curvature) <= _FLAT * np.abs(curvature).max(initial=0.0)
+    modes = model.units[:, None] * (Q @ turned)
+    bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))
+    moves, length = _platform_moves(local), model.size
+    return PlatformStiffness(
+        answer.posture, "exact", at.platform[:3, 3].copy(), length, moves @ bent,
+        np.sign(curvature[~flat]), bent[model.springs], _owners(answer),
+        unit_screws(moves @ modes[:, flat], length),
+    )  # fmt: skip
+
+
+def _owners(answer: ExactAssembly) -> tuple[Part, ...]:
+    """Whose springs they are; pieces belong to their beam."""
+    cut, frames = answer.cut, answer.posture.robot.frames
+    parts = owners(answer.expansion.placement.model.joints)
+    rows = [cut.owner[cut.robot.index(part.frame)] for part in parts]
+    return tuple(
+        Part(frames[row].name, part.kind) for row, part in zip(rows, parts, strict=True)
+    )
+
+
+def _platform_moves(local: Expansion) -> NDArray:
+    """(6, N) small motion of the platform at its present origin, base axes."""
+    rows = local.placement.platform_rows.copy()
+    rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]
+    return rows

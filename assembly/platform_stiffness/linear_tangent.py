@@ -1,0 +1,160 @@
+r"""Modes of the linear virtual-joint model: what closures let springs and joints do.
+
+Without loads the small motions of springs y and free joints q keep the closures,
+
+    A_q q + A_y y = 0,      platform screw  P_q q + P_y y.
+
+Rows orthogonal to A_q leave Z'A_y y = 0, whose solutions y = W t, W orthonormal, are
+the modes: their energy is t.t / 2, and C = L L' with L the platform's screws.  No
+compliances are added up, so that stiff and soft ones keep their digits.
+
+A clearance is held at zero (the classical model), or as problem (22) found it: free
+within its bound; pressed against it, it holds across the bound and gives way along a
+round one, whose curvature turns the force f [J, per unit of the bound] that presses:
+a spring of stiffness f there.
+
+Sources:
+    Pashkevich, Chablat, Wenger (2009), Stiffness analysis of overconstrained parallel
+    manipulators (virtual joints; passive joints without springs).
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    linearise,
+    virtual_joints,
+)
+from assembly.linear.energy import Assembly
+from assembly.platform_stiffness.matrices import Part, PlatformStiffness, unit_screws
+from assembly.solvers.conic import cone_sizes
+
+Side = Literal["holding", "letting go"]
+_RANK = 1e-10  # relative size below which a singular value counts as zero
+_NOISE = 1e-12  # of a column before a projection that removes it whole
+_AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
+_PRESSED = 1e-8  # of the largest force: smaller ones press nothing
+
+
+def without_clearance(posture: Posture) -> PlatformStiffness:
+    """The classical virtual-joint model: every clearance is held at zero.
+
+    Args:
+        posture: where the robot stands.
+
+    Returns:
+        The stiffness at the platform's origin.
+    """
+    lin, joints = linearise(posture), virtual_joints(posture.robot)
+    return _stiffness(lin, "without clearance", joints.elastic, owners(joints),
+                      joints.free)  # fmt: skip
+
+
+def in_contact(answer: Assembly, side: Side = "holding") -> PlatformStiffness:
+    """The tangent of problem (22): clearances are free, or pressed, as they are there.
+
+    Args:
+        answer: the manipulator at least energy under its loads.
+        side: what clearances do that just touch their bound without a force.
+
+    Returns:
+        The stiffness at the platform's origin, second derivative of the least
+        potential.
+    """
+    joints, u = answer.joints, answer.clearances
+    pressed, touching = contacts(answer)
+    held = pressed | (touching & (side == "holding"))
+    force = _forces(answer)
+    springs, names, free = [joints.elastic], owners(joints), [joints.free]
+    for k, is_held in enumerate(held):
+        rows = np.flatnonzero(joints.group == k)
+        columns = joints.cones[:, rows]
+        if not is_held:
+            free.append(columns / np.linalg.norm(columns, axis=0))
+        elif len(rows) == 2:
+            along = columns @ (np.array([-u[rows[1]], u[rows[0]]]))
+            if pressed[k]:
+                springs.append(along[:, None] / np.sqrt(force[k]))
+                names.append(Part(_frame(joints, rows[0]), "clearance"))
+            else:
+                free.append(along[:, None] / np.linalg.norm(along))
+    return _stiffness(answer.linearisation, "in contact", np.hstack(springs), names,
+                      np.hstack(free))  # fmt: skip
+
+
+def contacts(answer: Assembly) -> tuple[NDArray, NDArray]:
+    """Clearances that carry a force, and those that touch their bound without one.
+
+    Args:
+        answer: the manipulator at least energy.
+
+    Returns:
+        (cones,) bool each.
+    """
+    force = _forces(answer)
+    size = cone_sizes(answer.clearances, answer.joints.group)
+    at_bound = size >= 1.0 - _AT_BOUND
+    pressed = at_bound & (force > _PRESSED * force.max(initial=0.0))
+    return pressed, at_bound & ~pressed
+
+
+def _forces(answer: Assembly) -> NDArray:
+    """(cones,) [J] force on each clearance times its bound."""
+    pull = answer.joints.cones.T @ answer.joint_wrenches.ravel()
+    return cone_sizes(pull, answer.joints.group)
+
+
+def _frame(joints: VirtualJoints, column: int) -> str:
+    """Whose clearance it is."""
+    row = int(np.abs(joints.cones[:, column]).argmax()) // 6
+    return joints.robot.frames[row].name
+
+
+def owners(joints: VirtualJoints) -> list[Part]:
+    """Whose springs the columns of ``joints.elastic`` are."""
+    rows = np.abs(joints.elastic).argmax(axis=0) // 6 if joints.elastic.size else ()
+    return [
+        Part(joints.robot.frames[row].name, "link" if link else "joint")
+        for row, link in zip(rows, joints.links, strict=True)
+    ]
+
+
+def _stiffness(
+    lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray
+) -> PlatformStiffness:
+    """Springs and free motions to modes; see the head of this module."""
+    free = free / _sizes(free, lin.size)
+    A_q, A_y = lin.rows @ free, lin.rows @ springs
+    tolerance = _RANK + 30.0 * lin.posture.mismatch
+    U, S, Vt = _svd(A_q)
+    rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
+    closing = Vt[:rank].T / S[:rank] @ U[:, :rank].T
+    loose = Vt[rank:].T
+    _, S, Vt = _svd(U[:, rank:].T @ A_y)
+    noise = _NOISE * np.abs(A_y).max(initial=0.0)
+    rank = int(np.sum(S > max(noise, tolerance * S.max(initial=0.0))))
+    modes = Vt[rank:].T
+    joined = springs @ modes - free @ (closing @ (A_y @ modes))
+    return PlatformStiffness(
+        lin.posture, state, lin.posture.platform[:3, 3], lin.size,
+        lin.platform @ joined, np.ones(modes.shape[1]), modes, tuple(parts),
+        unit_screws(lin.platform @ free @ loose, lin.size),
+    )  # fmt: skip
+
+
+def _sizes(columns: NDArray, length: float) -> NDArray:
+    """Size of screws, rotations in rad and translations in reference lengths."""
+    weights = np.tile(np.repeat([1.0, 1.0 / length], 3), len(columns) // 6)
+    return np.linalg.norm(columns * weights[:, None], axis=0)
+
+
+def _svd(A: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """All singular vectors, also of a matrix without rows or columns."""
+    if A.size:
+        return np.linalg.svd(A)
+    return np.eye(A.shape[0]), np.zeros(0), np.eye(A.shape[1])

@@ -1,0 +1,163 @@
+"""The classical stiffness of the platform at many postures at once, with its shares."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.batch.many_postures import structure_of
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import Posture
+from assembly.model.robot import Robot
+from assembly.platform_stiffness.linear_tangent import owners, without_clearance
+from assembly.platform_stiffness.matrices import Part
+from forcefit.inputs.display import html_table, short_repr
+from stiffness.screws import screw_map
+
+_RANK = 1e-10  # relative size of a compliance's root that counts as rigid
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffnesses:
+    """The platform's stiffness at k postures, clearances held at zero.
+
+    Attributes:
+        robot: of n frames.
+        length: [m] characteristic length.
+        springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
+            unit wrenches at the platform's origin, base axes; NaN where a motion of
+            the platform is free.
+        parts: (ny,) whose springs they are.
+        fallback: (k,) bool, where the compiled solver failed.
+    """
+
+    robot: Robot
+    length: float
+    springs: NDArray
+    parts: tuple[Part, ...]
+    fallback: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @cached_property
+    def compliance(self) -> NDArray:
+        """(k, 6, 6) [rad/(N m) .. m/N]; NaN where a motion of the platform is free."""
+        return np.swapaxes(self.springs, 1, 2) @ self.springs
+
+    @cached_property
+    def _roots(self) -> tuple[NDArray, NDArray]:
+        """Singular values (k, 6) and vectors (k, 6, 6) of the scaled roots."""
+        scale = np.repeat([self.length, 1.0], 3)
+        # a triangle of six rows first: there may be many springs
+        known = np.isfinite(self.springs).all(axis=(1, 2))
+        values = np.full((len(self.springs), 6), np.nan)
+        vectors = np.full((len(self.springs), 6, 6), np.nan)
+        if known.any():
+            R = np.linalg.qr(self.springs[known] * scale, mode="r")
+            _, S, Vt = np.linalg.svd(R, full_matrices=False)
+            values[known, : S.shape[1]] = S
+            values[known, S.shape[1] :] = 0.0
+            vectors[known, :, : S.shape[1]] = np.swapaxes(Vt, 1, 2)
+        return values, vectors
+
+    @cached_property
+    def eigen_stiffnesses(self) -> NDArray:
+        """(k, 6) [N/m] softest first, rotations times the length; inf where rigid."""
+        values, _ = self._roots
+        rigid = values <= _RANK * values[:, :1]
+        stiffness = np.full(values.shape, np.inf)
+        np.divide(1.0, values**2, out=stiffness, where=~rigid)
+        return np.where(np.isnan(values), np.nan, stiffness)
+
+    @cached_property
+    def eigen_screws(self) -> NDArray:
+        """(k, 6, 6) [rad, m] their screws in columns."""
+        return self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
+
+    @property
+    def condition(self) -> NDArray:
+        """(k,) [-] stiffest over softest."""
+        return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
+
+    def along(self, direction: ArrayLike) -> NDArray:
+        """(k,) [N m/rad or N/m] stiffness along a direction, the others free.
+
+        Args:
+            direction: (6,) unit, of a wrench.
+
+        Returns:
+            1 / (d . C d); inf where nothing gives way, NaN where a motion is free.
+        """
+        with np.errstate(divide="ignore"):
+            return 1.0 / np.sum((self.springs @ np.asarray(direction)) ** 2, axis=1)
+
+    def shares(self, direction: ArrayLike) -> dict[Part, NDArray]:
+        """(k,) share of every link and joint in the compliance along a direction.
+
+        Args:
+            direction: (6,) of a wrench.
+
+        Returns:
+            By part; together they are 1.
+        """
+        energies = (self.springs @ np.asarray(direction)) ** 2
+        with np.errstate(invalid="ignore"):
+            energies = energies / energies.sum(axis=1, keepdims=True)
+        shares: dict[Part, NDArray] = {}
+        for k, part in enumerate(self.parts):
+            shares[part] = shares.get(part, 0.0) + energies[:, k]
+        return shares
+
+
+def platform_stiffnesses(
+    robot: Robot, transforms: ArrayLike, mismatch: ArrayLike = 0.0
+) -> Stiffnesses:
+    """The classical K_C at many postures.
+
+    Args:
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+
+    Returns:
+        Compliances and shares in the order given; those that the compiled road does
+        not cover are found one by one.
+    """
+    from assembly.platform_stiffness.compiled_compliance import SOLVED, comply_all
+
+    T = np.require(transforms, dtype=float, requirements=["C", "W"])
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
+    joints, structure = structure_of(robot)
+    inner = np.zeros((len(T), 6, len(structure.springs)))
+    road = np.zeros(len(T), dtype=np.int64)
+    comply_all(structure, T, off, inner, road)
+    size = size_of(robot)
+    # the kernel's forces act on translations in reference lengths
+    springs = np.zeros((len(T), joints.elastic.shape[1], 6))
+    unit = np.repeat([1.0, size], 3)
+    springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
+    springs[:, _alone(joints.elastic.shape[1], structure.spring_order)] = np.nan
+    _add_trunk(robot, T, joints.elastic, springs)
+    for i in np.flatnonzero(road != SOLVED).tolist():
+        q = np.full(len(robot.frames), np.nan)
+        one = without_clearance(Posture(robot, q, T[i], float(off[i])))
+        springs[i] = one.springs @ one.root.T if not one.free.size else np.nan
+    return Stiffnesses(robot, size, springs, tuple(owners(joints)), road != SOLVED)
+
+
+def _alone(count: int, acting: NDArray) -> NDArray:
+    """Places of the springs that are in no closure."""
+    return np.setdiff1d(np.arange(count), acting)
+
+
+def _add_trunk(robot: Robot, T: NDArray, elastic: NDArray, springs: NDArray) -> None:
+    """Springs in no closure carry the platform's wrench alone, or nothing."""
+    lone = np.flatnonzero(np.isnan(springs).all(axis=(0, 2))) if len(T) else ()
+    if not len(lone):
+        return
+    i = robot.index(robot.platform)
+    paths = screw_map(T[:, :, :3, 3] - T[:, None, i, :3, 3], T[:, :, :3, :3])
+    paths = paths * robot.on_path[i][:, None, None]
+    blocks = elastic[:, lone].reshape(len(robot.frames), 6, len(lone))
+    springs[:, lone] = np.einsum("knij,njs->ksi", paths, blocks)

@@ -1,0 +1,339 @@
+r"""The platform's stiffness and compliance at a point, and what follows from them.
+
+A small wrench added to the platform moves it by s = C w, and K w is what holds it.
+Both come from the modes of the manipulator: combinations of all motions that its
+closures allow, each with an energy of sigma / 2 per unit squared, sigma = +-1.
+
+======  ==============  ========  ====================================================
+symbol  code            shape     meaning
+======  ==============  ========  ====================================================
+L       ``root``        (6, k)    platform screw of each mode: C = L diag(sigma) L^T
+sigma   ``signs``       (k,)      -1 only where an equilibrium is unstable
+Y       ``springs``     (m, k)    scaled deformation of the springs in each mode
+F       ``free``        (6, f)    unit screws of the platform that nothing resists
+l       ``length``      m         makes rotations lengths: eigenvalues need one unit
+======  ==============  ========  ====================================================
+
+A free motion makes compliances infinite, a rigid direction stiffnesses: such entries
+are NaN, and no other entry is touched by them.
+
+Sources:
+    Salisbury (1980), Active stiffness control of a manipulator in Cartesian
+    coordinates (the Cartesian stiffness matrix).
+    Loncaric (1987), Normal forms of stiffness and compliance matrices (the centre).
+    Lipkin, Patterson (1992), Geometrical properties of modelled robot elasticity
+    (eigenscrews; why a length must be chosen).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import null_space
+
+from assembly.kinematics.posture import Posture
+from forcefit.inputs.display import Figures, html_table, numbers, short_repr
+from stiffness.screws import screw_map
+
+_RANK = 1e-10  # relative size of a motion that counts as none
+_UNTOUCHED = 1e-9  # component of a unit screw that counts as none
+
+
+class Part(NamedTuple):
+    """Whose deformation it is: a frame's ``link``, ``joint`` or ``clearance``."""
+
+    frame: str
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class EigenStiffnesses:
+    """Principal stiffnesses, stiffest last; rotations count as length times angle.
+
+    Attributes:
+        values: (6,) [N/m], 0 along free motions, inf where rigid.
+        screws: (6, 6) in columns, [rad, m], of unit size with rotations times length.
+        length: [m] the length chosen.
+    """
+
+    values: NDArray
+    screws: NDArray
+    length: float
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def condition(self) -> float:
+        """[-] stiffest over softest; inf if the platform is free or rigid somewhere."""
+        least, most = self.values[0], self.values[-1]
+        return float(most / least) if least > 0.0 and np.isfinite(most) else np.inf
+
+    @property
+    def pitches(self) -> NDArray:
+        """(6,) [m] pitch of each screw, inf of a translation."""
+        turn, shift = self.screws[:3], self.screws[3:]
+        squared = np.sum(turn**2, axis=0)
+        turns = squared * self.length**2 > _UNTOUCHED**2
+        pitch = np.full(6, np.inf)
+        np.divide(np.sum(turn * shift, axis=0), squared, out=pitch, where=turns)
+        return pitch
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformStiffness:
+    """How stiff the platform is at one point; see the head of this module.
+
+    Attributes:
+        posture: where the robot stands nominally.
+        state: ``"without clearance"``, ``"in contact"`` or ``"exact"``.
+        point: (3,) [m] where screws and wrenches are read, base axes.
+        length: [m] characteristic length.
+        root: (6, k) [rad, m] per sqrt(2 J).
+        signs: (k,) 1 or -1.
+        springs: (m, k) [sqrt(2 J)].
+        parts: (m,) whose springs they are.
+        free: (6, f) [rad, m].
+    """
+
+    posture: Posture
+    state: str
+    point: NDArray
+    length: float
+    root: NDArray
+    signs: NDArray
+    springs: NDArray
+    parts: tuple[Part, ...]
+    free: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly stiffness`` prints first."""
+        eigen = self.eigen
+        return {
+            "state": self.state,
+            "point": f"{numbers(self.point)} m, base axes",
+            "free motions": str(self.free.shape[1]),
+            "eigen-stiffnesses": f"{numbers(eigen.values)} N/m",
+            "length": f"{self.length:g} m",
+        }
+
+    def at(self, point: ArrayLike, length: float | None = None) -> "PlatformStiffness":
+        """The same platform read at another of its points.
+
+        Args:
+            point: (3,) [m] base axes.
+            length: [m] another characteristic length, if one is given.
+
+        Returns:
+            Its stiffness there.
+        """
+        point, length = np.array(point, dtype=float), length or self.length
+        move = screw_map(self.point - point)
+        return replace(
+            self, point=point, length=length, root=move @ self.root,
+            free=unit_screws(move @ self.free, length),
+        )  # fmt: skip
+
+    @cached_property
+    def compliance(self) -> NDArray:
+        """(6, 6) [rad/(N m) .. m/N] symmetric; NaN where a free motion acts."""
+        return _blank((self.root * self.signs) @ self.root.T, self.free)
+
+    @cached_property
+    def stiffness(self) -> NDArray:
+        """(6, 6) [N m/rad .. N/m] symmetric; NaN where the platform is rigid."""
+        way, core, rigid = self._resisted
+        K = way @ core @ way.T
+        return _blank((K + K.T) / 2, rigid)
+
+    @property
+    def rigid(self) -> NDArray:
+        """(6, r) [N m, N] unit wrenches that move nothing."""
+        return self._resisted[2]
+
+    @property
+    def stable(self) -> bool:
+        """Whether the potential has a minimum here."""
+        return bool((self.signs > 0).all())
+
+    @cached_property
+    def _scale(self) -> NDArray:
+        """(6,) rotations times the characteristic length."""
+        return np.array([*[self.length] * 3, 1.0, 1.0, 1.0])
+
+    @cached_property
+    def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Wrenches (6, r) of a basis, stiffness (r, r) in it, rigid wrenches (6, .)."""
+        scale = self._scale[:, None]
+        basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
+        U, S, Vt = np.linalg.svd(basis.T @ (scale * self.root))
+        rank = int(np.sum(S > _RANK * S.max(initial=0.0)))
+        inverse = np.diag(1.0 / S[:rank])
+        core = inverse @ inverse
+        if not self.stable:
+            mixed = (Vt[:rank] * self.signs) @ Vt[:rank].T
+            core = inverse @ np.linalg.inv(mixed) @ inverse
+        wrenches = scale * (basis @ U)
+        return wrenches[:, :rank], (core + core.T) / 2, wrenches[:, rank:]
+
+    @cached_property
+    def eigen(self) -> EigenStiffnesses:
+        """Principal stiffnesses and their screws for the characteristic length."""
+        way, core, rigid = self._resisted
+        values, vectors = np.linalg.eigh(core)
+        scale = self._scale[:, None]
+        # orthonormal with rotations times length
+        screws = np.hstack([
+            np.linalg.qr(scale * self.free)[0],
+            way @ vectors / scale,
+            rigid / scale,
+        ])
+        values = np.concatenate([
+            np.zeros(self.free.shape[1]), values, np.full(rigid.shape[1], np.inf)
+        ])  # fmt: skip
+        order = np.argsort(values, kind="stable")
+        return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
+
+    def along(self, direction: ArrayLike) -> tuple[float, float]:
+        """Stiffness along one direction, the others free or blocked.
+
+        Args:
+            direction: (6,) of a wrench and of a screw, such as ``[0, 0, 0, 0, 0, 1]``.
+
+        Returns:
+            [N/m or N m/rad] wrench per displacement with all other wrenches zero, and
+            with all other displacements zero.
+
+        Raises:
+            ValueError: the direction is zero.
+        """
+        d = _direction(direction)
+        with np.errstate(divide="ignore"):
+            free = float(np.float64(1.0) / self._compliance_along(d))
+        blocked = np.inf if _touches(self.rigid, d) else self._held(d)
+        return free, blocked
+
+    def _compliance_along(self, d: NDArray) -> float:
+        """D . C d, infinite along free motions."""
+        if _touches(self.free, d):
+            return np.inf
+        return float(self.signs @ (self.root.T @ d) ** 2)
+
+    def _held(self, d: NDArray) -> float:
+        """D . K d."""
+        way, core, _ = self._resisted
+        return float(d @ way @ core @ way.T @ d)
+
+    @cached_property
+    def centre(self) -> NDArray:
+        """(3,) [m] centre of stiffness, base axes; NaN if there is none.
+
+        Read there, the block of K from translations to moments is symmetric.
+        """
+        K = self.stiffness
+        turned, shifted = K[:3, 3:], K[3:, 3:]
+        spread = np.trace(shifted) * np.eye(3) - shifted
+        axial = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0],
+                          turned[1, 0] - turned[0, 1]])  # fmt: skip
+        size = np.linalg.norm(spread, 2) if np.isfinite(K).all() else 0.0
+        if not size or np.linalg.svd(spread, compute_uv=False)[-1] < _RANK * size:
+            return np.full(3, np.nan)
+        return self.point + np.linalg.solve(spread, axial)
+
+    def contributions(self) -> dict[Part, NDArray]:
+        """What every part adds to the compliance.
+
+        Returns:
+            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`, but for
+            what forces on turning parts add in the state ``"exact"``.  In the others
+            each is also the derivative of the compliance by the logarithm of the
+            part's own (Castigliano).
+        """
+        response = self.springs @ (self.signs[:, None] * self.root.T)
+        shares: dict[Part, NDArray] = {}
+        for part, row in zip(self.parts, response, strict=True):
+            shares[part] = shares.get(part, 0.0) + np.outer(row, row)
+        return {part: _blank(C, self.free) for part, C in shares.items()}
+
+    def shares(self, direction: ArrayLike) -> dict[Part, float]:
+        """Which part gives way: shares of the compliance along a direction.
+
+        Args:
+            direction: (6,) of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
+
+        Returns:
+            [-] by part, largest first.  What the forces already there add by turning
+            with their parts is the part ``("", "forces")``, which may be negative; all
+            together are 1.  NaN where the compliance is infinite, or none.
+
+        Raises:
+            ValueError: the direction is zero.
+        """
+        d = _direction(direction)
+        whole = self._compliance_along(d)
+        response = self.springs @ (self.signs * (self.root.T @ d))
+        energies: dict[Part, float] = {}
+        for part, value in zip(self.parts, response, strict=True):
+            energies[part] = energies.get(part, 0.0) + float(value) ** 2
+        if self.state == "exact":
+            energies[Part("", "forces")] = whole - sum(energies.values())
+        if not np.isfinite(whole) or whole == 0.0:
+            return dict.fromkeys(energies, np.nan)
+        order = sorted(energies, key=lambda part: -abs(energies[part]))
+        return {part: energies[part] / whole for part in order}
+
+
+def unit_screws(screws: NDArray, length: float) -> NDArray:
+    """Independent unit screws that span the same motions.
+
+    Args:
+        screws: (6, k) [rad, m], in units of about 1 rad or length; those much smaller
+            count as rounding.
+        length: [m] by which rotations are multiplied.
+
+    Returns:
+        (6, f) of 1 rad, or of 1 m if they do not turn; pure translations, and along
+        the axes, where there are such.
+    """
+    scale = np.array([*[length] * 3, 1.0, 1.0, 1.0])[:, None]
+    U, S, _ = np.linalg.svd(scale * screws, full_matrices=False)
+    basis = U[:, S > _UNTOUCHED * length]
+    done = 0
+    for row in (3, 4, 5, 0, 1, 2):  # Gauss and Jordan
+        size = np.abs(basis[row, done:])
+        if size.max(initial=0.0) > _UNTOUCHED:
+            pivot = done + int(size.argmax())
+            basis[:, [done, pivot]] = basis[:, [pivot, done]]
+            basis[:, done] /= basis[row, done]
+            others = np.arange(basis.shape[1]) != done
+            basis[:, others] -= np.outer(basis[:, done], basis[row, others])
+            done += 1
+    unit = basis / scale
+    turn = np.linalg.norm(unit[:3], axis=0)
+    shift = np.linalg.norm(unit[3:], axis=0)
+    unit = unit / np.where(turn * length > _UNTOUCHED * shift, turn, shift)
+    return np.where(np.abs(unit) > _UNTOUCHED, unit, 0.0)
+
+
+def _direction(direction: ArrayLike) -> NDArray:
+    """(6,) of unit size."""
+    d = np.array(direction, dtype=float)
+    if d.shape != (6,) or not np.isfinite(d).all() or not d.any():
+        raise ValueError(f"direction: found {d}, expected 6 numbers, not all 0")
+    return d / np.linalg.norm(d)
+
+
+def _touches(vectors: NDArray, d: NDArray) -> bool:
+    """Whether a direction has a part along any of these."""
+    return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
+
+
+def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
+    """NaN in rows and columns where any of the directions has a component."""
+    touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
+    matrix = np.where(touched[:, None] | touched, np.nan, matrix)
+    matrix.setflags(write=False)
+    return matrix

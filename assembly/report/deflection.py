@@ -1,0 +1,121 @@
+"""A load-deflection curve for machines and for people."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.deflection import DeflectionCurve, load_deflection
+from assembly.report.results import failure_status
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import numbers, rounded
+from forcefit.inputs.errors import plot_label
+from stiffness.screws import SCREW, WRENCH
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_ROWS = 25  # of the curve that people are shown
+
+
+def deflection_of(
+    posture: Posture,
+    component: int,
+    loads: Sequence[float],
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    exact: bool = False,
+) -> dict[str, Any]:
+    """Everything ``assembly deflection`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        component: of the load, 0 to 5.
+        loads: [N m or N] its values in the order in which they act.
+        load: (6,) [N m, N] the rest of the load.
+        gravity: (3,) [m/s^2] base axes.
+        exact: whether with finite motions.
+
+    Returns:
+        Curve and events; ``status`` is ``"ok"``, or says why there is none.
+    """
+    results: dict[str, Any] = {
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "along": WRENCH[component].lower(), "exact": exact,
+    }  # fmt: skip
+    try:
+        curve = load_deflection(posture, component, loads, load, gravity, exact)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": failure_status(error), "reason": str(error)}
+    return results | _curve_values(curve)
+
+
+def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
+    """A curve as plain values."""
+    return {
+        "loads": curve.loads,
+        "deflection": curve.deflection,
+        "platform_screw": curve.screws,
+        "energy": curve.energies,
+        "stiffness": curve.stiffness,
+        "contacts": [sorted(names) for names in curve.pressed],
+        "free_play": curve.open_,
+        "events": [vars(event) for event in curve.events],
+    }
+
+
+def deflection_text(results: dict[str, Any]) -> str:
+    """A curve for people: a table and what happens on the way."""
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    if results["status"] != "ok":
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    component = [name.lower() for name in WRENCH].index(results["along"])
+    turns = component < 3
+    units = ("N m", "mrad", "N m/rad") if turns else ("N", "mm", "N/m")
+    head = (
+        f"{results['along']} [{units[0]}]", f"{SCREW[component]} [{units[1]}]",
+        f"stiffness [{units[2]}]", "contacts",
+    )  # fmt: skip
+    lines.append("".join(f"{text:>20s}" for text in head))
+    count = len(results["loads"])
+    for i in sorted({round(k) for k in np.linspace(0, count - 1, min(count, _ROWS))}):
+        lines.append(
+            f"{results['loads'][i]:20.6g}{rounded(1e3 * results['deflection'][i]):20.6g}"
+            f"{results['stiffness'][i]:20.6g}{len(results['contacts'][i]):20d}"
+            + ("  free play" if results["free_play"][i] else "")
+        )
+    for event in results["events"]:
+        at = f"{event['load']:.6g} {units[0]}"
+        lines.append(f"{event['kind']} at {at}: {event['what']}")
+    return "\n".join(lines)
+
+
+def draw_deflection(results: dict[str, Any]) -> "Figure":
+    """Load over deflection, kinks marked.
+
+    Args:
+        results: of :func:`deflection_of`.
+
+    Returns:
+        The figure.
+    """
+    from matplotlib.figure import Figure
+
+    component = [name.lower() for name in WRENCH].index(results["along"])
+    turns = component < 3
+    figure = Figure(figsize=(6.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    moved, loads = 1e3 * np.asarray(results["deflection"]), results["loads"]
+    axes.plot(moved, loads, ".-")
+    order = np.argsort(loads, kind="stable")
+    for event in results["events"]:
+        at = np.interp(event["load"], np.asarray(loads)[order], moved[order])
+        axes.plot([at], [event["load"]], "x", color="black")
+    axes.set_xlabel(f"{SCREW[component]} [{'mrad' if turns else 'mm'}]")
+    axes.set_ylabel(f"{results['along']} [{'N m' if turns else 'N'}]")
+    axes.set_title(plot_label(str(results["robot"])))
+    return figure

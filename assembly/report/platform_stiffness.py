@@ -1,0 +1,281 @@
+"""The platform's stiffness for machines and for people, and who is to blame."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.exact_tangent import exact_tangent
+from assembly.platform_stiffness.linear_tangent import (
+    Side,
+    contacts,
+    in_contact,
+    without_clearance,
+)
+from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.report.results import failure_status
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import numbers, rounded
+from forcefit.inputs.errors import plot_label
+from stiffness.screws import SCREW
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DIRECTIONS = tuple(name.lower() for name in SCREW)
+_KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
+_SHOWN = 12  # parts in the table and in the chart; the rest are one row
+
+
+def stiffness_of(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    at: ArrayLike = (0.0, 0.0, 0.0),
+    exact: bool = False,
+    length: float | None = None,
+) -> dict[str, Any]:
+    """Everything ``assembly stiffness`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        at: (3,) [m] of the platform, in its axes, where screws and wrenches are read.
+        exact: whether the tangent is that of the exact equilibrium, else the classical
+            model's, and beside it that of problem (22) if the robot has clearances.
+        length: [m] by which rotations are multiplied; the longest body if absent.
+
+    Returns:
+        The keys of the public format; ``status`` is ``"ok"``, ``"free motion"``, or
+        ``"unstable"``, or says why there is no equilibrium.
+    """
+    results: dict[str, Any] = {
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "load": np.zeros(6) if load is None else np.asarray(load),
+        "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
+    }  # fmt: skip
+    try:
+        if exact:
+            answer = solve_exact(posture, load, gravity=gravity)
+            platform, sides = answer.placement.platform, [exact_tangent(answer)]
+            away = exact_tangent(answer, "letting go")
+            if away.free.shape[1] > sides[0].free.shape[1]:
+                sides.append(away)
+        else:
+            platform, sides = posture.platform, [without_clearance(posture)]
+        point = platform[:3, 3] + platform[:3, :3] @ np.asarray(at, dtype=float)
+        values = [stiffness_values(side, point, length) for side in sides]
+        results |= values[0] | {"status": _status(sides[0])}
+        if exact:
+            results["letting_go"] = values[1] if len(values) > 1 else None
+        elif virtual_clearances(posture):
+            results["in_contact"] = _in_contact(posture, load, gravity, point, length)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        results |= {"status": failure_status(error), "reason": str(error)}
+    return results
+
+
+def virtual_clearances(posture: Posture) -> bool:
+    """Whether any joint of the robot has a clearance."""
+    return any(frame.clearance is not None for frame in posture.robot.frames)
+
+
+def _in_contact(
+    posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
+) -> list[dict[str, Any]]:
+    """The tangent of (22): one, or two where a clearance just touches its bound."""
+    answer = solve_assembly(posture, load, gravity=gravity)
+    pressed, touching = contacts(answer)
+    sides: list[Side] = ["holding"]
+    if touching.any():
+        sides.append("letting go")
+    return [
+        {"side": side, "contacts": int(pressed.sum()), "touching": int(touching.sum())}
+        | stiffness_values(in_contact(answer, side), point, length)
+        for side in sides
+    ]
+
+
+def _status(answer: PlatformStiffness) -> str:
+    """Whether the platform is held, and stable."""
+    if not answer.stable:
+        return "unstable"
+    return "free motion" if answer.free.shape[1] else "ok"
+
+
+def stiffness_values(
+    answer: PlatformStiffness, point: NDArray, length: float | None = None
+) -> dict[str, Any]:
+    """One stiffness as plain values; NaN and infinity stand for no number.
+
+    Args:
+        answer: of a posture.
+        point: (3,) [m] where to read it, base axes.
+        length: [m] by which rotations are multiplied.
+
+    Returns:
+        Matrices, free motions, eigenscrews, shares by direction.
+    """
+    answer = answer.at(point, length)
+    eigen = answer.eigen
+    return {
+        "state": answer.state,
+        "point": answer.point,
+        "compliance": answer.compliance,
+        "stiffness": answer.stiffness,
+        "free_motions": answer.free.T,
+        "rigid_wrenches": answer.rigid.T,
+        "characteristic_length": answer.length,
+        "eigen": [
+            {"stiffness": float(value), "screw": screw, "pitch": float(pitch)}
+            for value, screw, pitch in zip(
+                eigen.values, eigen.screws.T, eigen.pitches, strict=True
+            )
+        ],
+        "condition": eigen.condition,
+        "centre": answer.centre,
+        "along": {
+            name: dict(zip(("free", "blocked"), answer.along(axis), strict=True))
+            for name, axis in zip(DIRECTIONS, np.eye(6), strict=True)
+        },
+        "shares": {
+            name: _share_values(answer, axis)
+            for name, axis in zip(DIRECTIONS, np.eye(6), strict=True)
+        },
+    }
+
+
+def _share_values(answer: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
+    """Shares along an axis by kind and frame."""
+    table: dict[str, Any] = {"links": {}, "joints": {}}
+    for part, share in answer.shares(axis).items():
+        if part.kind in _KINDS:
+            table.setdefault(_KINDS[part.kind], {})[part.frame] = share
+        else:
+            table["forces"] = share
+    return table
+
+
+def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
+    """Shares of every part in the six directions, largest first.
+
+    Args:
+        shares: of :func:`stiffness_values`.
+
+    Returns:
+        Six numbers by the part's name, such as ``"leg1.distal link"``.
+    """
+    rows: dict[str, list[float]] = {}
+    for k, name in enumerate(DIRECTIONS):
+        for kind, word in _KINDS.items():
+            for frame, share in shares[name].get(word, {}).items():
+                rows.setdefault(f"{frame} {kind}", [np.nan] * 6)[k] = share
+        if "forces" in shares[name]:
+            rows.setdefault("forces already there", [np.nan] * 6)[k] = shares[name][
+                "forces"
+            ]
+    return dict(
+        sorted(rows.items(), key=lambda row: -np.nan_to_num(np.abs(row[1])).max())
+    )
+
+
+def stiffness_text(results: dict[str, Any]) -> str:
+    """A stiffness for people: matrix, eigen-stiffnesses, and the parts to blame."""
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    if "compliance" not in results:
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    if results["status"] == "unstable":
+        lines.append("unstable: this equilibrium has a direction of negative stiffness")
+    lines += _state_lines(results)
+    lines += _share_lines(results["shares"])
+    for side in results.get("in_contact", ()):
+        lines += ["", f"with clearances, {side['contacts']} pressed, {side['side']}:"]
+        lines += _state_lines(side)
+    if results.get("letting_go"):
+        lines += ["", "clearances that touch their bound without a force let go:"]
+        lines += _state_lines(results["letting_go"])
+    return "\n".join(lines)
+
+
+def _state_lines(values: dict[str, Any]) -> list[str]:
+    """One state: K, what moves freely, eigen-stiffnesses, centre."""
+    lines = [f"stiffness {values['state']}, read at {numbers(values['point'])} m, "
+             "base axes [N m/rad, N/rad, N m/m, N/m]"]  # fmt: skip
+    K = np.asarray(values["stiffness"])
+    size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
+    K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
+    lines += [
+        f"  {name}" + "".join(_cell(value) for value in row)
+        for name, row in zip(SCREW, K, strict=True)
+    ]
+    lines += [f"free motion: {numbers(screw)}" for screw in values["free_motions"]]
+    lines += [f"rigid along: {numbers(w)}" for w in values["rigid_wrenches"]]
+    shown = " ".join(f"{one['stiffness']:.4g}" for one in values["eigen"])
+    length = values["characteristic_length"]
+    lines.append(f"eigen-stiffnesses: {shown} N/m, angles times {length:.4g} m")
+    centre = values["centre"]
+    if np.isfinite(centre).all():
+        lines.append(f"centre of stiffness: {numbers(centre)} m, base axes")
+    return lines
+
+
+def _cell(value: float) -> str:
+    """A number of the matrix; rigid where it has none."""
+    return f"{value:13.5g}" if np.isfinite(value) else f"{'rigid':>13s}"
+
+
+def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
+    """The table of who gives way, in per cent of the compliance."""
+    rows = share_rows(shares)
+    table = _largest_rows(rows)
+    width = max(map(len, (*table, "part")))
+    head = "".join(f"{name:>9s}" for name in DIRECTIONS)
+    lines = ["", "shares in the compliance along each direction, per cent",
+             f"{'part':{width}s}{head}"]  # fmt: skip
+    for name, row in table.items():
+        cells = (
+            f"{rounded(100 * value):9.3g}" if np.isfinite(value) else f"{'-':>9s}"
+            for value in row
+        )
+        lines.append(f"{name:{width}s}" + "".join(cells))
+    return lines
+
+
+def _largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
+    """The first rows, and all others together."""
+    names = list(rows)
+    if len(names) <= _SHOWN + 1:
+        return rows
+    rest = np.sum([rows[name] for name in names[_SHOWN:]], axis=0)
+    first = {name: rows[name] for name in names[:_SHOWN]}
+    return first | {f"{len(names) - _SHOWN} others": rest.tolist()}
+
+
+def draw_shares(results: dict[str, Any]) -> "Figure":
+    """A bar chart of the parts' shares in the compliance along each direction.
+
+    Args:
+        results: of :func:`stiffness_of`.
+
+    Returns:
+        The figure; directions without a finite compliance are empty.
+    """
+    from matplotlib.figure import Figure
+
+    rows = share_rows(results["shares"])
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    bottom = np.zeros(6)
+    for name, row in _largest_rows(rows).items():
+        height = 100 * np.nan_to_num(row)
+        axes.bar(DIRECTIONS, height, bottom=bottom, label=plot_label(name))
+        bottom = bottom + height
+    axes.set_ylabel("share of the compliance [%]")
+    axes.set_title(plot_label(f"{results['robot']}: which part gives way"))
+    axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

@@ -1,0 +1,116 @@
+"""The command ``forcefit assembly deflection``."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+)
+from forcefit.commands.progress import one_thread
+from forcefit.inputs.errors import BadInput, describe, nearest
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+_MOST = 10_000  # loads of a curve
+
+
+def deflection(
+    robot: RobotArgument,
+    along: Annotated[
+        str, typer.Option(help="Component of the load, from:to:step, as fz=0:-500:10.")
+    ],
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    exact: Annotated[
+        bool,
+        typer.Option(
+            "--exact", help="With finite motions: large deflections, buckling."
+        ),
+    ] = False,
+    back: Annotated[
+        bool, typer.Option("--back", help="Also back to the first load.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Draw the curve.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Load against deflection: free play, contacts, elastic, critical loads."""
+    from assembly.effects.robot_effects import apply_robot_effects
+    from assembly.report.deflection import (
+        deflection_of,
+        deflection_text,
+        draw_deflection,
+    )
+
+    if output is not None:
+        check_writable(output, PICTURE)
+    component, loads = parse_along(along)
+    loads = [*loads, *reversed(loads[:-1])] if back else loads
+    applied = apply_robot_effects(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=exact,
+    )  # fmt: skip
+    with one_thread():
+        results = deflection_of(
+            applied.posture, component, loads, applied.load, applied.gravity, exact
+        )
+    write_json(results, json)
+    if json != "-":
+        print(deflection_text(results))
+    if output is not None and "deflection" in results:
+        save_figure(draw_deflection(results), output)
+    if results["status"] != "ok":
+        raise typer.Exit(1)
+
+
+def parse_along(text: str) -> tuple[int, list[float]]:
+    """Component and values of ``--along``.
+
+    Args:
+        text: such as ``"fz=0:-500:10"``; the step's sign does not matter.
+
+    Returns:
+        Row of the wrench, and [N m or N] values; both ends if the step fits.
+
+    Raises:
+        BadInput: not of that form, no change, or more than 10000 values.
+    """
+    from assembly.model.largest import LARGEST
+    from stiffness.screws import WRENCH
+
+    names = [name.lower() for name in WRENCH]
+    name, _, values = (part.strip() for part in text.partition("="))
+    expected = "expected COMPONENT=FROM:TO:STEP such as fz=0:-500:10"
+    try:
+        start, stop, step = (float(part) for part in values.split(":"))
+    except ValueError:
+        raise BadInput(f"--along: found {describe(text)}, {expected}") from None
+    if name not in names:
+        raise BadInput(
+            f'--along: unknown component "{name[:60]}"{nearest(name, names)}'
+        )
+    if not all(abs(value) <= LARGEST for value in (start, stop, step)):
+        raise BadInput(f"--along: found {describe(text)}, expected finite numbers")
+    if step == 0.0 or start == stop:
+        raise BadInput(f"--along: found {describe(text)}, expected a change and a step")
+    count = math.floor(abs(stop - start) / abs(step) + 1e-9)
+    if count >= _MOST:
+        raise BadInput(f"--along: found {count + 1} loads, expected at most {_MOST}")
+    step = math.copysign(step, stop - start)
+    return names.index(name), [start + k * step for k in range(count + 1)]

@@ -1,0 +1,82 @@
+"""The command ``forcefit assembly stiffness``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+    parse_point,
+)
+from forcefit.commands.progress import one_thread
+from forcefit.inputs.errors import checked
+from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+
+def stiffness(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    at: Annotated[
+        str | None,
+        typer.Option(help="Point of the platform, in its axes [m], such as 0,0,-0.1."),
+    ] = None,
+    exact: Annotated[
+        bool,
+        typer.Option(
+            "--exact",
+            help="The tangent of the exact equilibrium: internal forces and loads "
+            "stiffen or soften.",
+        ),
+    ] = False,
+    length: Annotated[
+        float | None,
+        typer.Option(help="[m] by which angles are multiplied in eigen-stiffnesses."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Bar chart of the shares.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """How stiff the platform is, in which direction, and which part gives way."""
+    from assembly.effects.robot_effects import apply_robot_effects
+    from assembly.report.platform_stiffness import (
+        draw_shares,
+        stiffness_of,
+        stiffness_text,
+    )
+
+    if output is not None:
+        check_writable(output, PICTURE)
+    if length is not None:
+        checked("--length", length, "m", above=0)
+    point = parse_point(at, "--at")
+    applied = apply_robot_effects(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=exact,
+    )  # fmt: skip
+    with one_thread():
+        results = stiffness_of(
+            applied.posture, applied.load, applied.gravity, point, exact, length
+        )
+    write_json(results, json)
+    if json != "-":
+        print(stiffness_text(results))
+    if output is not None and "shares" in results:
+        save_figure(draw_shares(results), output)
+    if results["status"] != "ok":
+        raise typer.Exit(1)

@@ -1,0 +1,151 @@
+"""Load against deflection: clearances, contacts, buckling, jumps; closed forms."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.platform_stiffness.deflection import load_deflection
+from assembly.robots import load_robot
+
+FY, FZ = 4, 5
+
+
+def bush(clearance=1e-4, stiffness=1e5):
+    """A spring in series with an axial clearance, along z."""
+    K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, stiffness])
+    frames = (
+        Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=clearance)),
+        Frame("tip", "spring"),
+    )
+    return home_posture(Robot("bush", "tip", frames))
+
+
+def cantilever(link):
+    tip = Frame("tip", translation=[1.0, 0, 0], link=link)
+    return home_posture(Robot("cantilever", "tip", (tip,)))
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_free_play_then_contact_then_a_spring(exact):
+    """Deflection = sign(F) c + F / k; at no load anything within the play."""
+    c, k = 1e-4, 1e5
+    curve = load_deflection(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), exact=exact)
+    loaded = curve.loads != 0.0
+    expected = np.sign(curve.loads) * c + curve.loads / k
+    np.testing.assert_allclose(
+        curve.deflection[loaded], expected[loaded], rtol=1e-5, atol=1e-9
+    )
+    np.testing.assert_array_equal(curve.open_, ~loaded)
+    np.testing.assert_allclose(curve.stiffness, np.where(loaded, k, 0.0), rtol=1e-6)
+    release, contact = curve.events
+    assert (release.kind, release.what) == ("release", "spring axial")
+    assert (contact.kind, contact.what) == ("contact", "spring axial")
+    assert max(abs(release.load), abs(contact.load)) < 0.01
+
+
+def test_an_error_is_pressed_back_at_the_load_that_it_took():
+    """Forced by k (e - c) against its stop, a closure lets go at that load.
+
+    Two springs k hold the tip; the one behind the stop lets go when the other carries
+    all: at 2 k (e - c) / 2 on each.
+    """
+    c, e, k = 1e-4, 3e-4, 1e5
+    K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, k])
+    frames = (
+        Frame("one", link=MatrixLink(K), clearance=Clearance(axial=c)),
+        Frame("tip", "one", geometric_error=[0, 0, 0, 0, 0, e]),
+        Frame("two", link=MatrixLink(K)),
+        Frame("other", "two"),
+    )
+    posture = home_posture(Robot("pair", "tip", frames, (("tip", "other"),)))
+    curve = load_deflection(posture, FZ, np.arange(0.0, 60.0, 7.0))
+    assert curve.deflection[0] == pytest.approx((e - c) / 2, rel=1e-5)
+    assert curve.stiffness[0] == pytest.approx(2 * k, rel=1e-6)
+    first, *_ = curve.events
+    assert (first.kind, first.what) == ("release", "one axial")
+    assert first.load == pytest.approx(k * (e - c), abs=0.01)
+    # then the play, 2 c wide, is crossed on one spring alone
+    second = curve.events[1]
+    assert (second.kind, second.what) == ("contact", "one axial")
+    assert second.load == pytest.approx(k * (e + c), abs=0.01)
+    between = (curve.loads > k * (e - c)) & (curve.loads < k * (e + c))
+    np.testing.assert_allclose(curve.stiffness[between], k, rtol=1e-6)
+
+
+def test_the_tangent_is_the_slope_of_the_curve():
+    """Central differences along a loaded robot's curve, error of second order."""
+    posture = home_posture(load_robot("four_bar"))
+    loads = 100.0 + np.array([-0.5, 0.0, 0.5])
+    curve = load_deflection(posture, FY, loads, exact=True)
+    slope = (curve.deflection[2] - curve.deflection[0]) / (loads[2] - loads[0])
+    assert 1 / slope == pytest.approx(curve.stiffness[1], rel=1e-6)
+
+
+def test_euler_s_column_is_found_to_buckle():
+    width, E = 0.02, 70e9
+    link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=16,
+                    theory="euler")  # fmt: skip
+    euler = np.pi**2 * E * width**4 / 12 / 4
+    loads = -euler * np.array([0.0, 0.5, 0.9, 1.1])
+    (event,) = load_deflection(cantilever(link), 3, loads, exact=True).events
+    assert event.kind == "critical"
+    assert -event.load == pytest.approx(euler, rel=2e-3)
+    assert "tip link" in event.what
+
+
+def test_a_thin_cantilever_buckles_sideways():
+    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), and what bending before it adds.
+
+    1 / sqrt((1 - I_y/I_z) (1 - GJ/EI_z)) for the latter; 16 pieces leave 0.1 %.
+    """
+    E, nu = 70e9, 0.3
+    G = E / (2 * (1 + nu))
+    section = {"area": 2e-4, "I_y": 2e-10, "I_z": 2e-8, "J": 1e-9,
+               "shear_y": 1.0, "shear_z": 1.0}  # fmt: skip
+    link = BeamLink(section, E, nu, up=(0, 0, 1), pieces=16, theory="euler")
+    plain = 4.0126 * np.sqrt(E * 2e-10 * G * 1e-9)
+    bent = plain / np.sqrt((1 - 0.01) * (1 - G * 1e-9 / (E * 2e-8)))
+    loads = plain * np.array([0.0, 0.5, 0.9, 1.2])
+    (event,) = load_deflection(cantilever(link), FY, loads, exact=True).events
+    assert event.kind == "critical"
+    assert event.load == pytest.approx(bent, rel=5e-3)
+
+
+def shallow_arch():
+    """Von Mises' truss: two springs k at an angle that meet in a slider."""
+    half, rise, k = 1.0, 0.1, 1e5
+    length, angle = np.hypot(half, rise), np.arctan2(rise, half)
+    K = np.diag([np.inf, np.inf, np.inf, k, np.inf, np.inf])
+    frames = (
+        Frame("left", rotation=[0, 0, angle], joint="revolute"),
+        Frame("left_end", "left", [length, 0, 0], joint_stiffness=K),
+        Frame("pin", "left_end", rotation=[0, 0, -2 * angle], joint="revolute"),
+        Frame("right_start", "pin", [length, 0, 0], joint_stiffness=K),
+        Frame("foot", "right_start", joint="revolute"),
+        Frame("end", "foot", rotation=[0, 0, angle]),
+        Frame("ground", translation=[2 * half, 0, 0]),
+        Frame("apex", "left_end", rotation=[0, 0, -angle]),
+    )
+    return home_posture(Robot("arch", "apex", frames, (("end", "ground"),)))
+
+
+def test_a_shallow_arch_snaps_through_at_its_limit_point():
+    """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2: largest, then a jump."""
+    half, rise, k = 1.0, 0.1, 1e5
+    length = np.hypot(half, rise)
+    heights = np.linspace(0.0, rise, 100_001)
+    force = 2 * k * (length / np.hypot(half, heights) - 1) * heights
+    limit = force.max()
+    loads = -np.array([0.0, 0.5, 0.9, 0.99, 1.05, 1.2]) * limit
+    curve = load_deflection(shallow_arch(), FY, loads, exact=True)
+    jump = next(event for event in curve.events if event.kind == "jump")
+    assert -jump.load == pytest.approx(limit, rel=1e-3)
+    assert curve.deflection[3] > -rise
+    assert curve.deflection[4] < -2 * rise
+    # back: it stays below until the load there is lost too
+    back = load_deflection(
+        shallow_arch(), FY, [*loads, *reversed(loads[:-1])], exact=True
+    )
+    assert back.deflection[-2] == pytest.approx(curve.deflection[5], rel=0.2)
+    assert back.deflection[-2] < -2 * rise < back.deflection[1]

@@ -1,0 +1,343 @@
+"""K_C against closed forms, symmetry, statics and differences of the equilibrium."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.se3 import turn_jacobian
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.platform_stiffness.linear_tangent import contacts
+from assembly.platform_stiffness.matrices import Part
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
+from assembly.robots.hexapod import HexapodParameters, hexapod, points
+from stiffness.screws import screw_map
+from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
+
+UNIT = np.eye(6)
+RIGID = np.diag([np.inf] * 6)
+
+
+def assert_same_matrix(M, expected, tolerance):
+    """Entries relative to sqrt(M_ii M_jj), so that rad and m weigh alike."""
+    size = np.sqrt(np.abs(np.diag(expected)))
+    np.testing.assert_allclose(
+        M / np.outer(size, size), expected / np.outer(size, size), atol=tolerance
+    )
+
+
+def serial(*frames):
+    """A chain of frames from the base, the last one the platform."""
+    chain, above = [], "base"
+    for frame in frames:
+        chain.append(replace(frame, parent=above))
+        above = frame.name
+    return home_posture(Robot("chain", above, tuple(chain)))
+
+
+def only(row, stiffness):
+    """K_B rigid but for one direction."""
+    K = RIGID.copy()
+    K[row, row] = stiffness
+    return K
+
+
+def test_a_cantilever_has_the_textbook_compliance():
+    """L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI, L/EI of a square section along x."""
+    L, a, E = 0.8, 0.02, 70e9
+    A, inertia, G, J = a**2, a**4 / 12, E / 2, 0.1406 * a**4
+    section = {"area": A, "I_y": inertia, "I_z": inertia, "J": J,
+               "shear_y": 5 / 6, "shear_z": 5 / 6}  # fmt: skip
+    beam = Frame("beam", translation=[L, 0, 0], link=BeamLink(section, E, 0.0))
+    C = platform_stiffness(serial(beam)).compliance
+    bend, slope = L**3 / (3 * E * inertia) + 1.2 * L / (G * A), L**2 / (2 * E * inertia)
+    expected = np.diag([L / (G * J), *[L / (E * inertia)] * 2, L / (E * A), bend, bend])
+    expected[1, 5] = expected[5, 1] = -slope
+    expected[2, 4] = expected[4, 2] = slope
+    assert_same_matrix(C, expected, 1e-12)
+
+
+def test_a_chain_is_the_sum_of_its_parts():
+    """C = sum of X C_i X', each part moved to the tip: a serial arm."""
+    rng = np.random.default_rng(1)
+    frames, expected = [], np.zeros((6, 6))
+    steps, springs = rng.normal(size=(3, 3)), []
+    for k, step in enumerate(steps):
+        B = rng.normal(size=(6, 6))
+        springs.append(B @ B.T + np.eye(6))
+        frames.append(Frame(f"f{k}", translation=step, link=MatrixLink(springs[-1])))
+    for k, K in enumerate(springs):
+        X = screw_map(-steps[k + 1 :].sum(axis=0))
+        expected += X @ np.linalg.inv(K) @ X.T
+    answer = platform_stiffness(serial(*frames))
+    assert_same_matrix(answer.compliance, expected, 1e-12)
+    assert_same_matrix(answer.stiffness, np.linalg.inv(expected), 1e-9)
+
+
+@pytest.mark.parametrize("pose", [{}, {"tx": 0.03, "tz": 0.5, "ry": 0.2}])
+def test_a_gough_platform_is_the_sum_over_its_struts(pose):
+    """K = sum of k w w', w the unit wrench of a strut's line (Merlet 2006, 4.2)."""
+    P = HexapodParameters()
+    posture = place_robot(hexapod(), pose) if pose else home_posture(hexapod())
+    base, platform = points()
+    ends = posture.platform[:3, 3] + platform @ posture.platform[:3, :3].T
+    K = np.zeros((6, 6))
+    area = np.pi * (P.radius**2 - P.inner_radius**2)
+    tube = P.young * area / np.linalg.norm(base - platform - [0, 0, P.height], axis=1)
+    for a, b, k_tube in zip(base, ends, tube, strict=True):
+        along = (b - a) / np.linalg.norm(b - a)
+        line = np.concatenate([np.cross(b - posture.platform[:3, 3], along), along])
+        K += np.outer(line, line) / (1 / P.drive + 1 / k_tube)
+    assert_same_matrix(platform_stiffness(posture).stiffness, K, 1e-9)
+
+
+@pytest.mark.parametrize("name", ["3rrr", "delta"])
+def test_a_machine_of_three_equal_legs_looks_the_same_turned_by_a_third(name):
+    K = platform_stiffness(home_posture(load_robot(name))).stiffness
+    turn = np.array([[-1, -np.sqrt(3), 0], [np.sqrt(3), -1, 0], [0, 0, 2]]) / 2
+    X = np.kron(np.eye(2), turn)
+    assert_same_matrix(X @ K @ X.T, K, 1e-9)
+
+
+def test_the_orthoglide_is_isotropic_at_home():
+    """Wenger and Chablat designed it so: k I for forces, no coupling."""
+    K = platform_stiffness(home_posture(load_robot("orthoglide"))).stiffness
+    assert_same_matrix(K, np.diag([K[0, 0]] * 3 + [K[3, 3]] * 3), 1e-9)
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "hexapod", "four_bar", "delta", "arm6"])
+def test_the_work_of_a_small_load_is_twice_its_energy(name):
+    """The least energy under a load is w.Cw/2: another solver, with its certificate."""
+    robot = load_robot(name)
+    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    posture = home_posture(replace(robot, frames=frames))
+    C = platform_stiffness(posture).compliance
+    for row in range(6):
+        moved = solve_assembly(posture, UNIT[row]).platform_screw
+        size = np.sqrt(np.diag(C) * C[row, row])
+        np.testing.assert_allclose(moved / size, C[row] / size, atol=1e-8)
+
+
+def differences(solve, posture, load, step):
+    """(6, 6) central differences of the platform screw by the load; its last screw."""
+    columns = []
+    for row in range(6):
+        ahead, back = (
+            solve(posture, load + sign * step[row] * UNIT[row]).platform_screw
+            for sign in (1, -1)
+        )
+        columns.append((ahead - back) / (2 * step[row]))
+    return np.column_stack(columns)
+
+
+def as_small_motion(C, screw):
+    """From changes of the rotation vector and work m.theta to small turns."""
+    J = np.eye(6)
+    J[:3, :3] = turn_jacobian(screw[:3])
+    return J @ C @ J.T
+
+
+LOAD = np.array([3.0, -5.0, 2.0, 150.0, 80.0, -200.0])
+
+
+@pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda case: case["name"])
+def test_the_tangent_of_the_paper_robot_is_the_difference_of_its_equilibria(case):
+    """At the paper's full errors, clearances pressed: internal forces count.
+
+    The cone solver stops at a gap of 1e-8 of the energy, which leaves 1e-4 in screws;
+    the exact equilibrium is solved to rounding.
+    """
+    posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
+    linear, exact = solve_assembly(posture, LOAD), solve_exact(posture, LOAD)
+    assert contacts(linear)[0].any()
+    step = np.array([1e-2] * 3 + [1e-1] * 3)
+    C = platform_stiffness(posture, "in contact", LOAD).compliance
+    assert_same_matrix(C, differences(solve_assembly, posture, LOAD, step), 1e-4)
+    C = platform_stiffness(posture, "exact", LOAD).compliance
+    by_load = differences(solve_exact, posture, LOAD, step)
+    assert_same_matrix(C, as_small_motion(by_load, exact.platform_screw), 1e-5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_tangent_of_random_robots_is_the_difference_of_their_equilibria(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=3)
+    posture = home_posture(robot.with_errors(0.3 * robot.errors))
+    load = rng.normal(size=6) * [1, 1, 1, 20, 20, 20]
+    exact = solve_exact(posture, load)
+    answer = platform_stiffness(posture, "exact", load)
+    step = 1e-4 * np.array([1, 1, 1, 20, 20, 20])
+    by_load = differences(solve_exact, posture, load, step)
+    by_load = as_small_motion(by_load, exact.platform_screw)
+    finite = np.isfinite(answer.compliance).all(axis=0)
+    assert finite.any()
+    part = np.ix_(finite, finite)
+    assert_same_matrix(answer.compliance[part], by_load[part], 1e-4)
+
+
+def test_read_at_another_point_power_is_the_same():
+    """w . s does not depend on where both are read: C moves by X C X'."""
+    posture = home_posture(load_robot("irsbot2"))
+    here, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
+    there = platform_stiffness(posture, at=r)
+    X = screw_map(-r)  # the platform's axes are the base's here
+    assert_same_matrix(there.compliance, X @ here.compliance @ X.T, 1e-12)
+    K = np.linalg.inv(X).T @ here.stiffness @ np.linalg.inv(X)
+    assert_same_matrix(there.stiffness, K, 1e-9)
+    np.testing.assert_allclose(there.centre, here.centre, atol=1e-9)
+
+
+def test_the_centre_of_a_spring_is_where_it_sits():
+    """A link of diagonal stiffness, carried on by a rigid arm: centred at its tip."""
+    K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
+    spring = Frame("spring", translation=[0.3, 0.1, 0.2], link=MatrixLink(K))
+    arm = Frame("arm", translation=[0.5, -0.4, 0.1])
+    np.testing.assert_allclose(
+        platform_stiffness(serial(spring, arm)).centre, [0.3, 0.1, 0.2], atol=1e-9
+    )
+
+
+def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_own():
+    """Rotations count as length times angle: k / length^2."""
+    K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
+    spring = Frame("spring", translation=[0.5, 0, 0], link=MatrixLink(K))
+    eigen = platform_stiffness(serial(spring)).eigen
+    np.testing.assert_allclose(
+        eigen.values, [20 / 0.25, 30 / 0.25, 40 / 0.25, 1e4, 2e4, 3e4]
+    )
+
+
+def test_shares_are_of_the_whole_and_a_lone_link_has_all_of_it():
+    answer = platform_stiffness(home_posture(load_robot("irsbot2")))
+    for row in range(6):
+        assert sum(answer.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
+    whole = sum(answer.contributions().values())
+    assert_same_matrix(whole, answer.compliance, 1e-12)
+    beam = Frame("beam", translation=[1, 0, 0], link=MatrixLink(UNIT))
+    alone = platform_stiffness(serial(beam))
+    assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
+
+
+def test_a_stiffer_material_lowers_the_compliance_by_the_link_s_share():
+    """dC = -C_i dE/E (Castigliano): differences of Young's modulus."""
+    robot = load_robot("orthoglide")
+    posture = place_robot(robot, {"tx": 0.03, "ty": -0.02})
+    part, by = platform_stiffness(posture).contributions(), 1e-4
+    name = next(p.frame for p in part if p.kind == "link")
+    scaled = []
+    for factor in (1 + by, 1 - by):
+        link = robot.frame(name).link
+        other = robot.with_links({name: replace(link, young=factor * link.young)})
+        there = place_robot(other, {"tx": 0.03, "ty": -0.02})
+        scaled.append(platform_stiffness(there).compliance)
+    slope = (scaled[0] - scaled[1]) / (2 * by)
+    size = np.sqrt(np.diag(platform_stiffness(posture).compliance))
+    size = np.outer(size, size)
+    np.testing.assert_allclose(
+        slope / size, -part[Part(name, "link")] / size, atol=1e-7
+    )
+
+
+def test_a_motion_that_nothing_resists_is_named_and_has_no_number():
+    """A slide along x on a spring: TX is free, what does not touch it is the spring."""
+    K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
+    spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
+                   link=MatrixLink(K))  # fmt: skip
+    answer = platform_stiffness(serial(spring, Frame("tip")))
+    np.testing.assert_allclose(np.abs(answer.free), UNIT[:, [3]], atol=1e-12)
+    touched = np.isnan(answer.compliance)
+    assert touched[3].all()
+    assert touched[:, 3].all()
+    assert not np.delete(np.delete(touched, 3, 0), 3, 1).any()
+    np.testing.assert_allclose(answer.stiffness[3], 0.0, atol=1e-6)
+    assert answer.eigen.values[0] == 0.0
+    assert answer.along(UNIT[3])[0] == 0.0
+    assert np.isnan([*answer.shares(UNIT[3]).values()]).all()
+
+
+def test_a_rigid_direction_has_no_compliance_and_no_finite_stiffness():
+    """A hinge with a torsion spring, a rigid arm along x: RZ and TY move together."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
+    answer = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
+    screw = np.array([0, 0, 1, 0, 0.4, 0])
+    np.testing.assert_allclose(answer.compliance, np.outer(screw, screw) / 50.0)
+    K = answer.stiffness
+    assert np.isnan(K[2]).all()
+    assert np.isnan(K[4]).all()
+    assert answer.along(UNIT[4]) == (pytest.approx(50.0 / 0.4**2), np.inf)
+    assert answer.eigen.condition == np.inf
+
+
+def test_a_column_on_a_torsion_spring_buckles_at_its_critical_load():
+    """Rigid bar of length L on a spring k under a dead force F: k/L^2 - F/L."""
+    k, L = 50.0, 0.4
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
+    posture = serial(hinge, Frame("arm", translation=[L, 0, 0]))
+    for share in (0.5, 0.99, 1.5, -1.0):
+        load = [0, 0, 0, -share * k / L, 0, 0]
+        answer = platform_stiffness(posture, "exact", load)
+        expected = k / L**2 * (1 - share)
+        assert answer.along(UNIT[4])[0] == pytest.approx(expected, rel=1e-9)
+        assert answer.stable == (share < 1)
+        shares = answer.shares(UNIT[4])
+        assert sum(shares.values()) == pytest.approx(1.0)
+        assert shares["", "forces"] == pytest.approx(-share / (1 - share))
+
+
+@pytest.mark.parametrize("state", ["in contact", "exact"])
+def test_a_pin_in_a_hole_holds_across_and_rolls_along_its_rim(state):
+    """Pressed by F with a radial clearance c it gives way along the rim as F/c."""
+    force, c, k = 30.0, 1e-3, 1e5
+    K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c turns nothing
+    clearance = Clearance(radial=c)
+    spring = Frame("spring", link=MatrixLink(K), clearance=clearance)
+    posture = serial(spring, Frame("tip"))
+    load = [0, 0, 0, force, 0, 0]
+    answer = platform_stiffness(posture, state, load)
+    across, along = (answer.along(UNIT[row])[0] for row in (3, 4))
+    assert across == pytest.approx(k, rel=1e-6)
+    assert along == pytest.approx(1 / (1 / k + c / force), rel=1e-6)
+    assert answer.along(UNIT[5])[0] == pytest.approx(k, rel=1e-9)
+
+
+@pytest.mark.parametrize("state", ["in contact", "exact"])
+def test_within_its_clearance_nothing_holds_the_platform(state):
+    K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
+    spring = Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=1e-4))
+    posture = serial(spring, Frame("tip"))
+    answer = platform_stiffness(posture, state)
+    assert answer.along(UNIT[5])[0] == 0.0
+    assert answer.along(UNIT[3])[0] == pytest.approx(1e5)
+    np.testing.assert_allclose(np.abs(answer.free), UNIT[:, [5]], atol=1e-12)
+
+
+@pytest.mark.parametrize("state", ["in contact", "exact"])
+def test_both_sides_of_a_change_of_contact(state):
+    """An error just takes up the play: against the stop rigid, away from it a spring.
+
+    The stop is met without a force, so both are true, each for one sense of the load.
+    """
+    K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
+    frames = (
+        Frame("bush", clearance=Clearance(axial=1e-4)),
+        Frame("tip", "bush", geometric_error=[0, 0, 0, 0, 0, 1e-4]),
+        Frame("spring", link=MatrixLink(K)),
+        Frame("other", "spring"),
+    )
+    posture = home_posture(Robot("pair", "tip", frames, (("tip", "other"),)))
+    stop = platform_stiffness(posture, state, side="holding")
+    away = platform_stiffness(posture, state, side="letting go")
+    assert stop.along(UNIT[5])[0] == np.inf
+    assert away.along(UNIT[5])[0] == pytest.approx(1e5)
+
+
+def test_an_unknown_state_and_a_direction_that_is_none_are_refused():
+    posture = home_posture(load_robot("four_bar"))
+    with pytest.raises(ValueError, match="no state"):
+        platform_stiffness(posture, "loose")
+    with pytest.raises(ValueError, match="not all 0"):
+        platform_stiffness(posture).shares(np.zeros(6))

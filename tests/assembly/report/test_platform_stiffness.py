@@ -1,0 +1,62 @@
+"""What ``assembly stiffness`` answers: its keys, its sums, its statuses."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.report.platform_stiffness import (
+    DIRECTIONS,
+    draw_shares,
+    stiffness_of,
+    stiffness_text,
+)
+from assembly.robots import load_robot
+
+
+def total(shares):
+    """Sum of all shares of a direction."""
+    return shares.get("forces", 0.0) + sum(
+        value
+        for kind in ("links", "joints", "clearances")
+        for value in shares.get(kind, {}).values()
+    )
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_shares_add_up_to_one_in_every_direction(exact):
+    load = [0, 0, 0, 10.0, -20.0, -50.0]
+    posture = home_posture(load_robot("hexapod"))
+    results = stiffness_of(posture, load, exact=exact)
+    assert results["status"] == "ok"
+    for name in DIRECTIONS:
+        assert total(results["shares"][name]) == pytest.approx(1.0, rel=1e-9)
+    C, K = np.array(results["compliance"]), np.array(results["stiffness"])
+    np.testing.assert_allclose(C @ K, np.eye(6), atol=1e-6)
+
+
+def test_a_free_motion_is_named_and_leaves_the_other_entries():
+    slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
+    tip = Frame("tip", "slide")
+    results = stiffness_of(home_posture(Robot("slider", "tip", (slide, tip))))
+    assert results["status"] == "free motion"
+    np.testing.assert_allclose(results["free_motions"], [[0, 0, 0, 0, 0, 1]])
+    C = np.array(results["compliance"])
+    assert np.isnan(C[5]).all()
+    np.testing.assert_allclose(C[:5, :5], np.eye(5), atol=1e-12)
+    assert "free motion: [0 0 0 0 0 1]" in stiffness_text(results)
+
+
+def test_a_load_that_nothing_carries_is_said_to_be_one():
+    slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
+    posture = home_posture(Robot("slider", "tip", (slide, Frame("tip", "slide"))))
+    results = stiffness_of(posture, [0, 0, 0, 0, 0, 1.0], exact=True)
+    assert results["status"] == "no equilibrium"
+    assert "no equilibrium" in stiffness_text(results)
+
+
+def test_the_chart_has_a_bar_for_each_part_and_direction():
+    results = stiffness_of(home_posture(load_robot("four_bar")))
+    (axes,) = draw_shares(results).axes
+    heights = [bar.get_height() for bar in axes.patches]
+    np.testing.assert_allclose(sum(heights), 600.0)

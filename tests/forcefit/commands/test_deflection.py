@@ -1,0 +1,50 @@
+"""The command ``forcefit assembly deflection``."""
+
+import json
+
+import pytest
+
+
+def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
+    picture = tmp_path / "curve.svg"
+    status, out, _ = run(
+        "assembly", "deflection", "hexapod", "--along", "fz=-100:100:50", "--json",
+        "-", "-o", str(picture),
+    )  # fmt: skip
+    answer = json.loads(out)
+    assert status == 0
+    assert answer["loads"] == [-100.0, -50.0, 0.0, 50.0, 100.0]
+    assert answer["free_play"] == [False, False, True, False, False]
+    assert answer["stiffness"][4] == pytest.approx(7.144e7, rel=1e-3)
+    assert answer["deflection"][4] == pytest.approx(-answer["deflection"][0], rel=1e-6)
+    assert {event["kind"] for event in answer["events"]} == {"contact", "release"}
+    assert picture.stat().st_size > 1000
+
+
+def test_back_is_the_same_way_where_nothing_is_lost(run):
+    status, out, _ = run(
+        "assembly", "deflection", "four_bar", "--along", "fx=100:300:100", "--back",
+        "--exact", "--json", "-",
+    )  # fmt: skip
+    answer = json.loads(out)
+    assert status == 0
+    assert answer["loads"] == [100.0, 200.0, 300.0, 200.0, 100.0]
+    there = answer["deflection"]
+    assert there[0] == pytest.approx(there[4], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("along", "message"),
+    [
+        ("fz", "--along: found 'fz', expected COMPONENT=FROM:TO:STEP"),
+        ("fq=0:1:1", '--along: unknown component "fq"'),
+        ("fz=0:1:0", "expected a change and a step"),
+        ("fz=0:inf:1", "expected finite numbers"),
+        ("fz=0:1e9:1", "expected at most 10000"),
+    ],
+)
+def test_what_is_no_path_of_loads_is_refused(run, along, message):
+    status, out, err = run("assembly", "deflection", "four_bar", "--along", along)
+    assert status == 2
+    assert out == ""
+    assert message in err
