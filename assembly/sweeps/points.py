@@ -23,6 +23,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.sweeps.situations import (
@@ -234,6 +235,8 @@ def _solve_reached(
         _bound_play(perfect, T, off, found, rows)
     if question.reading is not None and good:
         _bound(question, robot, T, errors, off, energies, found, rows)
+    if question.stiffness:
+        _note_stiffness(robot, T, off, found, rows)
     if question.linearisation:
         for i in good:
             _compare_finite(here, i, found, int(rows[i]))
@@ -256,6 +259,25 @@ def _note_singularities(
             found.texts["near_singularity"].update(
                 dict.fromkeys(rows[run].tolist(), names[i])
             )
+
+
+def _note_stiffness(
+    robot: Robot, T: NDArray, off: NDArray, found: Found, rows: NDArray
+) -> None:
+    """K_C once a posture; errors do not change it, draws of a posture share it."""
+    runs = list(_runs(T.reshape(len(T), -1)))
+    starts = [run.start for run in runs]
+    answer = platform_stiffnesses(robot, T[starts], off[starts])
+    along = np.stack([answer.along(axis) for axis in np.eye(6)], axis=1)
+    by_axis = [list(answer.shares(axis).values()) for axis in np.eye(6)]
+    shares = np.array(by_axis).transpose(2, 1, 0)
+    out = found.records
+    for i, run in enumerate(runs):
+        out["compliance"][rows[run]] = answer.compliance[i]
+        out["stiffness"][rows[run]] = along[i]
+        out["eigen_stiffness"][rows[run]] = answer.eigen_stiffnesses[i]
+        out["stiffness_condition"][rows[run]] = answer.condition[i]
+        out["share"][rows[run]] = shares[i]
 
 
 def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:

@@ -50,6 +50,7 @@ def ask_sweep(
     load: Sequence[float] = (0.0,) * 6,
     gravity: Sequence[float] = (0.0,) * 3,
     under: Mapping[str, float] | None = None,
+    stiffness: bool = False,
 ) -> Sweep:
     """The sweep that options of ``forcefit assembly sweep`` ask for.
 
@@ -70,6 +71,7 @@ def ask_sweep(
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
+        stiffness: also K_C and the shares of its parts, clearances held at zero.
 
     Returns:
         The sweep, everything in it checked.
@@ -120,6 +122,7 @@ def ask_sweep(
         machine, design, tuple(varied), targets.names, sources, seed,
         None if reading == "none" else reading, play_alone, tuple(wrench),
         linearisation, near, yield_strength, tuple(load), tuple(gravity), under,
+        stiffness,
     )  # fmt: skip
     _check_readings(question)
     return Sweep(
