@@ -6,10 +6,6 @@ from typing import Annotated
 
 import typer
 
-import forcefit.commands.deflection  # adds its command
-import forcefit.commands.platform_stiffness  # likewise
-import forcefit.commands.statistics  # likewise
-import forcefit.commands.sweep  # likewise
 from forcefit.commands import assembly, stiffness, validation
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars

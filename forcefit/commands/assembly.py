@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.deflection import deflection
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -23,7 +24,10 @@ from forcefit.commands.options import (
     parse_vector,
     posture_of,
 )
+from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.progress import one_thread
+from forcefit.commands.statistics import statistics, tolerances
+from forcefit.commands.sweep import plot, sweep
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import (
     PIXELS,
@@ -250,3 +254,7 @@ def show(
     else:
         save_pixels(plotter.screenshot(return_img=True), output)
     plotter.close()
+
+
+for command in (stiffness, deflection, statistics, tolerances, sweep, plot):
+    app.command()(command)

@@ -1,7 +1,4 @@
-"""The command ``forcefit assembly deflection``.
-
-Importing this module adds it to the application.
-"""
+"""The command ``forcefit assembly deflection``."""
 
 import math
 from pathlib import Path
@@ -9,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -30,7 +26,6 @@ from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_
 _MOST = 10_000  # loads of a curve
 
 
-@app.command()
 def deflection(
     robot: RobotArgument,
     along: Annotated[

@@ -1,14 +1,10 @@
-"""The command ``forcefit assembly stiffness``.
-
-Importing this module adds it to the application.
-"""
+"""The command ``forcefit assembly stiffness``."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -28,7 +24,6 @@ from forcefit.inputs.errors import checked
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
 
-@app.command()
 def stiffness(
     robot: RobotArgument,
     pose: PoseOption = None,
