@@ -33,6 +33,7 @@ _OWNERS = {
     "assembly.platform_stiffness.deflection": ("load_deflection",),
     "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
+    "assembly.platform_stiffness.vibration": ("natural_modes",),
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),

@@ -32,7 +32,7 @@ _NOISE = 1e-12
 _STILL = 1e-9  # [-] of a unit wrench's work on a free motion that counts as none
 
 
-@kernel
+@kernel(fastmath={"contract", "reassoc"})
 def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
     """Scaled deformation of every spring under a unit wrench.
 
@@ -57,7 +57,7 @@ def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
         out[c] = total
 
 
-@kernel
+@kernel(fastmath={"contract", "reassoc"})
 def pulls(s: Structure, closing: NDArray, pull: NDArray) -> None:
     """The closures' wrench on frames of each pattern, into all rows but the last."""
     for g in range(len(s.patterns)):
@@ -69,7 +69,7 @@ def pulls(s: Structure, closing: NDArray, pull: NDArray) -> None:
                     pull[g, a] += sign * closing[6 * k + a]
 
 
-@kernel
+@kernel(fastmath={"contract", "reassoc"})
 def hold_free_motions(
     s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
     order: NDArray, rank: int, row: int, closing: NDArray,
@@ -93,7 +93,7 @@ def hold_free_motions(
     return True
 
 
-@kernel
+@kernel(fastmath={"contract", "reassoc"})
 def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     """One posture: every spring under six unit wrenches, or why there is no answer.
 
@@ -155,7 +155,7 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     return SOLVED
 
 
-@kernel
+@kernel(fastmath={"contract", "reassoc"})
 def comply_all(
     s: Structure, T: NDArray, mismatch: NDArray, out: NDArray, road: NDArray
 ) -> None:

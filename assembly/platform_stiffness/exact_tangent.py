@@ -54,15 +54,15 @@ def exact_tangent(answer: ExactAssembly, side: Side = "holding") -> PlatformStif
     flat = np.abs(curvature) <= _FLAT * np.abs(curvature).max(initial=0.0)
     modes = model.units[:, None] * (Q @ turned)
     bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))
-    moves, length = _platform_moves(local), model.size
+    moves, length = platform_moves(local), model.size
     return PlatformStiffness(
         answer.posture, "exact", at.platform[:3, 3].copy(), length, moves @ bent,
-        np.sign(curvature[~flat]), bent[model.springs], _owners(answer),
+        np.sign(curvature[~flat]), bent[model.springs], part_owners(answer),
         unit_screws(moves @ modes[:, flat], length),
     )  # fmt: skip
 
 
-def _owners(answer: ExactAssembly) -> tuple[Part, ...]:
+def part_owners(answer: ExactAssembly) -> tuple[Part, ...]:
     """Whose springs they are; pieces belong to their beam."""
     cut, frames = answer.cut, answer.posture.robot.frames
     parts = owners(answer.expansion.placement.model.joints)
@@ -72,7 +72,7 @@ def _owners(answer: ExactAssembly) -> tuple[Part, ...]:
     )
 
 
-def _platform_moves(local: Expansion) -> NDArray:
+def platform_moves(local: Expansion) -> NDArray:
     """(6, N) small motion of the platform at its present origin, base axes."""
     rows = local.placement.platform_rows.copy()
     rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]

@@ -133,31 +133,23 @@ def platform_stiffnesses(
     road = np.zeros(len(T), dtype=np.int64)
     comply_all(structure, T, off, inner, road)
     size = size_of(robot)
-    # the kernel's forces act on translations in reference lengths
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
+    # the kernel's forces act on translations in reference lengths
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
-    springs[:, _alone(joints.elastic.shape[1], structure.spring_order)] = np.nan
-    _add_trunk(robot, T, joints.elastic, springs)
+    alone = np.setdiff1d(np.arange(springs.shape[1]), structure.spring_order)
+    springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
     for i in np.flatnonzero(road != SOLVED).tolist():
         q = np.full(len(robot.frames), np.nan)
         one = without_clearance(Posture(robot, q, T[i], float(off[i])))
-        springs[i] = one.springs @ one.root.T if not one.free.size else np.nan
+        springs[i] = np.nan if one.free.size else one.springs @ one.root.T
     return Stiffnesses(robot, size, springs, tuple(owners(joints)), road != SOLVED)
 
 
-def _alone(count: int, acting: NDArray) -> NDArray:
-    """Places of the springs that are in no closure."""
-    return np.setdiff1d(np.arange(count), acting)
-
-
-def _add_trunk(robot: Robot, T: NDArray, elastic: NDArray, springs: NDArray) -> None:
-    """Springs in no closure carry the platform's wrench alone, or nothing."""
-    lone = np.flatnonzero(np.isnan(springs).all(axis=(0, 2))) if len(T) else ()
-    if not len(lone):
-        return
+def _outside_closures(robot: Robot, T: NDArray, columns: NDArray) -> NDArray:
+    """(k, s, 6) springs in no closure: the platform's wrench alone acts, or nothing."""
     i = robot.index(robot.platform)
     paths = screw_map(T[:, :, :3, 3] - T[:, None, i, :3, 3], T[:, :, :3, :3])
     paths = paths * robot.on_path[i][:, None, None]
-    blocks = elastic[:, lone].reshape(len(robot.frames), 6, len(lone))
-    springs[:, lone] = np.einsum("knij,njs->ksi", paths, blocks)
+    blocks = columns.reshape(len(robot.frames), 6, columns.shape[1])
+    return np.einsum("knij,njs->ksi", paths, blocks)

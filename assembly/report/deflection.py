@@ -83,9 +83,10 @@ def deflection_text(results: dict[str, Any]) -> str:
     lines.append("".join(f"{text:>20s}" for text in head))
     count = len(results["loads"])
     for i in sorted({round(k) for k in np.linspace(0, count - 1, min(count, _ROWS))}):
+        moved = rounded(1e3 * results["deflection"][i])
         lines.append(
-            f"{results['loads'][i]:20.6g}{rounded(1e3 * results['deflection'][i]):20.6g}"
-            f"{results['stiffness'][i]:20.6g}{len(results['contacts'][i]):20d}"
+            f"{results['loads'][i]:20.6g}{moved:20.6g}{results['stiffness'][i]:20.6g}"
+            f"{len(results['contacts'][i]):20d}"
             + ("  free play" if results["free_play"][i] else "")
         )
     for event in results["events"]:

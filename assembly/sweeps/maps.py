@@ -29,6 +29,10 @@ _PAPER = (
 )
 _RIGID = ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
 _SAFETY = ("safety", 1.0, "yield strength over peak stress [-]", "viridis")
+_STIFFNESS = (
+    ("softest", 1e-6, "softest eigen-stiffness [N/um]", "viridis"),
+    ("stiffness_condition", 1.0, "condition of the stiffness [-]", "magma_r"),
+)
 
 Panel = tuple[str, float, str, str]
 
@@ -232,11 +236,14 @@ def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     """The panels whose variables a data set has."""
     if "rotation_error_play" in data:
         return _PAPER
-    return (*_PAPER[:4], _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
+    middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
+    return (*_PAPER[:2], *middle, _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A variable; for pose errors the upper bound, or the size of half the screw."""
+    """A variable; for pose errors the upper bound, or else half the platform screw."""
+    if key == "softest":
+        return data["eigen_stiffness"].isel(eigen=0, drop=True)
     halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
     if key not in halves:
         return data[key].sel(bound="upper", drop=True) if "play" in key else data[key]

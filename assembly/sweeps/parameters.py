@@ -53,7 +53,13 @@ class Design:
     @cached_property
     def paths(self) -> list[str]:
         """Full paths of all numbers."""
-        return [path for path, _ in _numbers(copy.deepcopy(self.content))]
+        return list(self.values)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """All numbers by their full path."""
+        numbers = _numbers(copy.deepcopy(self.content))
+        return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
         """Full paths that a path matches.
@@ -89,7 +95,7 @@ class Design:
             BadInput: a path leads to no number.
         """
         content = copy.deepcopy(self.content)
-        setters = dict(_numbers(content))
+        setters = {path: setter for path, _, setter in _numbers(content)}
         for path, value in values.items():
             for full in self.find(path):
                 setters[full](float(value))
@@ -157,8 +163,8 @@ def unit_of(path: str) -> str:
     return _UNITS.get(key, _UNITS.get(above, "SI"))
 
 
-def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
-    """Path and setter of every number; absent ones that mean zero are inserted."""
+def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
+    """Path, value, setter of every number; absent ones that mean zero are put there."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -168,25 +174,23 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
         yield from _inside(frame["name"], frame)
 
 
-def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, Setter]]:
+def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
     """Numbers of a table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):
-            yield path_of_key, _setter(table, key)
+            yield path_of_key, value, _setter(table, key)
         elif isinstance(value, dict):
             yield from _inside(path_of_key, value)
         elif isinstance(value, list) and len(value) in _AXES:
             axes = _AXES[len(value)]
             for i, name in enumerate(axes):
                 if _is_number(value[i]):
-                    yield f"{path_of_key}.{name}", _setter(value, i)
+                    yield f"{path_of_key}.{name}", value[i], _setter(value, i)
                 elif isinstance(value[i], list) and len(value[i]) == len(axes):
                     for j, other in enumerate(axes):
-                        yield (
-                            f"{path_of_key}.{name}.{other}",
-                            _setter_of_two(value, i, j),
-                        )
+                        whose = f"{path_of_key}.{name}.{other}"
+                        yield whose, value[i][j], _setter_of_two(value, i, j)
 
 
 def _is_number(value: object) -> bool:

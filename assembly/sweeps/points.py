@@ -25,6 +25,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.point_conditions import (
     assemble_rows,
@@ -243,6 +244,8 @@ def _solve_reached(
             robot, T, question.reading, errors, mismatch, energies
         )
         _record_bounds(bounds, solved, rows)
+    if question.stiffness:
+        _record_stiffness(robot, T, mismatch, solved, rows)
     if question.linearisation:
         for i in ok:
             _compare_finite(conditions, i, solved, int(rows[i]))
@@ -265,6 +268,25 @@ def _note_singularities(
             solved.texts["near_singularity"].update(
                 dict.fromkeys(rows[run].tolist(), names[i])
             )
+
+
+def _record_stiffness(
+    robot: Robot, T: NDArray, mismatch: NDArray, solved: SolvedPoints, rows: NDArray
+) -> None:
+    """K_C once a posture; errors do not change it, draws of a posture share it."""
+    runs = list(_runs(T.reshape(len(T), -1)))
+    starts = [run.start for run in runs]
+    answer = platform_stiffnesses(robot, T[starts], mismatch[starts])
+    along = np.stack([answer.along(axis) for axis in np.eye(6)], axis=1)
+    by_axis = [list(answer.shares(axis).values()) for axis in np.eye(6)]
+    shares = np.array(by_axis).transpose(2, 1, 0)
+    out = solved.records
+    for i, run in enumerate(runs):
+        out["compliance"][rows[run]] = answer.compliance[i]
+        out["stiffness"][rows[run]] = along[i]
+        out["eigen_stiffness"][rows[run]] = answer.eigen_stiffnesses[i]
+        out["stiffness_condition"][rows[run]] = answer.condition[i]
+        out["share"][rows[run]] = shares[i]
 
 
 def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:

@@ -50,6 +50,7 @@ def ask_sweep(
     load: Sequence[float] = (0.0,) * 6,
     gravity: Sequence[float] = (0.0,) * 3,
     under: Mapping[str, float] | None = None,
+    stiffness: bool = False,
 ) -> Sweep:
     """The sweep of the options of ``forcefit assembly sweep``, by their names.
 
@@ -70,6 +71,7 @@ def ask_sweep(
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
+        stiffness: also K_C and the shares of its parts, clearances held at zero.
 
     Returns:
         The sweep, everything in it checked.
@@ -132,6 +134,7 @@ def ask_sweep(
         load=tuple(load),
         gravity=tuple(gravity),
         under=under,
+        stiffness=stiffness,
     )
     _check_readings(question)
     return Sweep(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.deflection import deflection
+from forcefit.commands.frequencies import frequencies
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -257,5 +258,7 @@ def show(
     plotter.close()
 
 
-for command in (stiffness, deflection, statistics, tolerances, sweep, plot):
+for command in (
+    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+):  # fmt: skip
     app.command()(command)

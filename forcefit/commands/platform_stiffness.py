@@ -1,7 +1,7 @@
 """The command ``forcefit assembly stiffness``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,7 @@ from forcefit.commands.options import (
     RobotArgument,
     UnderOption,
     declared_posture,
+    parse_assignments,
     parse_covariates,
     parse_gravity,
     parse_load,
@@ -22,6 +23,9 @@ from forcefit.commands.options import (
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.errors import checked
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 def stiffness(
@@ -46,6 +50,10 @@ def stiffness(
     length: Annotated[
         float | None,
         typer.Option(help="[m] by which angles are multiplied in eigen-stiffnesses."),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option(help="Also dC by a number of the robot file, by its path."),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Bar chart of the shares.")
@@ -73,10 +81,34 @@ def stiffness(
         results = stiffness_of(
             applied.posture, applied.load, applied.gravity, point, exact, length
         )
+        if by:
+            results["slopes"] = _slopes(robot, by, pose, joint, point)
     write_json(results, json)
     if json != "-":
         print(stiffness_text(results))
+        for path, slope in results.get("slopes", {}).items():
+            print(f"dC/d({path}), diagonal: {slope.diagonal()}")
     if output is not None and "shares" in results:
         save_figure(draw_shares(results), output)
     if results["status"] != "ok":
         raise typer.Exit(1)
+
+
+def _slopes(
+    robot: str,
+    by: list[str],
+    pose: list[str] | None,
+    joint: list[str] | None,
+    point: list[float],
+) -> "dict[str, NDArray]":
+    """Derivatives of the classical compliance, posture kept."""
+    import numpy as np
+
+    from assembly.sweeps.parameters import load_design
+    from assembly.sweeps.stiffness_slopes import stiffness_slopes
+
+    return stiffness_slopes(
+        load_design(robot), by,
+        parse_assignments(pose, "--pose") if pose else None,
+        parse_assignments(joint, "--joint") if joint else None, np.array(point),
+    )  # fmt: skip

@@ -13,6 +13,7 @@ from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.worst_clearance import worst_error_slopes
@@ -38,6 +39,7 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
         lambda: bound_pose_error(solve_assembly(posture)),
         lambda: minimise_energies(robot, T),
         lambda: zone_margins(robot, T),
+        lambda: platform_stiffnesses(robot, T),
         lambda: bound_pose_errors(robot, T),
         lambda: prepare_margins(posture).solve(errors[None]),
         lambda: position_clearances(prepared, perfect, "uniform", rngs),

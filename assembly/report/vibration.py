@@ -1,0 +1,78 @@
+"""Natural frequencies for machines and for people."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.report.results import failure_status
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import numbers
+
+_NAMED = 3  # parts of a mode that people are told
+
+
+def vibration_of(
+    posture: Posture,
+    count: int = 6,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    exact: bool = False,
+) -> dict[str, Any]:
+    """Everything ``assembly frequencies`` reports, as plain values.
+
+    Args:
+        posture: where the robot stands.
+        count: modes at most.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        exact: whether around the equilibrium with errors, clearances and loads.
+
+    Returns:
+        Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"`` or
+        ``"unstable"``, or says why there is no equilibrium.
+
+    Raises:
+        BadInput: nothing that moves has a mass.
+    """
+    results: dict[str, Any] = {
+        "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
+        "exact": exact,
+    }  # fmt: skip
+    try:
+        modes = natural_modes(posture, count, load, gravity, exact)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return results | {"status": failure_status(error), "reason": str(error)}
+    if np.isnan(modes.frequencies).any():
+        results["status"] = "unstable"
+    elif (modes.frequencies == 0.0).any():
+        results["status"] = "free motion"
+    return results | {
+        "frequencies": modes.frequencies,
+        "modes": [
+            {
+                "frequency": float(frequency),
+                "platform_screw": screw,
+                "shares": {f"{p.frame} {p.kind}": share for p, share in shares.items()},
+            }
+            for frequency, screw, shares in zip(
+                modes.frequencies, modes.platform_screws.T, modes.shares, strict=True
+            )
+        ],
+    }
+
+
+def vibration_text(results: dict[str, Any]) -> str:
+    """Frequencies for people, with the parts that bend most."""
+    lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    if "modes" not in results:
+        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
+    for mode in results["modes"]:
+        most = list(mode["shares"].items())[:_NAMED]
+        said = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
+        lines.append(f"{mode['frequency']:12.6g} Hz  {said or 'nothing resists'}")
+    return "\n".join(lines)

@@ -1,0 +1,116 @@
+"""K_C of random robots by several roads.
+
+``python -m benchmarks.stiffness_random_robots``
+
+100 robots of one to three legs, with play, errors and loads, at three sizes of their
+errors: the exact tangent against differences of the exact equilibrium by the load, the
+classical matrix against the least energy (22) without play, the compiled against the
+plain road.  Every robot has an answer or a reason; differences are entries over
+sqrt(C_ii C_jj).
+"""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import Posture, home_posture
+from assembly.kinematics.se3 import turn_jacobian
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.exact_tangent import exact_tangent
+from assembly.platform_stiffness.linear_tangent import without_clearance
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.solvers.conic import SolverFailed
+from tests.robots_for_tests import random_robot
+
+ROBOTS, SIZES = 100, (0.1, 0.3, 1.0)
+_SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
+_STEP = 1e-4
+
+
+def relative(C: NDArray, other: NDArray) -> float:
+    """Largest difference of finite entries over sqrt(C_ii C_jj)."""
+    size = np.sqrt(np.abs(np.diag(C)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.abs(C - other) / np.outer(size, size)
+    return float(np.nan_to_num(off, posinf=0.0).max(initial=0.0))
+
+
+def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
+    """Exact tangent against central differences, or why there is none."""
+    try:
+        answer = solve_exact(posture, load)
+        C = exact_tangent(answer).compliance
+        finite = np.flatnonzero(np.isfinite(C).all(axis=0))
+        columns = []
+        for row in finite:
+            step = _STEP * _SIZE[row] * np.eye(6)[row]
+            ahead, back = (
+                solve_exact(posture, load + sign * step, near=answer).platform_screw
+                for sign in (1, -1)
+            )
+            columns.append((ahead - back) / (2 * step[row]))
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return np.nan, type(error).__name__
+    if not len(finite):
+        return np.nan, "free in all directions"
+    J = np.eye(6)
+    J[:3, :3] = turn_jacobian(answer.platform_screw[:3])
+    if len(finite) < 6 and np.abs(J - np.eye(6)).max() > 1e-12:
+        return np.nan, "turned, and free in some directions"
+    D = J @ np.column_stack(columns)
+    D = D @ J.T if len(finite) == 6 else D
+    return relative(C[np.ix_(finite, finite)], D[finite]), "compared"
+
+
+def by_least_energy(posture: Posture) -> float:
+    """The classical matrix against (22) of the robot without play and errors."""
+    robot = posture.robot
+    frames = tuple(replace(f, clearance=None) for f in robot.frames)
+    tight = replace(robot, frames=frames).with_errors(np.zeros_like(robot.errors))
+    posture = replace(posture, robot=tight)
+    C = without_clearance(posture).compliance
+    finite = np.flatnonzero(np.isfinite(C).all(axis=0))
+    moved = [solve_assembly(posture, np.eye(6)[row]).platform_screw for row in finite]
+    if not moved:
+        return np.nan
+    part = np.ix_(finite, finite)
+    return relative(C[part], np.array(moved).T[finite])
+
+
+def main() -> None:
+    """Print the three comparisons."""
+    said: Counter[str] = Counter()
+    exact, linear, compiled = [], [], []
+    for seed in range(ROBOTS):
+        rng = np.random.default_rng(seed)
+        robot = random_robot(rng, legs=int(rng.integers(1, 4)))
+        posture = home_posture(robot)
+        load = rng.normal(size=6) * _SIZE
+        linear.append(by_least_energy(posture))
+        many = platform_stiffnesses(robot, posture.transforms[None], posture.mismatch)
+        one = without_clearance(posture)
+        if not one.free.size:
+            compiled.append(relative(one.compliance, many.compliance[0]))
+        for size in SIZES:
+            forced = replace(posture, robot=robot.with_errors(size * robot.errors))
+            off, reason = by_differences(forced, load)
+            said[reason] += 1
+            exact.append(off)
+    for name, values in (
+        ("exact tangent, differences", exact), ("classical, (22)", linear),
+        ("compiled, plain", compiled),
+    ):  # fmt: skip
+        known = np.array([v for v in values if np.isfinite(v)])
+        print(
+            f"{name:28s} {len(known):4d} compared: median {np.median(known):.1e}, "
+            f"90 % {np.quantile(known, 0.9):.1e}, largest {known.max():.1e}"
+        )
+    print(", ".join(f"{reason}: {count}" for reason, count in said.most_common()))
+
+
+if __name__ == "__main__":
+    main()

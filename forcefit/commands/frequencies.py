@@ -1,0 +1,56 @@
+"""The command ``forcefit assembly frequencies``."""
+
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import (
+    GravityOption,
+    JointOption,
+    JsonOption,
+    LoadOption,
+    PoseOption,
+    RobotArgument,
+    UnderOption,
+    declared_posture,
+    parse_covariates,
+    parse_gravity,
+    parse_load,
+)
+from forcefit.commands.progress import one_thread
+from forcefit.inputs.writing import write_json
+
+
+def frequencies(
+    robot: RobotArgument,
+    pose: PoseOption = None,
+    joint: JointOption = None,
+    load: LoadOption = None,
+    gravity: GravityOption = None,
+    under: UnderOption = None,
+    exact: Annotated[
+        bool,
+        typer.Option(
+            "--exact", help="Around the equilibrium with errors, clearances and loads."
+        ),
+    ] = False,
+    count: Annotated[int, typer.Option(help="Modes.", min=1, max=1000)] = 6,
+    json: JsonOption = None,
+) -> None:
+    """Natural frequencies and modes, drives held; masses must be declared."""
+    from assembly.effects.robot_effects import apply_robot_effects
+    from assembly.report.vibration import vibration_of, vibration_text
+
+    applied = apply_robot_effects(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=exact,
+    )  # fmt: skip
+    with one_thread():
+        results = vibration_of(
+            applied.posture, count, applied.load, applied.gravity, exact
+        )
+    write_json(results, json)
+    if json != "-":
+        print(vibration_text(results))
+    if results["status"] != "ok":
+        raise typer.Exit(1)

@@ -1,0 +1,123 @@
+"""Natural frequencies against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from stiffness.screws import rotation_matrix
+
+LENGTH, SIDE, E, RHO = 1.0, 0.02, 70e9, 2700.0
+
+
+def only(row, stiffness):
+    K = np.diag([np.inf] * 6)
+    K[row, row] = stiffness
+    return K
+
+
+def cantilever(pieces, axis=(1.0, 0.0, 0.0)):
+    link = BeamLink({"width": SIDE, "height": SIDE}, E, 0.3, RHO, "euler",
+                    pieces=pieces)  # fmt: skip
+    tip = Frame("tip", translation=LENGTH * np.array(axis), link=link)
+    return home_posture(Robot("cantilever", "tip", (tip,)))
+
+
+def bending(root):
+    """[Hz] a clamped-free beam, roots of cos x cosh x = -1."""
+    inertia, area = SIDE**4 / 12, SIDE**2
+    speed = np.sqrt(E * inertia / (RHO * area)) / LENGTH**2
+    return root**2 * speed / (2 * np.pi)
+
+
+def test_a_mass_on_a_torsion_spring():
+    """omega^2 = k / (m l^2)."""
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
+    arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0, 0])
+    modes = natural_modes(home_posture(Robot("arm", "arm", (hinge, arm))))
+    expected = np.sqrt(50.0 / (2.0 * 0.5**2)) / (2 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [expected], rtol=1e-9)
+    assert modes.shares[0] == {("hinge", "joint"): pytest.approx(1.0)}
+
+
+def test_a_standing_pendulum_slows_down_under_its_weight():
+    """omega^2 = (k - m g l) / (m l^2); the exact tangent has the geometric part."""
+    k, m, length, g = 50.0, 2.0, 0.4, 9.81
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
+    arm = Frame("arm", "hinge", [length, 0, 0], mass=m)
+    posture = home_posture(Robot("arm", "arm", (hinge, arm)))
+    modes = natural_modes(posture, gravity=[-g, 0, 0], exact=True)
+    expected = np.sqrt((k - m * g * length) / (m * length**2)) / (2 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [expected], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pieces", "first", "second"), [(1, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)]
+)
+def test_a_cantilever_has_the_textbook_frequencies(pieces, first, second):
+    """Roots 1.8751 and 4.6941; Rayleigh: from above, errors of order 1/n^4."""
+    modes = natural_modes(cantilever(pieces), 4)
+    off = modes.frequencies / np.repeat([bending(1.8751041), bending(4.6940911)], 2) - 1
+    assert (off > 0).all()
+    assert off[:2].max() < first
+    assert off[2:].max() < second
+
+
+def test_stretching_and_twisting_waves():
+    """(1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p), 8 pieces: 0.2 % high."""
+    modes = natural_modes(cantilever(8), 60)
+    G, J = E / 2.6, 0.140577 * SIDE**4
+    twist = np.sqrt(G * J / (RHO * SIDE**4 / 6)) / (4 * LENGTH)
+    stretch = np.sqrt(E / RHO) / (4 * LENGTH)
+    for expected in (twist, stretch):
+        nearest = np.abs(modes.frequencies / expected - 1).min()
+        assert nearest < 2e-3
+
+
+def test_turning_the_beam_changes_nothing():
+    R = rotation_matrix([0.3, -1.0, 0.7])
+    straight = natural_modes(cantilever(3), 6).frequencies
+    turned = natural_modes(cantilever(3, tuple(R[:, 0])), 6).frequencies
+    np.testing.assert_allclose(turned, straight, rtol=1e-6)
+
+
+def test_a_free_motion_has_the_frequency_zero():
+    slide = Frame("slide", joint="prismatic")
+    body = Frame("body", "slide", mass=1.0)
+    modes = natural_modes(home_posture(Robot("slider", "body", (slide, body))))
+    np.testing.assert_array_equal(modes.frequencies, [0.0])
+
+
+def test_masses_four_times_as_heavy_swing_half_as_fast():
+    robot = load_robot("delta")
+    frames = tuple(
+        replace(
+            f, mass=4 * f.mass,
+            link=replace(f.link, density=4 * f.link.density)
+            if isinstance(f.link, BeamLink) and f.link.density else f.link,
+        )
+        for f in robot.frames
+    )  # fmt: skip
+    light = natural_modes(home_posture(robot)).frequencies
+    heavy = natural_modes(home_posture(replace(robot, frames=frames))).frequencies
+    np.testing.assert_allclose(heavy, light / 2, rtol=1e-9)
+    # three equal legs: modes across come in pairs
+    np.testing.assert_allclose(light[0], light[1], rtol=1e-6)
+
+
+def test_clearances_are_held_and_a_robot_without_mass_is_refused():
+    posture = cantilever(1)
+    (tip,) = posture.robot.frames
+    loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
+    robot = Robot("loose", "end", (loose, Frame("end", "beam")))
+    np.testing.assert_allclose(
+        natural_modes(home_posture(robot), 2).frequencies,
+        natural_modes(posture, 2).frequencies, rtol=1e-9,
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="found no mass that moves"):
+        natural_modes(home_posture(load_robot("irsbot2")))

@@ -1,0 +1,67 @@
+"""Derivatives of K_C by design numbers, against Castigliano and closed forms."""
+
+import json
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.platform_stiffness.linear_tangent import without_clearance
+from assembly.robots import load_robot
+from assembly.sweeps.parameters import load_design
+from assembly.sweeps.stiffness_slopes import stiffness_slopes
+from forcefit.inputs.table import BadInput
+
+POSE = {"tx": 0.1, "tz": -0.5}
+
+
+def test_by_young_s_modulus_it_is_minus_the_links_share():
+    """dC/dE = -C_links / E, both links of each leg summed (Castigliano)."""
+    path = "link_a.link.young"
+    slope = stiffness_slopes(load_design("irsbot2"), [path], POSE)[path]
+    robot = load_robot("irsbot2")
+    answer = without_clearance(place_robot(robot, POSE))
+    links = [
+        C
+        for part, C in answer.contributions().items()
+        if part.frame.endswith("link_a") and part.kind == "link"
+    ]
+    assert len(links) == 2
+    young = robot.frame("leg1.link_a").link.young
+    size = np.sqrt(np.diag(answer.compliance))
+    size = np.outer(size, size)
+    np.testing.assert_allclose(slope * young / size, -sum(links) / size, atol=1e-6)
+
+
+def test_by_a_bar_s_length_it_is_the_textbook_s(tmp_path):
+    """d(L/EA)/dL = 1/EA, d(L^2/2EI)/dL = L/EI of an arm on its own."""
+    path = tmp_path / "bar.toml"
+    path.write_text("""
+name = "bar"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+translation = [0.5, 0.0, 0.0]
+link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
+""")
+    name = "tip.translation.x"
+    slope = stiffness_slopes(load_design(path), [name])[name]
+    area, inertia = np.pi * 1e-4, np.pi * 1e-8 / 4
+    assert slope[3, 3] == pytest.approx(1 / (7e10 * area), rel=1e-6)
+    assert slope[2, 4] == pytest.approx(0.5 / (7e10 * inertia), rel=1e-6)
+
+
+def test_the_command_gives_them(run):
+    status, out, _ = run(
+        "assembly", "stiffness", "irsbot2", "--by", "link_a.link.beam.radius",
+        "--json", "-",
+    )  # fmt: skip
+    assert status == 0
+    slope = np.array(json.loads(out)["slopes"]["link_a.link.beam.radius"])
+    assert (np.diag(slope) < 0).all()
+
+
+def test_an_unknown_number_is_named():
+    with pytest.raises(BadInput, match="no number"):
+        stiffness_slopes(load_design("irsbot2"), ["link_a.link.beam.raduis"])
