@@ -145,7 +145,7 @@ def _campaign(
     for i, (command, readings) in enumerate(joined.rows):
         ks = np.flatnonzero(read[i])
         order = exchanged_here(base[i, ks], nominal[i, ks], scatter)
-        for place, k in enumerate(ks):
+        for place, k in enumerate(ks.tolist()):
             gap = float(np.linalg.norm(base[i, k] - nominal[i, k]))
             reason = ""
             if order is not None and order[place] != place:
