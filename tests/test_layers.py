@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 FLOORS = (
     "forcefit/inputs",
     "stiffness/screws", "stiffness/link", "stiffness/beam", "stiffness/surface",
-    "stiffness/mesh", "stiffness/fem", "stiffness/report",
+    "stiffness/mesh", "stiffness/fem", "stiffness/report", "stiffness/exchange",
     "assembly/solvers", "assembly/model", "assembly/kinematics", "assembly/linear",
     "assembly/batch", "assembly/exact", "assembly/platform_stiffness",
     "assembly/report", "assembly/measurement",

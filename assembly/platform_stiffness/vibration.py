@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.descent import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.exact.placement import LINK
+from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import BeamLink, Frame, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves

@@ -8,6 +8,7 @@ import typer
 
 from forcefit.commands.library import library
 from forcefit.commands.options import JsonOption
+from forcefit.commands.link_exchange import export, import_
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
+app.command("import")(import_)
+app.command()(export)
 
 CurveFile = Annotated[
     Path | None, typer.Option("--curve", help="A beam along a curve (TOML).")

@@ -19,11 +19,13 @@ class Match:
         how: ``"name"``, ``"time"`` or ``"order"``: what joined them to commands.
         rows: for each row of the campaign its command and its readings by target;
             a target read again at a command makes a further row.
-        unmatched: readings near no command.
+        strangers: readings of no target, as of points on the ground.
+        unmatched: readings of targets that belong to no command.
     """
 
     how: str
     rows: list[tuple[int, dict[str, Reading]]]
+    strangers: list[Reading]
     unmatched: list[Reading]
 
 
@@ -45,52 +47,61 @@ def match(
         The rows.
 
     Raises:
-        BadInput: a reading of no target, or no way to join them.
+        BadInput: no reading of any target, one of two, or no way to join them.
     """
-    targets = list(targets)
-    named = [_target(reading, targets) for reading in readings]
+    ours = _of_targets(readings, list(targets))
+    lost = {id(reading) for reading, _ in ours}
+    strangers = [reading for reading in readings if id(reading) not in lost]
     ids = {label: i for i, label in enumerate(commands.ids)}
     asked = [
         [ids[part] for part in reading.names if part in ids and part != target]
-        for reading, target in zip(readings, named, strict=True)
+        for reading, target in ours
     ]
-    if all(len(found) == 1 for found in asked):
-        how, at = "name", [found[0] for found in asked]
-    elif np.isfinite(commands.times).all() and all(
-        np.isfinite(reading.time) for reading in readings
-    ):
-        how, at = "time", [_nearest(reading, commands, window) for reading in readings]
+    clocks = [*commands.times, *(reading.time for reading, _ in ours)]
+    if sum(len(found) == 1 for found in asked) > len(asked) / 2:
+        how, at = "name", [found[0] if len(found) == 1 else -1 for found in asked]
+    elif np.isfinite(clocks).all():
+        how, at = "time", [_nearest(reading, commands, window) for reading, _ in ours]
     else:
-        how, at = "order", _in_order(readings, named, commands)
+        how, at = "order", _in_order(ours, commands)
     table: dict[tuple[int, int], dict[str, Reading]] = {}
     again: Counter[tuple[int, str]] = Counter()
-    for reading, target, command in zip(readings, named, at, strict=True):
+    for (reading, target), command in zip(ours, at, strict=True):
         if command >= 0:
             table.setdefault((command, again[command, target]), {})[target] = reading
             again[command, target] += 1
-    rows = [(command, cells) for (command, _), cells in sorted(
-        table.items(), key=lambda item: item[0])]  # fmt: skip
-    lost = [r for r, command in zip(readings, at, strict=True) if command < 0]
-    if not rows:
-        first = readings[0]
+    if not table:
         raise BadInput(
-            f"{first.place}: found no command within {window:g} s of any reading; "
+            f"{ours[0][0].place}: found no command within {window:g} s of any reading; "
             "expected clocks that agree, or a larger window in the targets file"
         )
-    return Match(how, rows, lost)
+    rows = [(command, table[command, k]) for command, k in sorted(table)]
+    unmatched = [r for (r, _), command in zip(ours, at, strict=True) if command < 0]
+    return Match(how, rows, strangers, unmatched)
 
 
-def _target(reading: Reading, targets: list[str]) -> str:
-    """The target that a reading's name names; the only one, if there is only one."""
-    found = [part for part in reading.names if part in targets]
-    if len(found) == 1:
-        return found[0]
-    if not found and len(targets) == 1:
-        return targets[0]
-    expected = ", ".join(map(quoted, targets[:6]))
-    raise BadInput(
-        f"{reading.place}: expected the name of one target in it: {expected}"
-    )
+def _of_targets(
+    readings: Sequence[Reading], targets: list[str]
+) -> list[tuple[Reading, str]]:
+    """Readings of targets; where nobody names the only one, all are of it."""
+    ours = []
+    for reading in readings:
+        found = [part for part in reading.names if part in targets]
+        if len(found) > 1:
+            expected = ", ".join(map(quoted, targets[:6]))
+            raise BadInput(
+                f"{reading.place}: expected the name of one target: {expected}"
+            )
+        if found:
+            ours.append((reading, found[0]))
+    if not ours and len(targets) == 1:
+        return [(reading, targets[0]) for reading in readings]
+    if not ours:
+        expected = ", ".join(map(quoted, targets[:6]))
+        raise BadInput(
+            f"{readings[0].place}: expected the name of one target in it: {expected}"
+        )
+    return ours
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
@@ -99,18 +110,18 @@ def _nearest(reading: Reading, commands: Commands, window: float) -> int:
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 
 
-def _in_order(
-    readings: Sequence[Reading], named: list[str], commands: Commands
-) -> list[int]:
+def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
     """The k-th reading of a target belongs to the k-th command."""
+    named = [target for _, target in ours]
+    first = ours[0][0]
     counts: Mapping[str, int] = Counter(named)
     for target, count in counts.items():
         if count != len(commands.ids):
             raise BadInput(
-                f"{readings[0].file}: found {count} readings of {quoted(target)} for "
+                f"{first.file}: found {count} readings of {quoted(target)} for "
                 f"{len(commands.ids)} commands; expected the id of the command in "
                 "their names, times in both tables, or as many readings as commands "
-                f"(names such as {describe('::'.join(readings[0].names))})"
+                f"(names such as {describe('::'.join(first.names))})"
             )
     at, seen = [], Counter[str]()
     for target in named:

@@ -141,11 +141,14 @@ def _campaign(
     read = np.isfinite(measured).all(axis=2)
     frame, scatter = _frame(declared, measured, nominal, names)
     base = frame.to_base(measured)
-    left_out = [f"{r.place}: no command near it in time" for r in joined.unmatched]
+    why = {"time": "no command near it in time"}.get(
+        joined.how, "no command's id in its name"
+    )
+    left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
     for i, (command, readings) in enumerate(joined.rows):
         ks = np.flatnonzero(read[i])
         order = exchanged_here(base[i, ks], nominal[i, ks], scatter)
-        for place, k in enumerate(ks):
+        for place, k in enumerate(ks.tolist()):
             gap = float(np.linalg.norm(base[i, k] - nominal[i, k]))
             reason = ""
             if order is not None and order[place] != place:
@@ -157,12 +160,16 @@ def _campaign(
                 place_of = readings[names[k]].place
                 left_out.append(f"{place_of}: command {quoted(label)}: {reason}")
                 read[i, k] = False
+    total -= len(joined.strangers)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
             f"{left_out[0]}; and {len(left_out) - 1} more of {total} readings, "
             f"expected at most {_MOST_LEFT_OUT:.0%}; are targets, commands, units "
             "right?"
         )
+    if joined.strangers:
+        first, count = joined.strangers[0].place, len(joined.strangers)
+        left_out.append(f"{count} readings of no target, the first: {first}")
     kept = np.flatnonzero(read.any(axis=1))
     rows = [joined.rows[i] for i in kept]
     gaps = np.where(read[..., None], base - nominal, np.nan)[kept]

@@ -21,7 +21,7 @@ def position_accuracy(deviations: ArrayLike) -> float:
     Returns:
         The distance.
     """
-    return float(np.linalg.norm(np.mean(deviations, axis=0)))
+    return float(np.linalg.norm(np.asarray(deviations, dtype=float).mean(axis=0)))
 
 
 def position_repeatability(deviations: ArrayLike) -> float:

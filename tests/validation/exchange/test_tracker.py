@@ -257,6 +257,19 @@ def test_what_is_there_is_not_written_over(lab, run):
     assert "expected a new folder" in err
 
 
+def test_points_on_the_ground_and_misnamed_readings_are_named(lab, run):
+    lines = list(points(line=SPATIAL_ANALYZER))
+    lines[5] = lines[5].replace("p1", "pl")
+    lab.export("\n".join(["Ground::nest1, 1, 2, 3", *lines]))
+    status, out, _ = run(*lab.words(), "--json", "-")
+    table = json.loads(out)
+    assert (status, table["readings"]) == (0, 38)
+    misnamed, ground = table["left_out"]
+    assert misnamed.endswith('("Main::pl::C"): no command\'s id in its name')
+    assert "1 readings of no target" in ground
+    assert "nest1" in ground
+
+
 def test_readings_far_from_any_command_are_named(lab, run):
     lab.targets("A", window=3)
     lab.commands(range(0, 130, 10))

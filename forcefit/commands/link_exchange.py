@@ -1,0 +1,71 @@
+"""The commands ``forcefit stiffness import`` and ``forcefit stiffness export``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.stiffness_options import Json
+from forcefit.inputs.writing import check_writable, write_bytes, write_json
+
+Length = Annotated[str, typer.Option(help="Of lengths: m, cm, mm, um, inch; N, rad.")]
+
+
+def import_(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help=".mtx, .pch, .dmig, .npy, .npz: K_E or K."),
+    ],
+    base: Annotated[
+        str, typer.Option(help='Held: a node, or "z=0" [m] with --nodes.')
+    ] = "1",
+    tip: Annotated[str, typer.Option(help="Where the screw is read, likewise.")] = "2",
+    nodes: Annotated[
+        Path | None, typer.Option(help="Places of nodes: number, x, y, z.")
+    ] = None,
+    mass: Annotated[
+        Path | None, typer.Option(help="Mass matrix of the same freedoms.")
+    ] = None,
+    unit: Length = "m",
+    order: Annotated[
+        str,
+        typer.Option(
+            help="Of a node's freedoms where the file names none: "
+            "translations-first, rotations-first."
+        ),
+    ] = "translations-first",
+    json: Json = None,
+) -> None:
+    """K_E from another program's matrix, condensed on two interfaces."""
+    from stiffness.exchange.import_link import import_link
+    from stiffness.report.results import link_results, link_text
+
+    link = import_link(
+        file, mass=mass, nodes=nodes, base=base, tip=tip, unit=unit, order=order
+    )
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+def export(
+    file: Annotated[
+        Path, typer.Argument(metavar="LINK.json", help="Written with --json.")
+    ],
+    to: Annotated[
+        str,
+        typer.Option(
+            help="matrix-market, abaqus, calculix, nastran, numpy, exudyn, adams, "
+            "mapdl."
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
+    unit: Length = "m",
+) -> None:
+    """Write a link's K_E for another program, as a matrix of two nodes."""
+    from stiffness.exchange.export_link import link_file, read_link_results
+
+    stiffness, offset = read_link_results(file)
+    content = link_file(stiffness, offset, to, unit)
+    check_writable(output)
+    write_bytes(content, output)

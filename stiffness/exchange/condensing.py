@@ -1,0 +1,165 @@
+"""A full matrix condensed on two interfaces: nodes of six freedoms, or rigid faces.
+
+Sources:
+    Guyan (1965), Reduction of stiffness and mass matrices, AIAA Journal 3, 380.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import triu
+
+from forcefit.inputs.errors import BadInput, describe
+from forcefit.inputs.table import read_text
+from stiffness.exchange.matrix_file import FileMatrix
+from stiffness.surface.interface import Interface, parse_interface
+
+_ON = 1e-6  # of the body's size: how near a node lies on its interface
+
+
+def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
+    """Places of nodes: lines of number, x, y, z between commas or blanks.
+
+    Args:
+        path: the file; lines that begin with ``*`` or ``#`` are passed over.
+        unit: [m] of its lengths.
+
+    Returns:
+        (3,) [m] by number.
+
+    Raises:
+        BadInput: a line of something else.
+    """
+    nodes: dict[int, NDArray] = {}
+    for number, line in enumerate(read_text(path).split("\n"), 1):
+        words = re.split(r"[,\s]+", line.strip(" ,\t"))
+        if not words[0] or words[0].startswith(("*", "#")):
+            continue
+        try:
+            place = np.array([float(word) for word in words[1:4]])
+            node = int(words[0])
+        except ValueError:
+            place, node = np.empty(0), 0
+        if place.shape != (3,) or not np.isfinite(place).all() or node in nodes:
+            raise BadInput(
+                f"{path}: line {number}: found {describe(line.strip())}, expected the "
+                "number of another node and its x, y, z"
+            )
+        nodes[node] = unit * place
+    if not nodes:
+        raise BadInput(f"{path}: found no nodes")
+    return nodes
+
+
+def interface_rows(
+    matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
+) -> tuple[NDArray, NDArray, NDArray | None]:
+    """Rows of an interface, and how a screw of it moves them.
+
+    Args:
+        matrix: with its freedoms.
+        asked: a node's number, or an interface as ``stiffness fea`` takes it.
+        option: whose it is, for messages.
+        nodes: (3,) [m] places by number, None where they are not known.
+
+    Returns:
+        (k,) rows, (k, 6) their motions for unit screws [R T] at the interface's point,
+        and (3,) [m] the point, None where it is not known.
+
+    Raises:
+        BadInput: no such node, not its six freedoms, or nothing on the interface.
+    """
+    row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
+    if asked.strip().isdigit():
+        node = int(asked)
+        rows = [row.get((node, direction), -1) for direction in (4, 5, 6, 1, 2, 3)]
+        if min(rows) < 0:
+            has = sorted(d for n, d in matrix.freedoms if n == node)
+            raise BadInput(
+                f"{option}: node {node} of {matrix.file} has the freedoms "
+                f"{has or 'none'}, expected 1 to 6, or an interface such as z=0 "
+                "with --nodes"
+            )
+        return np.array(rows), np.eye(6), None if nodes is None else nodes.get(node)
+    interface = parse_interface(asked, option)
+    if nodes is None:
+        raise BadInput(
+            f"{option}: an interface needs the places of nodes: --nodes FILE"
+        )
+    known = [node for node in nodes if (node, 1) in row]
+    places = np.array([nodes[node] for node in known]).reshape(-1, 3)
+    near = _on(interface, places)
+    if near.sum() < 3:
+        raise BadInput(
+            f"{option}: found {int(near.sum())} nodes on {interface}, expected at "
+            "least 3"
+        )
+    point = places[near].mean(axis=0)
+    if interface.kind != "plane":
+        point = interface.point
+    rows, motions = [], []
+    for node, place in zip(np.array(known)[near].tolist(), places[near], strict=True):
+        for direction in (1, 2, 3):
+            if (node, direction) not in row:
+                raise BadInput(f"{option}: node {node} has no freedom {direction}")
+            unit = np.eye(3)[direction - 1]
+            rows.append(row[node, direction])
+            # u = t + w x arm
+            motions.append(np.concatenate([np.cross(place - point, unit), unit]))
+    return np.array(rows), np.array(motions), point
+
+
+def _on(interface: Interface, places: NDArray) -> NDArray:
+    """(n,) bool: what lies on an interface."""
+    size = float(np.ptp(places, axis=0).max(initial=0.0)) or 1.0
+    near = interface.distance(places) < _ON * size
+    if interface.kind == "disc":
+        arm = places - interface.point
+        near &= np.linalg.norm(arm, axis=1) < interface.radius + _ON * size
+    return near
+
+
+def condensed(
+    matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
+) -> tuple[NDArray, NDArray]:
+    """The matrix of two interfaces, all other freedoms left to themselves.
+
+    Args:
+        matrix: (n, n).
+        ends: rows and motions of base and tip, see :func:`interface_rows`.
+
+    Returns:
+        (12, 12) base first, and (n, 12) the motion of every row for unit screws.
+
+    Raises:
+        BadInput: the interfaces share rows, or the other freedoms are loose.
+    """
+    from stiffness.fem.sparse_solver import solve
+
+    n = matrix.matrix.shape[0]
+    fields, free = np.zeros((n, 12)), np.ones(n, dtype=bool)
+    for k, (rows, motions) in enumerate(ends):
+        if not free[rows].all():
+            raise BadInput(f"{matrix.file}: base and tip share freedoms")
+        fields[rows, 6 * k : 6 * k + 6] = motions
+        free[rows] = False
+    K = matrix.matrix
+    if free.any():
+        inner = K[free][:, free]
+        loose = inner.diagonal() <= 0
+        if loose.any():
+            node, direction = np.array(matrix.freedoms)[free][int(np.argmax(loose))]
+            raise BadInput(
+                f"{matrix.file}: freedom {direction} of node {node} has no stiffness; "
+                "expected a body in one piece"
+            )
+        loads = -(K @ fields)[free]
+        fields[free] = solve(triu(inner, format="csr"), loads)
+        if not np.isfinite(fields).all():
+            raise BadInput(f"{matrix.file}: what lies between the interfaces is loose")
+    # energy of the fields: errors of the solution enter squared
+    K12 = fields.T @ (K @ fields)
+    return (K12 + K12.T) / 2, fields

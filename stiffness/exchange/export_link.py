@@ -1,0 +1,122 @@
+"""``forcefit stiffness export``: a link as the matrix of nodes 1, base, and 2, tip."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, nearest, one_line, quoted
+from forcefit.inputs.table import read_text
+from stiffness.exchange.import_link import LENGTHS
+from stiffness.exchange.two_interfaces import both_ends
+from stiffness.report.export import PROGRAMS, stiffness_for
+
+FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
+_FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]  # ours to shifts first, twice
+
+
+def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
+    """K_E and the base's point less the tip's, of what ``--json`` wrote of a link.
+
+    Args:
+        path: the JSON file.
+
+    Returns:
+        (6, 6) and (3,) [m].
+
+    Raises:
+        BadInput: it is not such a file.
+    """
+    try:
+        content = json.loads(read_text(path))
+        K = np.array(content["stiffness"], dtype=float)
+        offset = np.array(content["base"], dtype=float) - np.array(content["tip"])
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        reason = one_line(str(error), 80)
+        raise BadInput(
+            f"{path}: found no stiffness, base and tip ({reason}); expected what "
+            "stiffness beam, fea or import writes with --json"
+        ) from None
+    if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
+        raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
+    return K, offset
+
+
+def link_file(
+    stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
+) -> bytes:
+    """A file's content.
+
+    Args:
+        stiffness: (6, 6) K_E at the tip, SI, our order.
+        base_from_tip: (3,) [m].
+        to: one of ``FORMATS``.
+        unit: of lengths in the file; forces are N, turns rad.
+
+    Returns:
+        The content: shifts first at each node; of ``exudyn``, ``adams``, ``mapdl``
+        what :func:`stiffness.report.export.stiffness_for` gives.
+
+    Raises:
+        BadInput: an unknown format or unit, or a unit with a format that has its own.
+    """
+    for option, value, valid in (("--to", to, FORMATS), ("--unit", unit, LENGTHS)):
+        if value not in valid:
+            raise BadInput(f"{option}: found {quoted(value)}{nearest(value, valid)}")
+    if to in PROGRAMS:
+        if unit != "m":
+            raise BadInput(f"--unit: {to} is written in SI, expected m")
+        return stiffness_for(to, stiffness).encode()
+    length = LENGTHS[unit]
+    scale = np.tile(np.repeat([length, 1.0], 3), 2)
+    K = both_ends(stiffness, base_from_tip)[np.ix_(_FEM, _FEM)]
+    K = K * np.outer(scale, scale) / length
+    if to == "numpy":
+        content = io.BytesIO()
+        np.save(content, K)
+        return content.getvalue()
+    writers = {"matrix-market": _matrix_market, "abaqus": _user_element,
+               "calculix": _five_columns, "nastran": _dmig}  # fmt: skip
+    return writers[to](K).encode()
+
+
+def _lower(K: NDArray) -> list[tuple[int, int, float]]:
+    """Row, column, value of the lower half, column by column."""
+    return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
+
+
+def _matrix_market(K: NDArray) -> str:
+    """Matrix Market, symmetric."""
+    rows = [f"{i + 1} {j + 1} {v!r}" for i, j, v in _lower(K)]
+    head = "%%MatrixMarket matrix coordinate real symmetric\n% X Y Z RX RY RZ, twice"
+    return "\n".join([head, f"12 12 {len(rows)}", *rows]) + "\n"
+
+
+def _user_element(K: NDArray) -> str:
+    """Abaqus ``*USER ELEMENT``, four numbers a line."""
+    lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
+             "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
+    for i in range(12):
+        row = [f"{v!r}" for v in K[i, : i + 1].tolist()]
+        lines += [", ".join(row[k : k + 4]) + "," for k in range(0, i + 1, 4)]
+    return "\n".join(lines) + "\n"
+
+
+def _five_columns(K: NDArray) -> str:
+    """Node, direction, node, direction, value."""
+    return "".join(
+        f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
+        for i, j, v in _lower(K)
+    )
+
+
+def _dmig(K: NDArray) -> str:
+    """Nastran DMIG in large fields, form 6; sixteen characters a number."""
+    lines = ["DMIG    K2GG           0       6       2       0"]
+    for j in range(12):
+        lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")
+        for i in range(j, 12):
+            lines.append(f"*       {i // 6 + 1:16}{i % 6 + 1:16}{K[i, j]:16.9E}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,112 @@
+"""``forcefit stiffness import``: a link's K_E from another program's matrices."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from stiffness.exchange.condensing import condensed, interface_rows, read_nodes
+from stiffness.exchange.matrix_file import FileMatrix, read_matrix
+from stiffness.exchange.two_interfaces import link_of_both_ends, mass_of_both_ends
+from stiffness.link import LinkStiffness, check_definite, inverted
+
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
+ORDERS = ("translations-first", "rotations-first")
+
+
+def import_link(
+    path: Path | str,
+    *,
+    mass: Path | str | None = None,
+    nodes: Path | str | None = None,
+    base: str = "1",
+    tip: str = "2",
+    unit: str = "m",
+    order: str = ORDERS[0],
+) -> LinkStiffness:
+    """A link from a matrix of 6, 12 or more freedoms.
+
+    Args:
+        path: of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
+        mass: of the mass matrix of the same freedoms; None without one.
+        nodes: places of nodes, needed for interfaces of many.
+        base: node, or interface such as ``"z=0"`` [m], that is held.
+        tip: likewise, where the screw is read.
+        unit: of lengths in all files; forces are N, turns rad.
+        order: of the six freedoms of a node, where the file does not name them.
+
+    Returns:
+        The link, in the axes of the file.
+
+    Raises:
+        BadInput: a file is not what it should be, or the matrix is not that of a free
+            elastic body between the two interfaces.
+    """
+    for option, value, valid in (("--unit", unit, LENGTHS), ("--order", order, ORDERS)):
+        if value not in valid:
+            raise BadInput(f"{option}: found {quoted(value)}{nearest(value, valid)}")
+    length = LENGTHS[unit]
+    matrix = in_metres(reordered(read_matrix(path), order), length)
+    if matrix.matrix.shape[0] == 6 and not matrix.named:
+        if mass is not None:
+            raise BadInput("--mass: a stiffness of 6 rows has no body with a mass")
+        K = matrix.matrix.toarray()[np.ix_([3, 4, 5, 0, 1, 2], [3, 4, 5, 0, 1, 2])]
+        check_definite(f"{path}: stiffness", K)
+        return LinkStiffness(
+            f"imported from {Path(path).name}", inverted(K), np.zeros(3), np.zeros(3)
+        )
+    places = None if nodes is None else read_nodes(nodes, length)
+    ends = _ends(matrix, base, tip, places)
+    K12, fields = condensed(matrix, (ends[0][:2], ends[1][:2]))
+    points = [end[2] for end in ends]
+    known = points if all(point is not None for point in points) else [None, None]
+    who = f"imported from {Path(path).name}"
+    link = link_of_both_ends(K12, who, known[0], known[1])
+    if mass is None:
+        return link
+    heavy = in_metres(reordered(read_matrix(mass, "mass"), order), length)
+    if heavy.freedoms != matrix.freedoms:
+        raise BadInput(f"{mass}: its freedoms are not those of {path}")
+    M12 = fields.T @ (heavy.matrix @ fields)
+    kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
+    return replace(
+        link, mass=kilograms, center_of_mass=link.tip + centre, inertia=inertia
+    )
+
+
+def _ends(
+    matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
+) -> list[tuple[NDArray, NDArray, NDArray | None]]:
+    """Rows, motions and point of base and tip."""
+    return [
+        interface_rows(matrix, asked, option, places)
+        for asked, option in ((base, "--base"), (tip, "--tip"))
+    ]
+
+
+def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
+    """The matrix with freedoms named as its file orders them."""
+    if matrix.named or order == ORDERS[0]:
+        return matrix
+    freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
+    return replace(matrix, freedoms=freedoms)
+
+
+def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
+    """The matrix with shifts in metres and work in joules.
+
+    Args:
+        matrix: with forces in N, turns in rad and shifts in ``length``.
+        length: [m] its unit.
+
+    Returns:
+        The matrix in SI; a mass matrix likewise, if its unit is consistent (tonnes
+        beside mm, N and s).
+    """
+    turns = np.array([direction > 3 for _, direction in matrix.freedoms])
+    scale = np.where(turns, 1.0, 1.0 / length)
+    scaled = matrix.matrix.multiply(scale[:, None]).multiply(scale[None, :]) * length
+    return replace(matrix, matrix=scaled.tocsr())

@@ -1,0 +1,109 @@
+"""A body between two interfaces: twelve freedoms, six of which move it rigidly.
+
+======  ============  =======================================================
+symbol  shape         meaning
+======  ============  =======================================================
+K12     (12, 12)      stiffness of base and tip, [R T] of each
+K       (6, 6)        K_E: the tip's part of it, the base held
+X       (6, 6)        rigid motion carried from base to tip: K12 [s; X s] = 0
+======  ============  =======================================================
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.errors import BadInput
+from stiffness.link import LinkStiffness, check_definite, inverted
+from stiffness.screws import screw_map, skew
+
+_BALANCED = 1e-5  # of its scale: what text of seven digits leaves
+
+
+def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
+    """K12 of a link.
+
+    Args:
+        stiffness: (6, 6) K_E at the tip.
+        base_from_tip: (3,) [m] the base's point less the tip's.
+
+    Returns:
+        (12, 12) base first, then tip; in our order.
+    """
+    K = np.asarray(stiffness, dtype=float)
+    X = screw_map(base_from_tip)
+    both = np.hstack([-X, np.eye(6)])
+    return np.asarray(both.T @ K @ both)
+
+
+def link_of_both_ends(
+    K12: ArrayLike,
+    who: str,
+    base: ArrayLike | None = None,
+    tip: ArrayLike | None = None,
+) -> LinkStiffness:
+    """The link that a matrix of two interfaces is.
+
+    Args:
+        K12: (12, 12) in SI, in our order.
+        who: whose it is, for messages.
+        base: (3,) [m] its point, None to find it from the matrix.
+        tip: (3,) [m] likewise; both or neither.
+
+    Returns:
+        The link; with points unknown the tip is the origin.
+
+    Raises:
+        BadInput: K_E is no stiffness, or the body is held to something else: it has
+            a stiffness against its own rigid motions.
+    """
+    K12 = np.asarray(K12, dtype=float)
+    K = K12[6:, 6:]
+    check_definite(f"{who}: the tip's part", K)
+    X = -inverted(K) @ K12[6:, :6]
+    arm = X[3:, :3]
+    found = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
+                      arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip
+    offset = found
+    if base is not None and tip is not None:
+        offset = np.asarray(base, dtype=float) - np.asarray(tip, dtype=float)
+    ideal = both_ends(K, offset)
+    size = np.sqrt(np.abs(np.diag(ideal)))
+    gap = np.abs(K12 - ideal) / np.outer(size, size)
+    if not gap.max() < _BALANCED:
+        i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
+        raise BadInput(
+            f"{who}: the two interfaces do not balance: [{i + 1}, {j + 1}] is "
+            f"{K12[i, j]:.6e}, expected {ideal[i, j]:.6e} for a free body whose base "
+            f"is {offset[0]:.6g}, {offset[1]:.6g}, {offset[2]:.6g} m from its tip; is "
+            "it held elsewhere, or are order and unit others?"
+        )
+    at = np.zeros(3) if tip is None else np.asarray(tip, dtype=float)
+    return LinkStiffness(who, inverted(K), tip=at, base=at + offset)
+
+
+def mass_of_both_ends(
+    M12: ArrayLike, offset: ArrayLike
+) -> tuple[float, NDArray, NDArray]:
+    """Mass, its centre and its moments from a mass matrix of two interfaces.
+
+    Args:
+        M12: (12, 12) in SI, in our order.
+        offset: (3,) [m] the base's point less the tip's.
+
+    Returns:
+        [kg], (3,) [m] the centre seen from the tip, (3, 3) [kg m^2] about it.
+
+    Raises:
+        BadInput: its mass is not above zero.
+    """
+    rigid = np.vstack([screw_map(-np.asarray(offset, dtype=float)), np.eye(6)])
+    M = rigid.T @ np.asarray(M12, dtype=float) @ rigid
+    mass = float(np.trace(M[3:, 3:]) / 3)
+    if not mass > 0:
+        raise BadInput(f"the mass matrix: found a mass of {mass:g} kg, expected > 0")
+    # v = t + w x c: the block below the diagonal is -m [c]x
+    arm = -M[3:, :3] / mass
+    centre = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
+                       arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip
+    J = M[:3, :3] + mass * skew(centre) @ skew(centre)
+    return mass, centre, (J + J.T) / 2

@@ -1,0 +1,327 @@
+"""Links of other programs: a textbook's beam, a solid's full matrix, mistakes."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.io import mmread, mmwrite
+from scipy.sparse import csr_matrix, diags, save_npz
+
+from forcefit.inputs.errors import BadInput
+from stiffness.beam.beam import beam_compliance
+from stiffness.beam.sections import round_section
+from stiffness.exchange.export_link import FORMATS, link_file, read_link_results
+from stiffness.exchange.import_link import import_link
+from stiffness.exchange.two_interfaces import both_ends
+from stiffness.fem.elements import assemble, isoparametric, lame
+from stiffness.link import scaled
+from tests.solids_for_tests import box_solid
+
+# a steel bar of 0.5 m along x in mm, N, tonnes
+E, NU, RADIUS, LENGTH, RHO = 2.1e5, 0.3, 10.0, 500.0, 7.85e-9
+
+
+def textbook_beam(length=LENGTH):
+    """(12, 12) Euler-Bernoulli beam along x, X Y Z RX RY RZ of node 1, then node 2.
+
+    Przemieniecki (1968), Theory of Matrix Structural Analysis, eq. (5.116), no shear.
+    """
+    A, I = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4
+    J, G, L = 2 * I, E / (2 + 2 * NU), length
+    K = np.zeros((12, 12))
+
+    def spring(k, i, j):
+        K[np.ix_([i, j], [i, j])] += k * np.array([[1, -1], [-1, 1]])
+
+    spring(E * A / L, 0, 6)
+    spring(G * J / L, 3, 9)
+    bend = E * I / L**3 * np.array([
+        [12, 6 * L, -12, 6 * L], [6 * L, 4 * L**2, -6 * L, 2 * L**2],
+        [-12, -6 * L, 12, -6 * L], [6 * L, 2 * L**2, -6 * L, 4 * L**2],
+    ])  # fmt: skip
+    for rows, sign in (([1, 5, 7, 11], 1), ([2, 4, 8, 10], -1)):
+        turn = np.diag([1, sign, 1, sign])  # a turn about y lowers z
+        K[np.ix_(rows, rows)] += turn @ bend @ turn
+    return K
+
+
+def beam_mass():
+    """(12, 12) mass matrix of two lumps: half the beam's mass at each node."""
+    half = RHO * np.pi * RADIUS**2 * LENGTH / 2
+    M = np.zeros((12, 12))
+    for k in (0, 1, 2, 6, 7, 8):
+        M[k, k] = half
+    return M
+
+
+def expected_stiffness():
+    """(6, 6) of the same beam in SI, from the library's own closed form."""
+    section = round_section(RADIUS * 1e-3, NU)
+    C = beam_compliance(LENGTH * 1e-3, section, E * 1e6, NU, theory="euler")
+    return np.linalg.inv(C)
+
+
+def assert_same(K, expected, tolerance=1e-9):
+    assert np.abs(scaled(K - expected, expected)).max() < tolerance
+
+
+def user_element(K, M=None, head="** 1, 2\n1, 2, 3, 4, 5, 6\n"):
+    """Abaqus' text of a symmetric matrix, four numbers a line."""
+    text = f"**\n*USER ELEMENT, NODES= 2, LINEAR\n** ELEMENT NODES\n{head}"
+    for kind, matrix in (("STIFFNESS", K), ("MASS", M)):
+        if matrix is not None:
+            text += f"*MATRIX,TYPE={kind}\n"
+            for i in range(len(matrix)):
+                row = [repr(v) for v in matrix[i, : i + 1].tolist()]
+                for k in range(0, i + 1, 4):
+                    text += " " + " , ".join(row[k : k + 4]) + ",\n"
+    return text
+
+
+def calculix_element(K):
+    """CalculiX' text: every freedom is a node of its own."""
+    order = [(1, d) for d in range(1, 7)] + [(2, d) for d in range(1, 7)]
+    head = "**" + ",".join(f"{n:10}" for n, _ in order[:10]) + ",\n"
+    head += "**" + ",".join(f"{n:10}" for n, _ in order[10:]) + ",\n"
+    head += f"{order[0][1]:10}\n"
+    head += "".join(f"{k:10},{d:10}\n" for k, (_, d) in enumerate(order[1:], 2))
+    return user_element(K, head=head)
+
+
+def five_columns(K):
+    """Node, direction, node, direction, value: the upper half."""
+    return "".join(
+        f"{i // 6 + 1},{i % 6 + 1}, {j // 6 + 1},{j % 6 + 1}, {K[i, j]!r}\n"
+        for i in range(12) for j in range(i, 12) if K[i, j]
+    ).replace("np.float64(", "").replace(")", "")  # fmt: skip
+
+
+def dmig_small(K):
+    """Nastran's DMIG in fields of eight, exponents without a letter."""
+
+    def real(v):
+        mantissa, exponent = f"{v:.3E}".split("E")
+        return f"{mantissa}{int(exponent):+d}"
+
+    text = "$ a comment\nDMIG    KAAX           0       6       1       0\n"
+    for j in range(12):
+        rows = [i for i in range(j, 12) if K[i, j]]
+        text += f"DMIG    KAAX    {j // 6 + 1:8}{j % 6 + 1:8}        "
+        text += f"{rows[0] // 6 + 1:8}{rows[0] % 6 + 1:8}{real(K[rows[0], j]):>8}\n"
+        for one, two in zip(rows[1::2], [*rows[2::2], None], strict=False):
+            text += f"        {one // 6 + 1:8}{one % 6 + 1:8}{real(K[one, j]):>8}"
+            if two is not None:
+                text += f"        {two // 6 + 1:8}{two % 6 + 1:8}{real(K[two, j]):>8}"
+            text += "\n"
+    return text
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "tolerance"),
+    [
+        ("k.mtx", lambda p, K: p.write_text(user_element(K)), 1e-9),
+        ("ccx.mtx", lambda p, K: p.write_text(calculix_element(K)), 1e-9),
+        ("five.mtx", lambda p, K: p.write_text(five_columns(K)), 1e-9),
+        ("mm.mtx", lambda p, K: mmwrite(p, csr_matrix(K), symmetry="symmetric"), 1e-9),
+        ("full.mtx", lambda p, K: mmwrite(p, K, symmetry="general"), 1e-9),
+        ("k.npy", lambda p, K: np.save(p, K), 1e-9),
+        ("k.npz", lambda p, K: save_npz(p, csr_matrix(K)), 1e-9),
+    ],
+)
+def test_a_textbook_beam_from_every_program(name, write, tolerance, tmp_path):
+    """Millimetres in, SI out; the base is found 0.5 m behind the tip."""
+    path = tmp_path / name
+    write(path, textbook_beam())
+    link = import_link(path, unit="mm")
+    assert_same(link.stiffness, expected_stiffness(), tolerance)
+    assert link.base - link.tip == pytest.approx([-0.5, 0, 0], abs=1e-9)
+
+
+def test_dmig_of_four_digits(tmp_path):
+    """Eight characters hold four digits, so the ends balance to a stiff beam's 1e-4."""
+    path = tmp_path / "k.pch"
+    K = textbook_beam()
+    K = np.vectorize(lambda v: float(f"{v:.3E}"))(K)
+    path.write_text(dmig_small(K))
+    with pytest.raises(BadInput, match="do not balance"):
+        import_link(path, unit="mm")
+
+
+@pytest.mark.parametrize(
+    "to", ["matrix-market", "abaqus", "calculix", "nastran", "numpy"]
+)
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_what_is_written_is_read_back(to, unit, tmp_path, rng):
+    """Any stiffness, any offset; ten digits of Nastran's fields, else rounding."""
+    L = rng.normal(size=(6, 6))
+    size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
+    K = (L @ L.T + np.eye(6)) * np.outer(size, size)
+    offset = np.array([-0.3, 0.1, 0.05])
+    ending = {"nastran": "pch", "numpy": "npy"}.get(to, "mtx")
+    path = tmp_path / f"k.{ending}"
+    path.write_bytes(link_file(K, offset, to, unit))
+    link = import_link(path, unit=unit)
+    assert_same(link.stiffness, K, 1e-8 if to == "nastran" else 1e-12)
+    assert link.base - link.tip == pytest.approx(offset, abs=1e-8)
+
+
+def test_scipy_reads_our_matrix_market(tmp_path):
+    path = tmp_path / "k.mtx"
+    K = expected_stiffness()
+    path.write_bytes(link_file(K, np.array([-0.5, 0, 0]), "matrix-market"))
+    order = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
+    expected = both_ends(K, [-0.5, 0, 0])[np.ix_(order, order)]
+    assert mmread(path).toarray() == pytest.approx(expected, rel=1e-15)
+
+
+def test_six_rows_are_the_tip_s(tmp_path):
+    np.save(tmp_path / "k.npy", textbook_beam()[6:, 6:])
+    assert_same(
+        import_link(tmp_path / "k.npy", unit="mm").stiffness, expected_stiffness()
+    )
+
+
+def test_masses_are_read_beside(tmp_path):
+    """Two lumps at the ends: centre in the middle, m L^2 / 4 about it."""
+    path = tmp_path / "k.mtx"
+    path.write_text(user_element(textbook_beam(), beam_mass()))
+    link = import_link(path, mass=path, unit="mm")
+    mass = RHO * 1e3 * np.pi * RADIUS**2 * LENGTH  # tonnes to kg
+    assert link.mass == pytest.approx(mass, rel=1e-12)
+    middle = (link.base + link.tip) / 2
+    assert link.center_of_mass == pytest.approx(middle, abs=1e-12)
+    expected = np.diag([0, 1, 1]) * mass * 0.5**2 / 4
+    assert link.inertia == pytest.approx(expected, abs=1e-12 * mass)
+
+
+def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
+    """Two half beams in a row, the node between them left to itself, are one beam."""
+    K, part = np.zeros((18, 18)), textbook_beam(LENGTH / 2)
+    K[:12, :12] += part
+    K[6:, 6:] += part
+    np.save(tmp_path / "k.npy", K)
+    link = import_link(tmp_path / "k.npy", unit="mm", base="1", tip="3")
+    assert_same(link.stiffness, expected_stiffness())
+
+
+def full_matrix(counts=(2, 2, 5)):
+    """Nodes and sparse matrix of a bar of cubic elements, 0.02 by 0.03 by 0.2 m."""
+    solid = box_solid(counts, np.array([0.02, 0.03, 0.2]))
+    mesh = isoparametric(solid, 3)
+    lam, mu = (np.full(len(mesh.cells), c) for c in lame(7e10, 0.33))
+    upper = assemble(mesh, lam, mu)
+    return mesh.nodes, csr_matrix(upper + upper.T - diags(upper.diagonal()))
+
+
+def write_solid(folder, nodes, K):
+    """The two files of a solid: its nodes, and its matrix in five columns."""
+    lines = [f"{i},{x!r},{y!r},{z!r}" for i, (x, y, z) in enumerate(nodes.tolist(), 1)]
+    (folder / "nodes.csv").write_text("\n".join(lines))
+    upper = csr_matrix(np.triu(K.toarray())).tocoo()
+    rows = zip(upper.row.tolist(), upper.col.tolist(), upper.data.tolist(), strict=True)
+    (folder / "k.mtx").write_text("\n".join(
+        f"{i // 3 + 1} {i % 3 + 1} {j // 3 + 1} {j % 3 + 1} {v!r}" for i, j, v in rows
+    ))  # fmt: skip
+
+
+@pytest.mark.exudyn
+def test_a_solid_is_condensed_as_exudyn_condenses_it(tmp_path):
+    """Rigid faces at both ends (RBE2), static modes of Hurty-Craig-Bampton, to 1e-8."""
+    fem = pytest.importorskip("exudyn.FEM")
+    nodes, K = full_matrix()
+    write_solid(tmp_path, nodes, K)
+    link = import_link(
+        tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", base="z=0", tip="z=0.2"
+    )
+    ends = [np.flatnonzero(np.abs(nodes[:, 2] - z) < 1e-9) for z in (0, 0.2)]
+    other = fem.FEMinterface()
+    other.nodes = {"Position": nodes}
+    other.surface = [{"Name": "none", "Trigs": []}]
+    other.stiffnessMatrix = K
+    other.massMatrix = csr_matrix(np.eye(3 * len(nodes)))
+    other.ComputeHurtyCraigBamptonModes(
+        [end.tolist() for end in ends], 0,
+        computationMode=fem.HCBstaticModeSelection.RBE2,
+    )  # fmt: skip
+    reduced = fem.ObjectFFRFreducedOrderInterface(other)
+    basis = np.asarray(reduced.modeBasis)
+    rigid = np.zeros((len(ends[1]), 3, 6))
+    for k in range(3):
+        rigid[:, :, k] = np.cross(np.eye(3)[k], nodes[ends[1]] - link.tip)
+        rigid[:, k, 3 + k] = 1.0
+    moved = basis.reshape(-1, 3, basis.shape[1])[ends[1]]
+    screws = np.linalg.lstsq(rigid.reshape(-1, 6), moved.reshape(-1, 6))[0]
+    back = np.linalg.inv(screws)
+    theirs = back.T @ np.asarray(reduced.stiffnessMatrixReduced) @ back
+    assert_same(link.stiffness, theirs, 1e-8)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "options", "message"),
+    [
+        (lambda K: K[:, :11], [], "expected a square"),
+        (lambda K: K[:11, :11], [], "found 11 rows without names"),
+        (lambda K: K + np.eye(12, k=1) * 1e4, [], "not symmetric: found"),
+        (lambda K: K + np.diag([1e3] * 12), [], "the two interfaces do not balance"),
+        (lambda K: -K, [], "is not positive definite"),
+        (lambda K: K * np.nan, [], "not finite"),
+        (lambda K: K, ["--tip", "3"], "node 3 of"),
+        (lambda K: K, ["--tip", "1"], "base and tip share freedoms"),
+        (lambda K: K, ["--tip", "z=1"], "needs the places of nodes: --nodes"),
+        (lambda K: K, ["--tip", "q"], "--tip: found 'q', expected"),
+        (lambda K: K, ["--unit", "ft"], '--unit: found "ft"'),
+        (lambda K: K, ["--order", "x"], '--order: found "x"'),
+        (lambda K: np.array(["a"]), [], "expected a square of numbers"),
+    ],
+)
+def test_what_is_no_link_is_one_line(run, matrix, options, message, tmp_path):
+    path = tmp_path / "k.npy"
+    np.save(path, matrix(textbook_beam()))
+    status, out, err = run("stiffness", "import", path, *options)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("k.mtx", "%%MatrixMarket matrix nonsense\n", "no Matrix Market file"),
+        ("k.mtx", "1 1 1 1\n", "line 1: found 4 words"),
+        ("k.mtx", "1 1 1 1 x\n", "expected a number"),
+        ("k.mtx", "", "found no entries"),
+        ("k.mtx", "*USER ELEMENT,NODES=2\n", "found no ** ELEMENT NODES"),
+        ("k.mtx", user_element(np.eye(11)), "found 66 numbers, expected 78"),
+        ("k.pch", "DMIG    A              0       9       1       0\n", "form '9'"),
+        ("k.pch", "DMIG,A,1,x,,1,1,1.0\n", "expected a whole number"),
+        ("k.npy", "not numpy", "no matrix of NumPy"),
+        ("k.npz", "not numpy", "no matrix of NumPy"),
+        ("k.odb", "", "found the ending .odb, expected one of"),
+    ],
+)
+def test_a_wrong_file_is_one_line(run, name, text, message, tmp_path):
+    (tmp_path / name).write_text(text)
+    status, out, err = run("stiffness", "import", tmp_path / name)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+
+
+def test_from_a_beam_to_nastran_and_back(run, tmp_path):
+    """The command's own files: beam --json, export, import --json."""
+    f = tmp_path
+    beam = ["--length", 0.5, "--radius", 0.01, "--young", 2.1e11, "--poisson", 0.3]
+    assert run("stiffness", "beam", *beam, "--json", f / "b.json")[0] == 0
+    words = ["stiffness", "export", f / "b.json", "--to", "nastran", "-o", f / "b.pch"]
+    assert run(*words)[0] == 0
+    status, out, _ = run("stiffness", "import", f / "b.pch", "--json", "-")
+    assert status == 0
+    K, _ = read_link_results(f / "b.json")
+    assert_same(np.array(json.loads(out)["stiffness"]), K, 1e-8)
+    status, _, err = run(*words[:3], "--to", "nastra", "-o", f / "c.pch")
+    assert status == 2
+    assert 'did you mean "nastran"?' in err
+    assert "exudyn" in FORMATS
+    status, _, err = run(
+        "stiffness", "export", f / "b.pch", "--to", "abaqus", "-o", f / "d"
+    )
+    assert status == 2
+    assert "found no stiffness, base and tip" in err
