@@ -12,7 +12,7 @@ grid of its workspace.  Printed, in this order:
   ratio of cvxpy's DPP to each;
 - the same for the margin (21), both readings;
 - the share of the grid's points with a certified energy at six multiples of the errors,
-  and how many of them the slower road had to solve.
+  and how many of them the fallback had to solve.
 
 The slow ways see a sample of the grid, ours all of it; nothing is run twice to choose
 the better time but ours, whose first run compiles.
@@ -252,7 +252,7 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
         share, slow = answers.certified.mean() * 100, answers.fallbacks()
         newton = np.mean(answers.outcome == 0) * 100
         print(
-            f"errors times {kappa:<5g} {share:6.2f} %   slower road: {slow or 'none'}; "
+            f"errors times {kappa:<5g} {share:6.2f} %   fallback: {slow or 'none'}; "
             f"Newton alone {newton:.0f} %"
         )
 
