@@ -5,7 +5,7 @@ up to a share of the paper's.  Printed for each share: how many of the draws cos
 nothing, how many were certified and how many went to the fallback; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-solver of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second of
+solver of :mod:`assembly.batch.many_postures`, which reduces each draw, per second of
 processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
@@ -44,7 +44,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
-    """Draws without energy, certified, and by the fallback, of one block; drawing included."""
+    """Draws without energy, certified, and by the fallback, of one block."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     found = one.solve(errors)
     h = errors.reshape(BLOCK, -1) @ one.misfit.T
