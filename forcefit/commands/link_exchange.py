@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.stiffness_options import Json
+from forcefit.commands.options import JsonOption
 from forcefit.inputs.writing import check_writable, write_bytes, write_json
 
 Length = Annotated[str, typer.Option(help="Of lengths: m, cm, mm, um, inch; N, rad.")]
@@ -34,7 +34,7 @@ def import_(
             "translations-first, rotations-first."
         ),
     ] = "translations-first",
-    json: Json = None,
+    json: JsonOption = None,
 ) -> None:
     """K_E from another program's matrix, condensed on two interfaces."""
     from stiffness.exchange.import_link import import_link
