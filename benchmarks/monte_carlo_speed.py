@@ -44,7 +44,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
-    """Draws without energy, certified, and by the fallback, of one block; drawing included."""
+    """Draws without energy, certified, and by the fallback, of one block."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
     h = errors.reshape(BLOCK, -1) @ one.misfit.T
@@ -86,7 +86,7 @@ def main() -> None:
         minimise_energies(posture.robot, T, few)
         batch = len(few) / (time.process_time() - start)
         print(
-            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {slower:6.4f}  "
+            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {fallback:6.4f}  "
             f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}  "
             f"{batch:18.0f}"
         )
