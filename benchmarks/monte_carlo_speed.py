@@ -2,10 +2,14 @@
 
 The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
 up to a share of the paper's.  Printed for each share: how many of the draws cost
+<<<<<<< HEAD
 nothing, how many were certified and how many needed the fallback; draws per second of
+=======
+nothing, how many were certified and how many went to the fallback; draws per second of
+>>>>>>> wt_namesA
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-road of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second of
+solver of :mod:`assembly.batch.many_postures`, which reduces each draw, per second of
 processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 

@@ -257,7 +257,7 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
         print(f"{'ours, one at a time':28}{single:10.2f}{single / batched:11.1f}")
         print(
             f"{'ours, batched':28}{batched:10.3f}{1:11d}  {batch.supports.mean():.1f} "
-            f"supports a point, {batch.fallback.sum()} by the slower road"
+            f"supports a point, {batch.fallback.sum()} by the fallback"
         )
 
 
@@ -286,7 +286,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
         f"\nthe study, {len(T)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "
         f"{done - solved:.2f}); widest bracket {widest:.1e}, "
-        f"{energies.certified.mean():.0%} of energies certified, {slow} by slower roads"
+        f"{energies.certified.mean():.0%} of energies certified, {slow} by fallbacks"
     )
 
 

@@ -191,7 +191,7 @@ def _complementary(
     s: Structure, P: Matrices, errors: Matrix, multipliers: Vector, motions: Vector
 ) -> tuple[float, float]:
     """Wrenches times f prove f gain - f^2 cost / 2: (gain, cost)."""
-    # the complementary energy of assembly.linear.energy.Assembly.bound
+    # the complementary energy of assembly.linear.assembled.Assembly.bound
     n = len(P)
     wrenches = np.zeros((n, 6))
     at_platform = np.zeros(6)

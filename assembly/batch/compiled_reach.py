@@ -32,7 +32,7 @@ from assembly.solvers.compiled import (
 )
 from assembly.solvers.farthest import DONE, advance, begin
 from assembly.solvers.householder import CLEAR, triangulate, turn_all
-from assembly.solvers.interior import LANES
+from assembly.solvers.layers import LANES
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import ConvexBody
 from assembly.solvers.vectors import copy, into_cones

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from assembly.linear.thresholds import NOISE
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import CLEAR, triangulate, turn, turn_all, turn_back
-from assembly.solvers.interior import LANES
+from assembly.solvers.layers import LANES
 from assembly.solvers.vectors import copy, divide, fill
 
 

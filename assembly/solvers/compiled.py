@@ -124,9 +124,9 @@ class _Part:
             self.signature, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS,
             **self.options,
         )(function)  # fmt: skip
-        found = compiled.overloads[self.signature.args]
-        native = found.fndesc.llvm_func_name
-        add_symbol(name, found.library.get_pointer_to_function(native))
+        overload = compiled.overloads[self.signature.args]
+        native = overload.fndesc.llvm_func_name
+        add_symbol(name, overload.library.get_pointer_to_function(native))
         self.loaded = True
 
 

@@ -29,7 +29,7 @@ from assembly.solvers.compiled import (
     Vector,
     part,
 )
-from assembly.solvers.interior import LANES, add, dot, layers_of
+from assembly.solvers.layers import LANES, add, dot, layers_of
 
 FAST = {"contract", "reassoc"}
 _HALVINGS = 12

@@ -11,7 +11,7 @@ Sources:
 import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, part
-from assembly.solvers.interior import LANES
+from assembly.solvers.layers import LANES
 
 CLEAR = 10.0  # within this factor of the threshold the rank is ambiguous
 

@@ -7,9 +7,8 @@ multipliers, satisfies everything but H u = k, and so do all iterates: the gap i
 sum of s.z over the cones.  Each step solves one symmetric system of the size of G's and
 H's rows together, about 10 by 10, whatever the number of clearances.
 
-For speed the columns are sorted into layers, the first of every cone, then the second
-of every cone that has one, and so on, the largest cones first: loops over the cones run
-along a layer, several cones at once in the processor's vector registers.
+The columns are sorted into layers, see :mod:`assembly.solvers.layers`; the scaling is
+in :mod:`assembly.solvers.nesterov_todd`.
 
 Sources:
     Nesterov, Todd (1997), Self-scaled barriers and interior-point methods for convex
@@ -30,14 +29,14 @@ from assembly.solvers.compiled import (
     kernel,
     part,
 )
+from assembly.solvers.layers import FAST, LANES, add, cone_sums, dot, layers_of
+from assembly.solvers.nesterov_todd import corrected, scalings, square_scaled
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the step to the nearest boundary of a cone
 # 3 is usual; on these problems 2 takes a seventh, 1.5 a sixth less iterations
 _CENTRING = 1.5
 _FAR = 1e30
-LANES = 16
-FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
 @part(fastmath=FAST)
@@ -91,7 +90,7 @@ def interior_point(
     for i in range(r):
         y[i] = h[i]
     _dual(M, y, linear, z1)
-    _sum(layers, z1, z1, sums[0])
+    cone_sums(layers, z1, z1, sums[0])
     for c in range(cones):
         z0[c] = np.sqrt(sums[0, c]) + 1.0
     taken = -1
@@ -112,13 +111,13 @@ def interior_point(
             break
         mu = gap / cones
         # scaling of each cone, and S = M D^-1 M^T + diag(1 .. 1, 0 .. 0)
-        if not _scalings(layers, u, z0, z1, eta, w0, w1, l0, l1, across, along, sums):
+        if not scalings(layers, u, z0, z1, eta, w0, w1, l0, l1, across, along, sums):
             break
         _fill_system(layers, M, w1, eta, along, across, sums, B, S, r)
         if not _cholesky(S):
             break
         # predictor: no centring, no correction
-        _sum(layers, u, z1, sums[0])
+        cone_sums(layers, u, z1, sums[0])
         for c in range(cones):
             t0[c] = -l0[c]
             r0[c] = -z0[c] - sums[0, c]
@@ -129,7 +128,7 @@ def interior_point(
         step = min(1.0, _longest(layers, u, du, z0, z1, dz0, dz1, sums))
         sigma = (1.0 - step) ** _CENTRING
         # corrector: centre, and what the predictor's product of steps leaves
-        _corrected(layers, eta, w0, w1, l0, l1, du, dz0, dz1, sigma * mu, sums,
+        corrected(layers, eta, w0, w1, l0, l1, du, dz0, dz1, sigma * mu, sums,
                    t0, t1, r0)  # fmt: skip
         _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1,
                    residual, r, sums, e, f, right, du, dz0, dz1)  # fmt: skip
@@ -152,62 +151,6 @@ def interior_point(
     return minimiser, y[r:].copy(), taken
 
 
-@part
-def layers_of(starts: GivenIndices) -> tuple[Indices, Indices]:
-    """Columns sorted into layers, the largest cones first.
-
-    Args:
-        starts: (cones + 1,) first column of each cone, and nu.
-
-    Returns:
-        (nu,) column at each place; (widest + 1,) first place of each layer, and nu.
-    """
-    cones, widest = len(starts) - 1, 0
-    for c in range(cones):
-        widest = max(widest, starts[c + 1] - starts[c])
-    order, layers = np.empty(starts[-1], np.int64), np.empty(widest + 1, np.int64)
-    place = 0
-    for layer in range(widest):
-        layers[layer] = place
-        for size in range(widest, layer, -1):
-            for c in range(cones):
-                if starts[c + 1] - starts[c] == size:
-                    order[place] = starts[c] + layer
-                    place += 1
-    layers[widest] = place
-    return order, layers
-
-
-@kernel(fastmath=FAST)
-def dot(a: NDArray, b: NDArray) -> float:
-    """Inner product of two rows, fast where they are padded to a multiple of LANES.
-
-    Args:
-        a: (width,).
-        b: (width,).
-
-    Returns:
-        a.b.
-    """
-    total = 0.0
-    for j in range(len(a)):
-        total += a[j] * b[j]
-    return total
-
-
-@kernel(fastmath=FAST)
-def add(weight: float, row: NDArray, total: NDArray) -> None:
-    """Add a multiple of a row.
-
-    Args:
-        weight: which multiple.
-        row: (width,).
-        total: (width,) incremented in place.
-    """
-    for j in range(len(total)):
-        total[j] += weight * row[j]
-
-
 @kernel(fastmath=FAST)
 def _dual(M: NDArray, y: NDArray, linear: NDArray, z1: NDArray) -> None:
     """z1 = M^T y + linear."""
@@ -215,78 +158,6 @@ def _dual(M: NDArray, y: NDArray, linear: NDArray, z1: NDArray) -> None:
         z1[j] = linear[j]
     for i in range(len(y)):
         add(y[i], M[i], z1)
-
-
-@kernel(fastmath=FAST)
-def _sum(layers: NDArray, a: NDArray, b: NDArray, total: NDArray) -> None:
-    """Inner products of a's and b's parts in every cone."""
-    for c in range(len(total)):
-        total[c] = 0.0
-    for layer in range(len(layers) - 1):
-        x, y = (
-            a[layers[layer] : layers[layer + 1]],
-            b[layers[layer] : layers[layer + 1]],
-        )
-        for c in range(len(x)):
-            total[c] += x[c] * y[c]
-
-
-@part(fastmath=FAST)
-def _scalings(
-    layers: Indices, u: Vector, z0: Vector, z1: Vector, eta: Vector, w0: Vector,
-    w1: Vector, l0: Vector, l1: Vector, across: Vector, along: Vector,
-    sums: Matrix,
-) -> bool:  # fmt: skip
-    """Nesterov-Todd points of all cones, W = eta (w), and the scaled point l = W z.
-
-    D^-1 = W^2 is ``across`` across w and ``along`` along it; w grows without bound, so
-    the two are kept apart.  ``sums[5]`` is overwritten with 1 / w.w.
-
-    Returns:
-        Whether all cones have such points.
-    """
-    ss, zz, sz, s_part, z_part, inverse = (
-        sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
-    )  # fmt: skip
-    _sum(layers, u, u, ss)
-    _sum(layers, z1, z1, zz)
-    _sum(layers, u, z1, sz)
-    outside = 0
-    for c in range(len(z0)):
-        s_norm, z_norm = np.sqrt(ss[c]), np.sqrt(zz[c])
-        s_size = (1.0 - s_norm) * (1.0 + s_norm)
-        z_size = (z0[c] - z_norm) * (z0[c] + z_norm)
-        outside += not (s_size > 0.0)
-        outside += not (z_size > 0.0)
-        s_size, z_size = np.sqrt(s_size), np.sqrt(z_size)
-        inner = (z0[c] + sz[c]) / (s_size * z_size)
-        double = np.sqrt(2.0 + 2.0 * inner)
-        eta[c] = np.sqrt(s_size / z_size)
-        w0[c] = (1.0 / s_size + z0[c] / z_size) / double
-        s_part[c] = 1.0 / (s_size * double)
-        z_part[c] = 1.0 / (z_size * double)
-    if outside:
-        return False
-    for layer in range(len(layers) - 1):
-        a, b = layers[layer], layers[layer + 1]
-        own, dual, w = u[a:b], z1[a:b], w1[a:b]
-        for c in range(len(own)):
-            w[c] = s_part[c] * own[c] - z_part[c] * dual[c]
-    ww, wz = ss, zz
-    _sum(layers, w1, w1, ww)
-    _sum(layers, w1, z1, wz)
-    for c in range(len(z0)):
-        l0[c] = eta[c] * (w0[c] * z0[c] + wz[c])
-        wz[c] = z0[c] + wz[c] / (1.0 + w0[c])
-        across[c] = eta[c] * eta[c]
-        along[c] = across[c] / (1.0 + 2.0 * ww[c])
-        inverse[c] = 1.0 / (ww[c] if ww[c] > 0.0 else 1.0)
-    for layer in range(len(layers) - 1):
-        a, b = layers[layer], layers[layer + 1]
-        dual, w, scaled = z1[a:b], w1[a:b], l1[a:b]
-        for c in range(len(w)):
-            scaled[c] = eta[c] * (dual[c] + wz[c] * w[c])
-    return True
 
 
 @part(fastmath=FAST)
@@ -300,7 +171,7 @@ def _fill_system(
         root[c] = np.sqrt(along[c])
     for i in range(len(S)):
         row, scaled = M[i], B[i]
-        _sum(layers, row, w1, part)
+        cone_sums(layers, row, w1, part)
         for c in range(len(part)):
             part[c] *= inverse[c]
         for layer in range(len(layers) - 1):
@@ -344,24 +215,6 @@ def _cholesky(S: Matrix) -> bool:
 
 
 @part(fastmath=FAST)
-def _square_scaled(
-    layers: Indices, w1: Vector, across: Vector, along: Vector, sums: Matrix,
-    x: Vector, out: Vector,
-) -> None:  # fmt: skip
-    """D^-1 x."""
-    part, inverse = sums[0], sums[5]
-    _sum(layers, x, w1, part)
-    for c in range(len(part)):
-        part[c] *= inverse[c]
-    for layer in range(len(layers) - 1):
-        a, b = layers[layer], layers[layer + 1]
-        own, w, product = x[a:b], w1[a:b], out[a:b]
-        for c in range(len(w)):
-            lengthwise = part[c] * w[c]
-            product[c] = across[c] * (own[c] - lengthwise) + along[c] * lengthwise
-
-
-@part(fastmath=FAST)
 def _direction(
     layers: Indices, M: Matrix, S: Matrix, eta: Vector, w0: Vector, w1: Vector,
     across: Vector, along: Vector, t0: Vector, t1: Vector, r0: Vector, u: Vector,
@@ -376,7 +229,7 @@ def _direction(
     """
     m = len(S)
     part, other = sums[0], sums[1]
-    _sum(layers, w1, t1, part)  # f = (W^-1 t)_1
+    cone_sums(layers, w1, t1, part)  # f = (W^-1 t)_1
     for c in range(len(part)):
         other[c] = 1.0 / eta[c]
         part[c] = part[c] / (1.0 + w0[c]) - t0[c]
@@ -385,7 +238,7 @@ def _direction(
         w, t, out = w1[a:b], t1[a:b], f[a:b]
         for c in range(len(w)):
             out[c] = (t[c] + part[c] * w[c]) * other[c]
-    _square_scaled(layers, w1, across, along, sums, f, e)
+    square_scaled(layers, w1, across, along, sums, f, e)
     for i in range(m):
         right[i] = dot(M[i], e)
     for i in range(m - r):
@@ -406,52 +259,11 @@ def _direction(
         add(right[i], M[i], dz1)
     for j in range(len(dz1)):
         e[j] = f[j] - dz1[j]
-    _square_scaled(layers, w1, across, along, sums, e, du)  # du = D^-1 (f - M^T right)
-    _sum(layers, z1, du, part)
-    _sum(layers, u, dz1, other)
+    square_scaled(layers, w1, across, along, sums, e, du)  # du = D^-1 (f - M^T right)
+    cone_sums(layers, z1, du, part)
+    cone_sums(layers, u, dz1, other)
     for c in range(len(part)):
         dz0[c] = r0[c] - part[c] - other[c]
-
-
-@part(fastmath=FAST)
-def _corrected(
-    layers: Indices, eta: Vector, w0: Vector, w1: Vector, l0: Vector, l1: Vector,
-    du: Vector, dz0: Vector, dz1: Vector, target: float, sums: Matrix,
-    t0: Vector, t1: Vector, r0: Vector,
-) -> None:  # fmt: skip
-    """Solve l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t."""
-    ds, dz, ll, lt = sums[0], sums[1], sums[2], sums[3]
-    _sum(layers, w1, du, ds)
-    _sum(layers, w1, dz1, dz)
-    for c in range(len(eta)):
-        ll[c], lt[c] = 0.0, 0.0
-        s0 = -ds[c] / eta[c]
-        y0 = eta[c] * (w0[c] * dz0[c] + dz[c])
-        r0[c] = target - s0 * y0 - l0[c] * l0[c]
-        ds[c] = ds[c] / (1.0 + w0[c])
-        dz[c] = dz0[c] + dz[c] / (1.0 + w0[c])
-        # kept for the columns
-        sums[4, c], t0[c] = s0, y0
-    for layer in range(len(layers) - 1):
-        a, b = layers[layer], layers[layer + 1]
-        w, scaled, t = w1[a:b], l1[a:b], t1[a:b]
-        s_step, z_step = du[a:b], dz1[a:b]
-        for c in range(len(w)):
-            s1 = (s_step[c] + ds[c] * w[c]) / eta[c]
-            y1 = eta[c] * (z_step[c] + dz[c] * w[c])
-            r0[c] -= s1 * y1 + scaled[c] * scaled[c]
-            t[c] = -(sums[4, c] * y1 + t0[c] * s1) - 2.0 * l0[c] * scaled[c]
-            ll[c] += scaled[c] * scaled[c]
-            lt[c] += scaled[c] * t[c]
-    for c in range(len(eta)):
-        size = np.sqrt(ll[c])
-        t0[c] = (l0[c] * r0[c] - lt[c]) / ((l0[c] - size) * (l0[c] + size))
-        ll[c] = 1.0 / l0[c]
-    for layer in range(len(layers) - 1):
-        a, b = layers[layer], layers[layer + 1]
-        scaled, t = l1[a:b], t1[a:b]
-        for c in range(len(t)):
-            t[c] = (t[c] - t0[c] * scaled[c]) * ll[c]
 
 
 @part(fastmath=FAST)
@@ -461,15 +273,15 @@ def _longest(
 ) -> float:  # fmt: skip
     """Longest step that keeps every s and z in its cone."""
     aa, ab, bb = sums[0], sums[1], sums[2]
-    _sum(layers, du, du, aa)
-    _sum(layers, u, du, ab)
-    _sum(layers, u, u, bb)
+    cone_sums(layers, du, du, aa)
+    cone_sums(layers, u, du, ab)
+    cone_sums(layers, u, u, bb)
     for c in range(len(z0)):
         aa[c] = _root(aa[c], ab[c], bb[c] - 1.0)
     ya, yb, yc = ab, bb, sums[3]
-    _sum(layers, dz1, dz1, ya)
-    _sum(layers, z1, dz1, yb)
-    _sum(layers, z1, z1, yc)
+    cone_sums(layers, dz1, dz1, ya)
+    cone_sums(layers, z1, dz1, yb)
+    cone_sums(layers, z1, z1, yc)
     for c in range(len(z0)):
         ya[c] = _root(
             ya[c] - dz0[c] * dz0[c], yb[c] - z0[c] * dz0[c], yc[c] - z0[c] * z0[c]

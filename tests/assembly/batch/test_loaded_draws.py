@@ -19,7 +19,7 @@ from assembly.solvers.conic import SolverFailed
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
-from forcefit.commands.statistics import app
+from forcefit.commands.assembly import app
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import random_robot
 
