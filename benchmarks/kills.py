@@ -333,7 +333,7 @@ def mounted(folder: Path, kilobytes: int) -> bool:
 
 def inputs(folder: Path) -> None:
     """What the commands read."""
-    from tests.test_diagnosis import measure
+    from tests.validation.diagnosis.test_diagnosis import measure
 
     (folder / "errors.toml").write_text(ERRORS)
     (folder / "plan.toml").write_text(PLAN)

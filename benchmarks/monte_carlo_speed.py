@@ -2,15 +2,11 @@
 
 The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
 up to a share of the paper's.  Printed for each share: how many of the draws cost
-<<<<<<< HEAD
 nothing, how many were certified and how many needed the fallback; draws per second of
-=======
-nothing, how many were certified and how many went to the fallback; draws per second of
->>>>>>> wt_namesA
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-solver of :mod:`assembly.batch.many_postures`, which reduces each draw, per second of
-processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+solver of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second
+of processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
 import sys
@@ -90,7 +86,7 @@ def main() -> None:
         minimise_energies(posture.robot, T, few)
         batch = len(few) / (time.process_time() - start)
         print(
-            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {fallback:6.4f}  "
+            f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {fallback:8.4f}  "
             f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}  "
             f"{batch:18.0f}"
         )

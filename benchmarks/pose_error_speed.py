@@ -193,8 +193,8 @@ def _secant_node(
         return None
     x = c + X @ v
     # the dual value, whatever the solver's status: an upper bound
-    pull = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
-    value = b[: len(k) + 6] @ z[: len(k) + 6] + conic.cone_sizes(pull, group).sum()
+    dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
+    value = b[: len(k) + 6] @ z[: len(k) + 6] + conic.cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x
 
 

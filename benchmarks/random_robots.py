@@ -186,17 +186,17 @@ def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
 
 def _largest_load(tight: Robot) -> float:
     """[N] under which the platform gives way by about what is allowed at home."""
-    pushes = [np.eye(6)[k] for k in (3, 4, 5)]
-    softest = (_moved(tight, pushes, tight) / _ALLOWED).max()
+    forces = [np.eye(6)[k] for k in (3, 4, 5)]
+    softest = (_moved(tight, forces, tight) / _ALLOWED).max()
     return float(f"{np.clip(1 / softest, 0.5, 400):.2g}")
 
 
-def _moved(robot: Robot, pushes: list[NDArray], tight: Robot) -> NDArray:
-    """(k, 2) [rad, m] how far pushes move the home platform."""
+def _moved(robot: Robot, forces: list[NDArray], tight: Robot) -> NDArray:
+    """(k, 2) [rad, m] how far forces move the home platform."""
     home = home_posture(tight)
     names = [frame.name for frame in robot.frames]
     q = dict(zip(names, home.coordinates.tolist(), strict=True))
-    rests = rest_on_springs([Machine(robot, q, push) for push in pushes])
+    rests = rest_on_springs([Machine(robot, q, force) for force in forces])
     T = np.array([r.transforms[robot.index(robot.platform)] for r in rests])
     turns = [np.linalg.norm(turn_of(R @ home.platform[:3, :3].T)) for R in T[:, :3, :3]]
     shifts = np.linalg.norm(T[:, :3, 3] - home.platform[:3, 3], axis=1)

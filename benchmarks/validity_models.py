@@ -11,6 +11,7 @@ from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly, solve_with
 from assembly.linear.load import loads_on_frames, weights
 from assembly.linear.zone import Zone, margin_with
+from assembly.model.clearance import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints
 from validation.assumptions.validity import Cost, cost_between
@@ -39,7 +40,7 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
     return robot.with_links({**links})
 
 
-def bush_margin(posture: Posture, compliant: str = "rigid") -> Zone:
+def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
     """Factor on all clearances at which a rigid manipulator on bushes just assembles.
 
     Args:

@@ -24,7 +24,7 @@ _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
 class FactorisationFailed(RuntimeError):
-    """A sparse factorisation gave up."""
+    """A sparse factorisation failed."""
 
 
 @cache

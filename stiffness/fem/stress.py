@@ -3,7 +3,7 @@
 Six fields, one for each component of the wrench, are enough: stresses superpose.
 At the edge of a rigid interface the elastic solution is singular: the peak there grows
 without bound as the mesh is refined and means nothing.  Stresses are therefore reported
-only at some distance from the interfaces, one interface radius unless told otherwise,
+only at some distance from the interfaces, one interface radius by default,
 and the report says so.  What happens inside that distance, and how a real joint holds
 the link, is left out.
 """

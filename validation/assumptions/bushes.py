@@ -63,7 +63,7 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     Raises:
         CannotAssemble: a closure is open that nothing can close.
         FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver failed.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     joints = bush_joints(virtual_joints(posture.robot))

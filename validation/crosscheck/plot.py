@@ -83,7 +83,7 @@ def stiffness_figure(beam: NDArray, fea: NDArray) -> "Figure":
 def closing_figure(
     posture: Posture, sequence: NDArray, exaggeration: float | None = None
 ) -> "Figure":
-    """A robot open, half shut and shut, its displacements exaggerated.
+    """A robot open, half closed and closed, its displacements exaggerated.
 
     Args:
         posture: nominal.

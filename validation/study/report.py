@@ -338,9 +338,7 @@ def _crosscheck(results: StudyResults) -> str:
     closing = ""
     if results.closing is not None:
         figure = closing_figure(check.posture, results.closing)
-        closing = html_figure(
-            figure, "The simulation pulls the open robot shut by force."
-        )
+        closing = html_figure(figure, "The simulation closes the open robot by force.")
     return (
         head + "The same forced assembly, without "
         "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "

@@ -89,7 +89,7 @@ class StudyResults:
     @property
     def unchecked(self) -> dict[str, str]:
         """What could not be checked, and why."""
-        silent = "its errors ask nothing of its springs and play at this pose"
+        silent = "its errors need neither springs nor clearances at this pose"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
         why = {"not run": "there is no assembly to check", "no signal": silent}

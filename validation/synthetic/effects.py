@@ -246,8 +246,8 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
             continue
         K = np.repeat(SENSOR, 3)
         K[robot.frame(name).own_axis] = math.inf
-        robot = insert_after(robot, name, "play", joint_stiffness=np.diag(K))
-        laws[f"{name}~play"] = ClearanceLaw(clearance)
+        robot = insert_after(robot, name, "clearance", joint_stiffness=np.diag(K))
+        laws[f"{name}~clearance"] = ClearanceLaw(clearance)
     return replace(machine, robot=robot, laws=laws)
 
 

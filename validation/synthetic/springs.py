@@ -80,7 +80,9 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     """
     robot = machines[0].robot
     if any(f.clearance is not None for m in machines for f in m.robot.frames):
-        raise SimulationFailed(robot.name, "play in closed loops is not for springs")
+        raise SimulationFailed(
+            robot.name, "clearances in closed loops need --program multibody"
+        )
     q = np.array([
         [m.coordinates.get(f.name, 0.0) for f in m.robot.frames] for m in machines
     ])

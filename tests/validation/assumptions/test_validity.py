@@ -42,7 +42,7 @@ def cantilever(link=FLAT, length=0.5):
 
 
 def pin(error):
-    """A pin with play between two rigid parts that miss each other by an error."""
+    """A pin with clearance between two rigid parts that miss each other by an error."""
     frames = (
         Frame("pin", clearance=PLAY, geometric_error=error),
         Frame("end", "pin"),
@@ -101,7 +101,7 @@ def test_bushes_lie_between_disc_and_cone_and_half_of_these(posture):
 
 
 def test_bushes_leave_joints_without_tilt_alone():
-    robot = load_robot("hexapod")  # ball joints and cardans: radial and axial play
+    robot = load_robot("hexapod")  # ball joints and cardans: radial and axial clearance
     joints = virtual_joints(robot)
     np.testing.assert_array_equal(bush_joints(joints).cones, joints.cones)
 

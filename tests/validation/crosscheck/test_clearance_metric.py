@@ -32,7 +32,7 @@ DISC = ClearanceCone((3, 4), 3e-5, 1e12)
 
 
 def coaxial(error, clearance, length=0.4):
-    """Two beams that miss each other by an error, one of them with play at its end."""
+    """Two beams that miss each other by an error, one with clearance at its end."""
     frames = (
         Frame("a", translation=[length, 0, 0], rotation=[0, math.pi / 2, 0],
               link=ROUND, geometric_error=error, clearance=clearance),
@@ -85,8 +85,8 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
 
     At z = h the axis is at (TX + h RY, TY - h RX).
     """
-    play = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
-    bushes = joint_clearance(Frame("f", clearance=play), bushes=True)
+    clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
+    bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
         ((5,), 1e-5, 0.0), ((3, 4), 3e-5, 0.04), ((3, 4), 3e-5, -0.04)
     ]  # fmt: skip
@@ -102,13 +102,13 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
 
 def test_a_joints_play_follows_the_format():
     """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
-    play = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
-    fixed = joint_clearance(Frame("f", clearance=play), scale=0.5)
+    clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
+    fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
     assert [(c.rows, c.size) for c in fixed.cones] == [
         ((0, 1), 1e-4), ((2,), 5e-3), ((3, 4), 5e-6)
     ]  # fmt: skip
     assert fixed.free == ()
-    pin = Frame("p", joint="revolute", clearance=replace(play, spin=None))
+    pin = Frame("p", joint="revolute", clearance=replace(clearance, spin=None))
     assert joint_clearance(pin).free == (2,)
     assert sorted(joint_clearance(pin).unlocked) == [0, 1, 2, 3, 4]
     slide = Frame("s", joint="prismatic", clearance=Clearance(axial=0.02, radial=1e-5))
@@ -118,7 +118,7 @@ def test_a_joints_play_follows_the_format():
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
 def test_axial_play_is_taken_off_the_misfit(misfit):
-    """E = (g - c)^2 EA / 2(2L), c = 30 um; play is along the joint's z.
+    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z.
 
     A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
     correction for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left.
@@ -241,7 +241,7 @@ def test_a_wrong_clearance_is_found_out(irsbot2, monkeypatch):
 
 
 def heavy(length=0.4):
-    """Two beams of 4 kg and 6 kg bodies, 60 um off, one end with play of 20 um."""
+    """Two beams of 4 kg and 6 kg bodies, 60 um off, one end with clearance of 20 um."""
     frames = coaxial(
         [0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5), length
     ).robot.frames
@@ -257,7 +257,7 @@ def heavy(length=0.4):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_weight_acts_beside_play(links):
-    """A hundredfold weight takes up what the play leaves: energy, springs, gap hold.
+    """A hundredfold weight exceeds the clearance: energy, springs, gap hold.
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
     """
@@ -299,10 +299,10 @@ def drawn(name, size, pose=None):
      ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed")],
 )  # fmt: skip
 def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
-    """No load, and errors within the play: any place in the valley, and no energy.
+    """No load, and errors within the clearance: any place in the valley, and no energy.
 
     That says something of the overconstrained robot only: the others close without
-    energy whatever their play.
+    energy whatever their clearance.
     """
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)

@@ -207,7 +207,7 @@ def test_two_scales_find_a_broken_term_too(irsbot2, name, broken):
 
 
 def test_clearances_are_left_out_on_both_sides():
-    """The play of 10 um would swallow the error of 8 um."""
+    """The clearance of 10 um would swallow the error of 8 um."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
     assert check.posture.robot.frame("a").clearance is None
     assert check.passed

@@ -203,8 +203,8 @@ def test_an_infinite_stiffness_locks_its_axis():
     )
 
 
-@pytest.mark.parametrize("play", [None, Clearance(radial=1e-5)])
-def test_a_bearing_turns_freely_and_yields_otherwise(play):
+@pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
+def test_a_bearing_turns_freely_and_yields_otherwise(clearance):
     """A bar from a bearing to a wall that is askew by up to 3e-3 rad and 0.2 mm.
 
     Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size.
@@ -212,14 +212,14 @@ def test_a_bearing_turns_freely_and_yields_otherwise(play):
     K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
     error = [0, 1e-4, 3e-3, 0, 0, 2e-4]
     frames = (
-        Frame("hub", joint="revolute", joint_stiffness=K, clearance=play),
+        Frame("hub", joint="revolute", joint_stiffness=K, clearance=clearance),
         Frame("tip", "hub", translation=[0.3, 0, 0]),
         Frame("wall", translation=[0.3, 0, 0], joint_stiffness=np.diag([1e9] * 6),
               geometric_error=error),
         Frame("end", "wall"),
     )  # fmt: skip
     posture = home_posture(Robot("hub", "tip", frames, (("tip", "end"),)))
-    assembly = simulate_assembly(posture, clearances=play is not None)
+    assembly = simulate_assembly(posture, clearances=clearance is not None)
     linear = solve_assembly(posture)
     assert linear.energy > 0.1
     assert assembly.energy == pytest.approx(linear.energy, rel=2e-3)

@@ -163,8 +163,8 @@ def test_a_spring_needs_its_matrix():
 
 
 def test_without_clearance_leaves_passive_joints_free():
-    play = Clearance(radial=1e-5, spin=0.1)
-    robot = Robot("pin", "pin", (Frame("pin", joint="revolute", clearance=play),))
+    clearance = Clearance(radial=1e-5, spin=0.1)
+    robot = Robot("pin", "pin", (Frame("pin", joint="revolute", clearance=clearance),))
     assert without_clearance(robot).frames[0].clearance is None
     assert without_clearance(robot).frames[0].passive
 
@@ -239,9 +239,9 @@ def test_models_with_contacts_and_models_that_fail_leave_nothing_behind():
 
     Every other one runs out of time; a leaked model is half a MiB.
     """
-    play = Clearance(axial=3e-5, radial=1e-5)
+    clearance = Clearance(axial=3e-5, radial=1e-5)
     frames = list(coaxial([0, 0, 0, 1e-5, 0, 1e-4]).robot.frames)
-    frames[0] = replace(frames[0], clearance=play)
+    frames[0] = replace(frames[0], clearance=clearance)
     frames.insert(1, Frame("a_tip", "a"))
     posture = home_posture(Robot("coaxial", "a_tip", tuple(frames), (("a_tip", "b"),)))
 

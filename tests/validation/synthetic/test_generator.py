@@ -169,15 +169,17 @@ def test_a_softer_beam_bends_more(added):
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_load_takes_up_play(added, side):
-    """A force along x shifts the beam by the radial play, towards the force."""
-    play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
-    contribution = added("joint_clearance", play, row(load=(0, 0, 0, 20 * side, 0, 0)))
+    """A force along x shifts the beam by the radial clearance, towards the force."""
+    clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
+    contribution = added(
+        "joint_clearance", clearance, row(load=(0, 0, 0, 20 * side, 0, 0))
+    )
     close(contribution, [0, 0, 0, 3e-5 * side, 0, 0], 2e-3, 1e-8)
 
 
 def test_play_that_no_load_takes_up_moves_nothing(added):
-    play = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
-    assert np.abs(added("joint_clearance", play, row())).max() < 1e-9
+    clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 1e-4}
+    assert np.abs(added("joint_clearance", clearance, row())).max() < 1e-9
 
 
 @pytest.mark.parametrize("approach", [1.0, -1.0])
