@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from forcefit.commands.library import library
-from forcefit.commands.options import JsonOption
 from forcefit.commands.link_exchange import export, import_
+from forcefit.commands.options import JsonOption
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
