@@ -21,6 +21,7 @@ from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
+from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.results import pose_error_of, solution_of
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.sweep import sweep_poses
@@ -92,6 +93,7 @@ class StudyResults:
         maps: data set over the grid.
         crosscheck: against the multibody simulation.
         crosscheck_failure: why there is none although it was asked for; empty if so.
+        platform_stiffness: K_C there, as ``assembly stiffness`` gives it.
         closing: (k, n, 4, 4) frames while the simulation pulls the closures shut, None
             where there is none to show.
     """
@@ -107,6 +109,7 @@ class StudyResults:
     crosscheck: Crosscheck | None
     crosscheck_failure: str
     closing: NDArray | None
+    platform_stiffness: dict[str, Any]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -381,7 +384,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         progress("cross-check", 1, 1)
     return StudyResults(
         study, robot, solution, answer, error or {}, reference, stiffness, maps, check,
-        failure.get("reason", ""), closing,
+        failure.get("reason", ""), closing, stiffness_of(posture),
     )  # fmt: skip
 
 
