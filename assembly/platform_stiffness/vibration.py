@@ -47,12 +47,15 @@ class NaturalModes:
         platform_screws: (6, k) [rad, m] platform's motion, of modal mass 1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
             first; empty where there is none.
+        idle: how many motions nothing resists that leave the platform where it is, as
+            a rod's spin between two ball joints; they are not among the modes.
     """
 
     posture: Posture
     frequencies: NDArray
     platform_screws: NDArray
     shares: tuple[dict[Part, float], ...]
+    idle: int
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -97,15 +100,33 @@ def natural_modes(
             'beams or "mass" of frames'
         )
     squares, modes = _modes(H, M)
-    modes, squares = modes[:, :count], squares[:count]
-    x = D @ modes
+    squares, modes, idle = _without_idle(
+        squares, modes, platform_moves(answer.expansion) @ D
+    )
+    squares, x = squares[:count], D @ modes[:, :count]
     with np.errstate(invalid="ignore"):
         frequencies = np.sqrt(squares) / (2 * np.pi)
-    bent = x[answer.expansion.placement.model.springs]
+    bent = x[answer.expansion.placement.model.springs] * (squares != 0.0)
     return NaturalModes(
         posture, frequencies, platform_moves(answer.expansion) @ x,
-        tuple(_shares(part_owners(answer), y) for y in bent.T),
+        tuple(_shares(part_owners(answer), y) for y in bent.T), idle,
     )  # fmt: skip
+
+
+def _without_idle(
+    squares: NDArray, modes: NDArray, moves: NDArray
+) -> tuple[NDArray, NDArray, int]:
+    """Free motions turned so that some leave the platform alone, and these left out."""
+    free = squares == 0.0
+    if not free.any():
+        return squares, modes, 0
+    _, S, Vt = np.linalg.svd(moves @ modes[:, free])
+    moved = int(np.sum(S > 1e-6 * np.linalg.norm(moves @ modes, axis=0).max()))
+    turned = modes.copy()
+    turned[:, free] = modes[:, free] @ Vt.T
+    kept = ~free
+    kept[np.flatnonzero(free)[:moved]] = True
+    return squares[kept], turned[:, kept], int(free.sum()) - moved
 
 
 def _modes(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
@@ -200,11 +221,11 @@ def _beam_mass(frame: Frame) -> NDArray:
     for rows, size in (((3, 9), mass), ((0, 6), turning)):
         M[np.ix_(rows, rows)] += size / 6 * np.array([[2, 1], [1, 2]])
     a, b, c, d = 22 * length, 13 * length, 4 * length**2, 3 * length**2
-    for rows, sign in (((4, 2, 10, 8), 1), ((5, 1, 11, 7), -1)):
+    for plane, sign in (((4, 2, 10, 8), 1), ((5, 1, 11, 7), -1)):
         # a turn about y lowers what lies ahead along x
         s = np.array([1, sign, 1, sign])
         block = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]
         ])  # fmt: skip
-        M[np.ix_(rows, rows)] += mass / 420 * block * np.outer(s, s)
+        M[np.ix_(plane, plane)] += mass / 420 * block * np.outer(s, s)
     return M

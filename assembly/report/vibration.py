@@ -53,6 +53,7 @@ def vibration_of(
         results["status"] = "free motion"
     return results | {
         "frequencies": modes.frequencies,
+        "idle_motions": modes.idle,
         "modes": [
             {
                 "frequency": float(frequency),
@@ -75,4 +76,9 @@ def vibration_text(results: dict[str, Any]) -> str:
         most = list(mode["shares"].items())[:_NAMED]
         said = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
         lines.append(f"{mode['frequency']:12.6g} Hz  {said or 'nothing resists'}")
+    if results["idle_motions"]:
+        lines.append(
+            f"{results['idle_motions']} motions that nothing resists leave the "
+            "platform where it is"
+        )
     return "\n".join(lines)

@@ -21,6 +21,7 @@ from validation.html import (
     png_bytes,
 )
 from validation.study.headline import verdict, worst_clearance
+from validation.study.platform_section import platform_section
 from validation.study.study import StudyResults, points_solved
 
 _CLEARANCE_OF = {
@@ -79,6 +80,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "error": results.error,
         "reference": results.reference,
         "stiffness": results.stiffness,
+        "platform_stiffness": results.platform_stiffness,
     }
     if results.crosscheck is not None:
         table["crosscheck"] = results.crosscheck.table()
@@ -119,6 +121,7 @@ def report_page(results: StudyResults) -> str:
         _verdict(results),
         _unchecked(results),
         _solution(results),
+        platform_section(results.platform_stiffness),
     ]
     if results.reference is not None:
         parts.append(_reference(results))

@@ -17,6 +17,7 @@ from assembly.linear.reach import READINGS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of
 from assembly.sweeps.sweep import sweep_poses
@@ -51,6 +52,7 @@ class StudyResults:
         maps: data set over the grid.
         crosscheck: against the multibody simulation.
         crosscheck_failure: why there is none although it was asked for; empty if so.
+        platform_stiffness: K_C there, as ``assembly stiffness`` gives it.
         closing: (k, n, 4, 4) frames while the simulation closes the closures, None
             where it cannot.
     """
@@ -66,6 +68,7 @@ class StudyResults:
     crosscheck: Crosscheck | None
     crosscheck_failure: str
     closing: NDArray | None
+    platform_stiffness: dict[str, Any]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -172,6 +175,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         crosscheck=check,
         crosscheck_failure=failure.get("reason", ""),
         closing=closing,
+        platform_stiffness=stiffness_of(posture),
     )
 
 

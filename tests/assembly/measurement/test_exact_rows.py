@@ -57,7 +57,7 @@ def test_together_as_one_by_one(name, rng):
 
 
 def test_beams_in_pieces_together_as_one_by_one(rng):
-    here = situations("five_bar", rng)
+    here = loaded_rows("five_bar", rng)
     links = {f.name: replace(f.link, pieces=3) for f in here.robot.frames if f.link}
     cut = replace(here, robot=here.robot.with_links(links))
     screws, found = solve_rows(cut, np.zeros((len(cut), 0)))

@@ -82,7 +82,7 @@ def test_the_folder_holds_a_self_contained_report_and_results(results):
     assert names == {"report.html", "results.json", "results.nc"}
     page = (folder / "report.html").read_text()
     assert "small &lt;study&gt;" in page
-    assert len(re.findall(r"src='data:image/png;base64,", page)) == 4
+    assert len(re.findall(r"src='data:image/png;base64,", page)) == 5
     assert not re.search(r"(src|href)=['\"](?!data:)", page)
     assert "displacement" in page or "exaggeration" in page
     table = json.loads((folder / "results.json").read_text())
