@@ -145,6 +145,7 @@ def _frame(table: Table) -> Frame:
         actuated=actuated,
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
+        tolerance=_tolerance(table),
         clearance=read_clearance(table),
         joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
@@ -161,6 +162,17 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
     """Lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _tolerance(table: Table) -> NDArray | None:
+    """Standard deviations of the geometric error, None where none are given."""
+    if not table.has("tolerance"):
+        return None
+    sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
+    if sigma.min() < 0:
+        message = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        raise table.bad("tolerance", message)
+    return sigma
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
@@ -295,6 +307,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
             table["actuated"] = True
     if np.any(frame.geometric_error):
         table["geometric_error"] = frame.geometric_error.tolist()
+    if frame.tolerance is not None:
+        table["tolerance"] = frame.tolerance.tolist()
     if frame.clearance is not None:
         given = vars(frame.clearance).items()
         table["clearance"] = {k: v for k, v in given if v is not None}

@@ -144,6 +144,8 @@ class Frame:
         actuated: a locked, commanded joint; otherwise its motion is free.
         position: [rad or m] joint coordinate in the home pose.
         geometric_error: (6,) [rad, m] delta l.
+        tolerance: (6,) [rad, m] standard deviations of delta l about the value given,
+            0 where it is exact; None where they are not known.
         clearance: the joint's play, None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
@@ -160,6 +162,7 @@ class Frame:
     actuated: bool = False
     position: float = 0.0
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
+    tolerance: NDArray | None = None
     clearance: Clearance | None = None
     joint_stiffness: NDArray | None = None
     link: Link | None = None
@@ -214,6 +217,7 @@ _SHAPES = {
     "translation": (3,),
     "rotation": (3,),
     "geometric_error": (6,),
+    "tolerance": (6,),
     "joint_stiffness": (6, 6),
     "centre_of_mass": (3,),
 }

@@ -118,6 +118,12 @@ def test_the_sound_files_are_sound(write_file):
 
 
 REFUSED = {
+    "negative tolerance": (
+        "mass = 1.2", "mass = 1.2\ntolerance = [0, 0, 1e-3, -1e-3, 0, 0]",
+        'frame "coupler".tolerance: found -0.001 in it, expected 6 numbers >= 0 '),
+    "tolerance of another shape": (
+        "mass = 1.2", "mass = 1.2\ntolerance = [1e-3]",
+        'frame "coupler".tolerance: found [0.001] of length 1, expected 6 finite '),
     "unknown key at the root": (
         'description = "', 'descripton = "',
         'unknown key "descripton"; did you mean "description"?'),
@@ -711,6 +717,7 @@ def assert_same_robot(robot, expected):
 lengths = st.floats(-10, 10).filter(lambda x: x == 0 or abs(x) > 1e-6)
 positive = st.floats(1e-6, 1e12)
 vectors = st.tuples(lengths, lengths, lengths)
+sixes = st.lists(lengths, min_size=6, max_size=6)
 names = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 material = {
     "young": positive,
@@ -784,6 +791,7 @@ def robots(draw):
                 actuated=actuated,
                 position=0.0,
                 geometric_error=np.array([*draw(vectors), *draw(vectors)]),
+                tolerance=draw(st.none() | sixes.map(np.abs)),
                 link=draw(links),
                 mass=draw(st.just(0.0) | positive),
                 centre_of_mass=np.array(draw(vectors)),
