@@ -1,7 +1,7 @@
 r"""Small unknowns taken out of a fit by their prior, its size found by the evidence.
 
-With unknowns g of covariance S^2 and readings z = model + J g + noise, the covariance of
-z - model is C = I + J S^2 J'.  Everything is scored with that covariance, so that no
+With unknowns g of covariance S^2 and readings z = model + J g + noise, the covariance
+of z - model is C = I + J S^2 J'.  Everything is scored with that covariance, so that no
 other effect is claimed for what small unknowns may do.
 
 ======  ===============  ======  =====================================================
@@ -182,7 +182,9 @@ class Evidence:
         self._sure = [np.isfinite(term.given).any() for term in terms]
         self._penalty = 0.5 * np.log(max(cells, 2))  # of each size asked for
         self._begin = np.cumsum([0, *(len(term) for term in terms)])
-        group = [np.where(t.group < 0, -1, 2 * i + t.group) for i, t in enumerate(terms)]
+        group = [
+            np.where(t.group < 0, -1, 2 * i + t.group) for i, t in enumerate(terms)
+        ]
         self._group = np.concatenate([np.zeros(0, int), *group])
         self._given = np.concatenate([np.zeros(0), *(t.given for t in terms)])
         J = np.hstack([np.zeros((cells, 0)), *(term.columns for term in terms)])
@@ -257,10 +259,10 @@ class Evidence:
             logs[asked] = some
             scaled = R * sizes(logs)
             L = np.linalg.cholesky(np.eye(len(y)) + scaled @ scaled.T)
-            a, B = np.split(solve_triangular(L, np.column_stack([y, scaled]), lower=True,
-                                             check_finite=False), [1], axis=1)  # fmt: skip
+            a = solve_triangular(L, y, lower=True, check_finite=False)
+            B = solve_triangular(L, scaled, lower=True, check_finite=False)
             value = 0.5 * float(np.sum(a**2)) + float(np.log(np.diag(L)).sum())
-            slope = (a[:, 0] @ B) ** 2 - np.einsum("rk,rk->k", B, B)
+            slope = (a @ B) ** 2 - np.einsum("rk,rk->k", B, B)
             return value, -np.array([slope[group == g].sum() for g in asked])
 
         logs = start.copy()

@@ -105,10 +105,7 @@ def believed_noise(campaign: Campaign, residual: NDArray) -> NDArray:
 def _repeats(
     campaign: Campaign, residual: NDArray, own: NDArray | None = None
 ) -> tuple[float, int]:
-    """Squares between repeats of the same configuration and load, and their number.
-
-    Of all cells, or of those in the mask ``own`` (N,).
-    """
+    """Squares between repeats of the same situation, and their number; of ``own``."""
     rows, columns = np.nonzero(campaign.cells)
     group = _alike(campaign)[rows] * 6 + columns
     if own is not None:
@@ -134,9 +131,7 @@ def _alike(campaign: Campaign) -> NDArray:
     return number_rows(*parts)
 
 
-def outlying(
-    campaign: Campaign, residual: NDArray, most: int | None = None
-) -> NDArray:
+def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
     """Rows that stand far off all others.
 
     Args:

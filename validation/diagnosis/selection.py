@@ -142,9 +142,7 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
             elif _names(every) in known:
                 fits[one.members] = known[_names(every)]
             else:
-                fits[one.members] = refit(
-                    campaign, here, every, start, finite, behind
-                )
+                fits[one.members] = refit(campaign, here, every, start, finite, behind)
                 known[_names(every)] = fits[one.members]
             if not waiting:  # the best set needs each of its members
                 refitted = _with_fits(screen, sets, fits)
@@ -172,7 +170,9 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
         chosen = in_full(campaign, here, chosen, behind)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rivals = _rivals(screen, sets, fits)
-    return Selection(screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms)
+    return Selection(
+        screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms
+    )
 
 
 class _Screens:
@@ -195,7 +195,10 @@ class _Screens:
 
         return Screen(
             behind.whitened(self._residual),
-            [Signature(s.hypothesis, seen(s.offset), seen(s.columns)) for s in signatures],
+            [
+                Signature(s.hypothesis, seen(s.offset), seen(s.columns))
+                for s in signatures
+            ],
         )
 
     def first(self, signatures: Sequence[Signature]) -> Prior:
@@ -203,6 +206,12 @@ class _Screens:
 
         Small terms may be all there is, or come beside the best set: both are tried,
         each with the sizes asked for anew once its best set is known.
+
+        Args:
+            signatures: of all hypotheses.
+
+        Returns:
+            The prior, of nothing where nothing small is asked for.
         """
         nothing = self.evidence.none()
         waiting = [self.evidence.best(self._residual)]

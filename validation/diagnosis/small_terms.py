@@ -19,7 +19,7 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.responses import Responses
 
 GEOMETRY, SPRINGS = "geometry", "springs"
-
+KINDS = ("rotation", "translation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,9 @@ class SmallTerm:
         """(k,) 0 for rotations, 1 for translations, -1 where the prior is given."""
         return np.where(np.isfinite(self.given), -1, self.axis // 3)
 
-    def take(self, unknowns: NDArray, rows: NDArray | slice = slice(None)) -> "SmallTerm":
+    def take(
+        self, unknowns: NDArray, rows: NDArray | slice = slice(None)
+    ) -> "SmallTerm":
         """Some of the unknowns, in some of the cells.
 
         Args:
@@ -66,7 +68,9 @@ class SmallTerm:
         )  # fmt: skip
 
 
-def small_terms(campaign: Campaign, here: Conditions, answers: Responses) -> list[SmallTerm]:
+def small_terms(
+    campaign: Campaign, here: Conditions, answers: Responses
+) -> list[SmallTerm]:
     """Geometry and springs of a campaign's robot.
 
     Args:
@@ -154,7 +158,9 @@ def screws_of(
     return errors
 
 
-def with_small(robot: Robot, terms: Sequence[SmallTerm], values: Sequence[NDArray]) -> Robot:
+def with_small(
+    robot: Robot, terms: Sequence[SmallTerm], values: Sequence[NDArray]
+) -> Robot:
     """A robot with the values of small terms built in.
 
     Args:
