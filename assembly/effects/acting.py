@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import LIBRARY, apply_known
+from assembly.effects.functions import covariates_of
 from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
+from assembly.measurement.variables import COMMON
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, nearest
-
-COVARIATES = ("temperature", "time", "approach")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,7 @@ def act(
     gravity: ArrayLike | None = None,
     covariates: Mapping[str, float] | None = None,
     *,
+    session: str | None = None,
     finite: bool = False,
 ) -> Acting:
     """Put the effects of a robot's file to work.
@@ -55,7 +56,9 @@ def act(
         posture: where the robot stands, as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
-        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
+        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
+            and others that functions depend on.
+        session: in which the machine is; None in none that its file names.
         finite: whether what follows is the exact model.
 
     Returns:
@@ -66,20 +69,24 @@ def act(
             motions, which belong to ``exact``.
     """
     given = dict(covariates or {})
-    effects = posture.robot.effects
-    check_covariates(posture.robot, given, finite=finite)
-    plain = replace(posture, robot=replace(posture.robot, effects={}))
+    robot = posture.robot
+    check_covariates(robot, given, finite=finite)
+    plain = replace(posture, robot=robot.without_effects())
+    common = {name: given.pop(name) for name in COMMON if name in given}
     declared = as_declared(
         plain,
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        **given,
+        covariates=given,
+        session=session,
+        **common,
     )
-    here = apply_effects(declared, effects)
+    here = apply_known(declared, robot)
     g = here.gravity[0] if here.gravity.any() else None
-    where = assemble_row(here, 0).posture if here.laws else here.posture(0)
-    if not effects:
+    yields = here.laws or here.yields
+    where = assemble_row(here, 0).posture if yields else here.posture(0)
+    if not robot.has_effects:
         where = posture
     return Acting(where, here.load_at_origin()[0], g, here)
 
@@ -98,19 +105,22 @@ def check_covariates(
         BadInput: an unknown covariate, one that an effect needs and is not given, or
             an effect that asks for finite motions.
     """
+    needed = covariates_of(robot)
     for name in given:
-        if name not in COVARIATES:
-            hint = nearest(name, COVARIATES)
+        if name not in (*COMMON, *needed):
+            hint = nearest(name, (*COMMON, *needed))
             raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
-    if "geometric_stiffening" in robot.effects and not finite:
+    finite_ones = [name for name in robot.effects if LIBRARY[name].finite]
+    if finite_ones and not finite:
         raise BadInput(
-            f'{robot.name}: effect "geometric_stiffening" asks for finite '
+            f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
             "motions; expected the command forcefit assembly exact"
         )
     for name in robot.effects:
-        for needed in LIBRARY[name].needs:
-            if needed not in given:
-                raise BadInput(
-                    f'{robot.name}: effect "{name}" depends on {needed}; '
-                    f"expected --under {needed}=NUMBER"
-                )
+        needed |= dict.fromkeys(LIBRARY[name].needs, name)
+    for covariate, effect in needed.items():
+        if covariate not in given:
+            raise BadInput(
+                f'{robot.name}: effect "{effect}" depends on {covariate}; '
+                f"expected --under {covariate}=NUMBER"
+            )

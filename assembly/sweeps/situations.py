@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.many_postures import Energies
-from assembly.effects import apply_effects
+from assembly.effects import apply_known
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
+from assembly.measurement.variables import COMMON
 from assembly.model.robot import Robot
 from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
@@ -38,23 +39,26 @@ def situations(
         The situations, k rows.
     """
     many = Posture(
-        replace(robot, effects={}) if robot.effects else robot,
+        robot.without_effects(),
         np.array([posture.coordinates for posture in postures]),
         np.array([posture.transforms for posture in postures]),
         max(posture.mismatch for posture in postures),
     )
     off = [posture.mismatch for posture in postures]
+    under = dict(question.under)
+    common = {name: under.pop(name) for name in COMMON if name in under}
     here = as_declared(
-        many, question.load, mismatch=off, gravity=question.gravity, **question.under
-    )
+        many, question.load, mismatch=off, gravity=question.gravity, covariates=under,
+        **common,
+    )  # fmt: skip
     if errors is not None:
         here = replace(here, errors=errors)
-    return apply_effects(here, robot.effects)
+    return apply_known(here, robot)
 
 
 def is_loaded(here: Conditions) -> bool:
     """Whether anything pushes, or yields otherwise than in proportion."""
-    return bool(here.load.any() or here.gravity.any() or here.laws)
+    return bool(here.load.any() or here.gravity.any() or here.laws or here.yields)
 
 
 def assemble_situations(here: Conditions) -> tuple[Energies, NDArray]:
