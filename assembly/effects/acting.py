@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from assembly.measurement.predict import assemble_row, read
 from assembly.measurement.variables import COMMON
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
-from forcefit.inputs.table import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +46,8 @@ def act(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    covariates: Mapping[str, float] | None = None,
+    covariates: Mapping[str, float | str] | None = None,
     *,
-    session: str | None = None,
     finite: bool = False,
 ) -> Acting:
     """Put the effects of a robot's file to work.
@@ -57,8 +57,7 @@ def act(
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
         covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
-            and others that functions depend on.
-        session: in which the machine is; None in none that its file names.
+            others that functions depend on, and ``session``, by name.
         finite: whether what follows is the exact model.
 
     Returns:
@@ -72,27 +71,41 @@ def act(
     robot = posture.robot
     check_covariates(robot, given, finite=finite)
     plain = replace(posture, robot=robot.without_effects())
-    common = {name: given.pop(name) for name in COMMON if name in given}
     declared = as_declared(
         plain,
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        covariates=given,
-        session=session,
-        **common,
+        **by_argument(given),
     )
     here = apply_known(declared, robot)
     g = here.gravity[0] if here.gravity.any() else None
-    yields = here.laws or here.yields
-    where = assemble_row(here, 0).posture if yields else here.posture(0)
+    where = here.posture(0)
+    if here.laws or here.yields:
+        settled = replace(here, exact=finite and bool(here.yields))
+        where = assemble_row(settled, 0).posture
     if not robot.has_effects:
         where = posture
     return Acting(where, here.load_at_origin()[0], g, here)
 
 
+def by_argument(under: Mapping[str, float | str]) -> dict[str, Any]:
+    """What acts beside loads, as :func:`as_declared` takes it.
+
+    Args:
+        under: numbers by name, and ``session``.
+
+    Returns:
+        Its arguments.
+    """
+    known = (*COMMON, "session")
+    further = {name: value for name, value in under.items() if name not in known}
+    common = {name: value for name, value in under.items() if name in known}
+    return {**common, "covariates": further}
+
+
 def check_covariates(
-    robot: Robot, given: Mapping[str, float], *, finite: bool = False
+    robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
     """Refuse effects that cannot be put to work with what is given.
 
@@ -105,18 +118,23 @@ def check_covariates(
         BadInput: an unknown covariate, one that an effect needs and is not given, or
             an effect that asks for finite motions.
     """
-    needed = covariates_of(robot)
+    session = given.get("session")
+    needed = covariates_of(robot, [str(session)])
+    known = [*COMMON, *needed, *(["session"] if robot.sessions else [])]
     for name in given:
-        if name not in (*COMMON, *needed):
-            hint = nearest(name, (*COMMON, *needed))
+        if name not in known:
+            hint = nearest(name, known)
             raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
+    if session is not None and session not in robot.sessions:
+        hint = nearest(str(session), robot.sessions)
+        raise BadInput(f"--under session: found {quoted(str(session))}{hint}")
     finite_ones = [name for name in robot.effects if LIBRARY[name].finite]
     if finite_ones and not finite:
         raise BadInput(
             f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
             "motions; expected the command forcefit assembly exact"
         )
-    for name in robot.effects:
+    for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
         needed |= dict.fromkeys(LIBRARY[name].needs, name)
     for covariate, effect in needed.items():
         if covariate not in given:

@@ -34,11 +34,12 @@ def is_loaded(function: Function) -> bool:
     return wrench or function.kind == "compliance"
 
 
-def covariates_of(robot: Robot) -> dict[str, str]:
+def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
     """Covariates that a robot's functions depend on, each with the title of one.
 
     Args:
         robot: with its functions.
+        sessions: in which it is looked at.
 
     Returns:
         Names without ``cov.``; ``time`` where a form counts it, ``approach`` where a
@@ -46,6 +47,8 @@ def covariates_of(robot: Robot) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for function in robot.functions:
+        if function.session not in (None, *sessions):
+            continue
         names = [n.removeprefix("cov.") for n in function.variables if _is_covariate(n)]
         form = FORMS.get(function.form)
         if form is not None and form.remembers:

@@ -341,6 +341,12 @@ class Robot:
         """Whether the machine is known to have any."""
         return bool(self.effects or self.session_effects or self.functions)
 
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """Names of the sessions to which some effect belongs."""
+        named = [f.session for f in self.functions if f.session is not None]
+        return tuple(dict.fromkeys([*self.session_effects, *named]))
+
     def without_effects(self) -> "Robot":
         """The same robot with nothing but what its frames and closures declare."""
         if not self.has_effects:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from assembly.batch.many_postures import Energies
 from assembly.effects import apply_known
+from assembly.effects.acting import by_argument
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
-from assembly.measurement.variables import COMMON
 from assembly.model.robot import Robot
 from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
@@ -45,11 +45,9 @@ def situations(
         max(posture.mismatch for posture in postures),
     )
     off = [posture.mismatch for posture in postures]
-    under = dict(question.under)
-    common = {name: under.pop(name) for name in COMMON if name in under}
     here = as_declared(
-        many, question.load, mismatch=off, gravity=question.gravity, covariates=under,
-        **common,
+        many, question.load, mismatch=off, gravity=question.gravity,
+        **by_argument(question.under),
     )  # fmt: skip
     if errors is not None:
         here = replace(here, errors=errors)

@@ -61,7 +61,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
         BadInput: a function of the robot depends on a covariate that is not there.
     """
     known = campaign.covariates
-    for name, function in covariates_of(campaign.robot).items():
+    for name, function in covariates_of(campaign.robot, ()).items():
         if name not in known and name != "approach":
             raise BadInput(
                 f'{campaign.name}: effect "{function}" depends on {name}; expected a '
