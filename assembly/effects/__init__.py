@@ -14,6 +14,7 @@ from assembly.effects.effect import Effect, Values
 from assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from assembly.effects.encoder_offset import ENCODER_OFFSET
 from assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
+from assembly.effects.functions import apply_functions, in_session_alone
 from assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
 from assembly.effects.joint_clearance import JOINT_CLEARANCE
 from assembly.effects.link_length import LINK_LENGTH
@@ -23,6 +24,7 @@ from assembly.effects.registration import REGISTRATION
 from assembly.effects.self_weight import SELF_WEIGHT
 from assembly.effects.thermal_expansion import THERMAL_EXPANSION
 from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 
 LIBRARY: dict[str, Effect] = {
     effect.name: effect
@@ -66,3 +68,20 @@ def apply_effects(here: Conditions, effects: Mapping[str, Values]) -> Conditions
         if name in effects:
             here = effect.apply(here, effects[name])
     return here
+
+
+def apply_known(here: Conditions, robot: Robot) -> Conditions:
+    """Conditions with all that a robot's file says the machine has.
+
+    Args:
+        here: of the robot without effects, R situations.
+        robot: with them.
+
+    Returns:
+        Conditions with its effects, those of each session and its functions.
+    """
+    recorded = here
+    here = apply_effects(here, robot.effects)
+    for session, effects in robot.session_effects.items():
+        here = in_session_alone(here, apply_effects(here, effects), session)
+    return apply_functions(here, robot.functions, recorded)

@@ -2,19 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import LIBRARY, apply_known
+from assembly.effects.functions import covariates_of
 from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
+from assembly.measurement.variables import COMMON
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
-from forcefit.inputs.table import BadInput, nearest
-
-COVARIATES = ("temperature", "time", "approach")
+from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ def act(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    covariates: Mapping[str, float] | None = None,
+    covariates: Mapping[str, float | str] | None = None,
     *,
     finite: bool = False,
 ) -> Acting:
@@ -55,7 +56,8 @@ def act(
         posture: where the robot stands, as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, beside any that the effects bring.
-        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
+        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
+            others that functions depend on, and ``session``, by name.
         finite: whether what follows is the exact model.
 
     Returns:
@@ -66,26 +68,44 @@ def act(
             motions, which belong to ``exact``.
     """
     given = dict(covariates or {})
-    effects = posture.robot.effects
-    check_covariates(posture.robot, given, finite=finite)
-    plain = replace(posture, robot=replace(posture.robot, effects={}))
+    robot = posture.robot
+    check_covariates(robot, given, finite=finite)
+    plain = replace(posture, robot=robot.without_effects())
     declared = as_declared(
         plain,
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        **given,
+        **by_argument(given),
     )
-    here = apply_effects(declared, effects)
+    here = apply_known(declared, robot)
     g = here.gravity[0] if here.gravity.any() else None
-    where = assemble_row(here, 0).posture if here.laws else here.posture(0)
-    if not effects:
+    where = here.posture(0)
+    if here.laws or here.yields:
+        settled = replace(here, exact=finite and bool(here.yields))
+        where = assemble_row(settled, 0).posture
+    if not robot.has_effects:
         where = posture
     return Acting(where, here.load_at_origin()[0], g, here)
 
 
+def by_argument(under: Mapping[str, float | str]) -> dict[str, Any]:
+    """What acts beside loads, as :func:`as_declared` takes it.
+
+    Args:
+        under: numbers by name, and ``session``.
+
+    Returns:
+        Its arguments.
+    """
+    known = (*COMMON, "session")
+    further = {name: value for name, value in under.items() if name not in known}
+    common = {name: value for name, value in under.items() if name in known}
+    return {**common, "covariates": further}
+
+
 def check_covariates(
-    robot: Robot, given: Mapping[str, float], *, finite: bool = False
+    robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
     """Refuse effects that cannot be put to work with what is given.
 
@@ -98,19 +118,27 @@ def check_covariates(
         BadInput: an unknown covariate, one that an effect needs and is not given, or
             an effect that asks for finite motions.
     """
+    session = given.get("session")
+    needed = covariates_of(robot, [str(session)])
+    known = [*COMMON, *needed, *(["session"] if robot.sessions else [])]
     for name in given:
-        if name not in COVARIATES:
-            hint = nearest(name, COVARIATES)
+        if name not in known:
+            hint = nearest(name, known)
             raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
-    if "geometric_stiffening" in robot.effects and not finite:
+    if session is not None and session not in robot.sessions:
+        hint = nearest(str(session), robot.sessions)
+        raise BadInput(f"--under session: found {quoted(str(session))}{hint}")
+    finite_ones = [name for name in robot.effects if LIBRARY[name].finite]
+    if finite_ones and not finite:
         raise BadInput(
-            f'{robot.name}: effect "geometric_stiffening" asks for finite '
+            f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
             "motions; expected the command forcefit assembly exact"
         )
-    for name in robot.effects:
-        for needed in LIBRARY[name].needs:
-            if needed not in given:
-                raise BadInput(
-                    f'{robot.name}: effect "{name}" depends on {needed}; '
-                    f"expected --under {needed}=NUMBER"
-                )
+    for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
+        needed |= dict.fromkeys(LIBRARY[name].needs, name)
+    for covariate, effect in needed.items():
+        if covariate not in given:
+            raise BadInput(
+                f'{robot.name}: effect "{effect}" depends on {covariate}; '
+                f"expected --under {covariate}=NUMBER"
+            )

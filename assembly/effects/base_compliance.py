@@ -14,7 +14,28 @@ _AXES = tuple(axis.lower() for axis in SCREW)
 
 
 def _apply(here: Conditions, values: Values) -> Conditions:
-    robot = with_foundation(here.robot, values)
+    return _standing(here, with_foundation(here.robot, values))
+
+
+def on_foundation(here: Conditions) -> Conditions:
+    """Conditions of a robot with a frame at the base that carries all the others.
+
+    Args:
+        here: R situations.
+
+    Returns:
+        The conditions, changed only if there is no such frame yet; it is the first.
+    """
+    feet = [f for f in here.robot.frames if f.parent == BASE]
+    foot = feet[0]
+    placed = foot.translation.any() or foot.rotation.any()
+    if len(feet) > 1 or placed or foot.joint != "fixed" or foot.link is not None:
+        here = _standing(here, with_foundation(here.robot, {}))
+    return here
+
+
+def _standing(here: Conditions, robot: Robot) -> Conditions:
+    """The situations with a frame before all others that does not move them."""
     still = np.broadcast_to(np.eye(4), (len(here), 1, 4, 4))
     zero = np.zeros((len(here), 1, 6))
     rest = None if here.rest is None else np.concatenate([zero, here.rest], axis=1)
@@ -70,4 +91,5 @@ BASE_COMPLIANCE = Effect(
         Unknown(f"compliance.{axis}", 1e-6, 0.0, 1.0) for axis in _AXES
     ),
     public=_public,
+    splits=True,
 )

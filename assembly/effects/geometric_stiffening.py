@@ -12,4 +12,5 @@ GEOMETRIC_STIFFENING = Effect(
     frames=None,
     components=(),
     unknowns=lambda robot: (),
+    finite=True,
 )

@@ -60,4 +60,5 @@ JOINT_CLEARANCE = Effect(
     ),
     public=_public,
     linear=False,
+    clearance=True,
 )  # fmt: skip

@@ -16,10 +16,10 @@ TOOL = ("tool.tx", "tool.ty", "tool.tz")
 def _apply(here: Conditions, values: Values) -> Conditions:
     b = np.array([values.get(name, 0.0) for name in BASE])
     R = rotation_matrix(b[:3])
-    turn = rotation_vector(R @ rotation_matrix(here.base[:3]))
-    shift = R @ here.base[3:] + b[3:]
+    turn = rotation_vector(R @ rotation_matrix(here.base[..., :3]))
+    shift = here.base[..., 3:] @ R.T + b[3:]
     tool = here.tool + [values.get(name, 0.0) for name in TOOL]
-    return replace(here, base=np.concatenate([turn, shift]), tool=tool)
+    return replace(here, base=np.concatenate([turn, shift], axis=-1), tool=tool)
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -34,4 +34,6 @@ REGISTRATION = Effect(
     frames=None,
     components=BASE + TOOL,
     unknowns=lambda robot: tuple(Unknown(name, 1e-4) for name in BASE + TOOL),
+    by_row=True,
+    device=BASE,
 )

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.effect_file import read_effects
+from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
 from assembly.kinematics.posture import home_posture
@@ -104,7 +103,7 @@ def declared_robot(root: Table, name: str) -> Robot:
     try:
         remarks = _remarks(tables[0])
         robot = Robot(name, platform, frames, closures, description, remarks=remarks)
-        robot = replace(robot, effects=read_effects(effects, robot))
+        robot = with_effects(robot, effects)
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -280,11 +279,8 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
-    if robot.effects:
-        table["effect"] = [
-            {"name": name, "parameters": dict(values)}
-            for name, values in robot.effects.items()
-        ]
+    if robot.has_effects:
+        table["effect"] = effect_tables(robot)
     return table
 
 

@@ -109,19 +109,22 @@ class Flexibility:
             closed & within & ~self.doubt[posture],
         )
 
-    def self_stress(self, columns: NDArray) -> NDArray:
+    def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
         """Forces that stress-free screws meet from the structure they are built into.
 
         Args:
             columns: (6n, s) screws at the frames.
+            read: (6n, t) screws on which the forces are asked for; the same if absent.
 
         Returns:
-            (c, s, s) generalised force on each per unit of each; negative semidefinite.
+            (c, t, s) generalised force on each per unit of each; of the same, negative
+            semidefinite.
         """
         through = np.einsum("cki,is->cks", self.rows, columns)
+        met = through if read is None else np.einsum("cki,it->ckt", self.rows, read)
         count = self.rows.shape[1]
         inner = self.inverse[:, :count, :count] / self.softness
-        return -np.einsum("cks,ckl,clt->cst", through, inner, through)
+        return -np.einsum("cks,ckl,clt->cst", met, inner, through)
 
     def platform_of(self, columns: NDArray) -> NDArray:
         """Where stress-free screws at the frames take the platform.

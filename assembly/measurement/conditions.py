@@ -14,12 +14,14 @@ g       ``gravity``           (R, 3)     base axes
 ======  ====================  =========  =============================================
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.measurement.history import History
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 
@@ -42,6 +44,27 @@ class ContactLaw:
 
 
 @dataclass(frozen=True, eq=False)
+class Yield:
+    """A place that gives under what goes through it, by a law of its own.
+
+    Attributes:
+        frame: where.
+        component: row of the screw there that it changes, in the frame's axes.
+        through: frames and rows of the wrenches that its law reads.
+        inputs: (R, k) what else the law depends on, row by row.
+        law: [rad or m] of the inputs (R, k) and wrenches (R, s); by row, smooth.
+        linear: whether it is a spring: a compliance times one wrench, at its place.
+    """
+
+    frame: str
+    component: int
+    through: tuple[tuple[str, int], ...]
+    inputs: NDArray
+    law: Callable[[NDArray, NDArray], NDArray]
+    linear: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class Conditions:
     """R situations of one robot; without effects, what its file declares.
 
@@ -57,16 +80,23 @@ class Conditions:
         temperature: (R,) [K] above that of calibration; NaN where not known.
         time: (R,) [s] since the first measurement; NaN where not known.
         approach: (R,) -1 or 1; NaN where not known.
+        covariates: (R,) each, further ones by name.
+        session: (R,) names of the sessions; None where nobody says.
+        history: rows of a campaign in the order measured, these among them; None where
+            situations have no past.
+        row: (R,) which rows of the history these are.
         laws: contact springs in series with joints.
+        yields: places that give by laws of their own.
         exact: finite motions instead of the linear model.
         second_order: (R, 6) [rad, m] what finite motions add to the linear platform
             screw without load; see
             :func:`assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) where play rests, in units of its bounds; None where the least
             energy is to say.
-        base: (6,) [rad, m] turn and shift of the measuring frame, acting on the left.
-        tool: (3,) [m] from the reference point to the one really measured, platform
-            axes.
+        base: (6,) or (R, 6) [rad, m] turn and shift of the measuring frame, acting on
+            the left.
+        tool: (3,) or (R, 3) [m] from the reference point to the one really measured,
+            platform axes.
         reading: (R, 6) [rad, m] added to what is read.
     """
 
@@ -81,7 +111,12 @@ class Conditions:
     temperature: NDArray
     time: NDArray
     approach: NDArray
+    covariates: Mapping[str, NDArray] = field(default_factory=dict)
+    session: NDArray | None = None
+    history: History | None = None
+    row: NDArray | None = None
     laws: tuple[ContactLaw, ...] = ()
+    yields: tuple[Yield, ...] = ()
     exact: bool = False
     second_order: NDArray | float = 0.0
     rest: NDArray | None = None
@@ -130,12 +165,15 @@ class Conditions:
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
-        for name in ("reading", "second_order"):
+        for name in ("reading", "second_order", "base", "tool"):
             values = getattr(self, name)
-            if isinstance(values, np.ndarray):
+            if np.ndim(values) == 2:
                 kept[name] = values[index]
-        if self.rest is not None:
-            kept["rest"] = self.rest[index]
+        for name in ("rest", "session", "row"):
+            values = getattr(self, name)
+            kept[name] = None if values is None else values[index]
+        kept["covariates"] = {k: v[index] for k, v in self.covariates.items()}
+        kept["yields"] = tuple(replace(y, inputs=y.inputs[index]) for y in self.yields)
         return replace(self, **kept)
 
 
@@ -155,6 +193,8 @@ def as_declared(
     temperature: ArrayLike = np.nan,
     time: ArrayLike = np.nan,
     approach: ArrayLike = np.nan,
+    covariates: Mapping[str, ArrayLike] | None = None,
+    session: ArrayLike | None = None,
 ) -> Conditions:
     """Conditions of a robot as its file declares it.
 
@@ -167,6 +207,8 @@ def as_declared(
         temperature: (R,) [K], or one number for all; likewise the next two.
         time: [s].
         approach: -1 or 1.
+        covariates: further ones by name, likewise.
+        session: its name, or (R,) names.
 
     Returns:
         The conditions, R of them.
@@ -184,4 +226,6 @@ def as_declared(
         rows(robot.errors, n, 6), np.array(point, dtype=float),
         rows(np.zeros(6) if load is None else load, 6), rows(gravity, 3),
         rows(temperature), rows(time), rows(approach),
+        {name: rows(values) for name, values in (covariates or {}).items()},
+        None if session is None else np.broadcast_to(np.asarray(session), (count,)),
     )  # fmt: skip

@@ -16,17 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.load import row_forces
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.without_clearance import flexibility, in_groups
-from assembly.measurement.conditions import Conditions, ContactLaw
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.contacts import (
+    contact_columns,
+    contact_deflections,
+    secants,
+    softened,
+    wrenches_through,
+)
 from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.settled_clearance import at_rest, fractions, taken_up
-from assembly.model.links import in_series, own_screw
+from assembly.measurement.settled_clearance import (
+    at_rest,
+    fractions,
+    taken_up,
+    without_play,
+)
+from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
@@ -211,13 +222,21 @@ def read(here: Conditions, screws: NDArray) -> NDArray:
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
     arm = R @ here.point
-    swung = np.einsum("rij,rj->ri", turn - np.eye(3), R @ (here.point + here.tool))
-    shift = screws[:, 3:] + swung + R @ here.tool
-    base = rotation_matrix(here.base[:3])
+    tool = _turned(R, here.tool)
+    swung = np.einsum("rij,rj->ri", turn - np.eye(3), arm + tool)
+    shift = screws[:, 3:] + swung + tool
+    base = rotation_matrix(here.base[..., :3])
     # the device's turn acts on the place itself; without one nothing is rounded off
-    where = (p + arm) @ (base - np.eye(3)).T + shift @ base.T + here.base[3:]
-    turned = rotation_vector(base @ turn) if here.base[:3].any() else screws[:, :3]
+    where = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
+    where += here.base[..., 3:]
+    turns = here.base[..., :3].any()
+    turned = rotation_vector(base @ turn) if turns else screws[:, :3]
     return np.concatenate([turned, where], axis=1) + here.reading
+
+
+def _turned(R: NDArray, vectors: NDArray) -> NDArray:
+    """(R, 3) vectors turned by one matrix, or each by its own."""
+    return (R @ vectors[..., None])[..., 0]
 
 
 def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
@@ -235,126 +254,95 @@ def assemble_row(here: Conditions, row: int) -> Assembly | ExactAssembly:
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the solver gave up.
     """
+    if here.yields:
+        return _assemble_yielding(with_springs(here, row))
     posture = here.posture(row)
     load = here.load_at_origin()[row]
     gravity = here.gravity[row] if here.gravity[row].any() else None
     give = np.zeros(len(here.laws))
     if here.exact and here.laws:  # the linear model settles them almost, and at once
         linear = assemble_row(replace(here, exact=False), row)
-        give = _secants(linear, here.laws)
+        give = secants(linear, here.laws)
     answer: Assembly | ExactAssembly
     for _ in range(_STEPS):
-        there = _softened(posture, here.laws, give)
+        there = softened(posture, here.laws, give)
         if here.exact:
             answer = solve_exact(
                 there, here.load[row], gravity=gravity, point=here.point
             )
         else:
             answer = solve_assembly(there, load, gravity=gravity)
-        before, give = give, _secants(answer, here.laws)
+        before, give = give, secants(answer, here.laws)
         near = _SETTLED_FINITE if here.exact else _SETTLED
         if np.all(np.abs(give - before) <= near * give):
             return answer
     raise SolverFailed("contact", f"deflections that do not settle in {_STEPS} steps")
 
 
-def _softened(posture: Posture, laws: tuple[ContactLaw, ...], give: NDArray) -> Posture:
-    """The posture with linear springs of the laws' secant compliance in series."""
-    if not give.any():
-        return posture
-    frames = list(posture.robot.frames)
-    for law, compliance in zip(laws, give, strict=True):
-        i = posture.robot.index(law.frame)
-        f = frames[i]
-        K = in_series(f.joint_stiffness, f.own_axis, float(compliance))
-        frames[i] = replace(f, joint_stiffness=K)
-    return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+def _assemble_yielding(one: Conditions) -> Assembly | ExactAssembly:
+    """One situation whose places give by laws of their own."""
 
+    def solve(there: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
+        answer = assemble_row(there, 0)
+        return answer, wrenches_through(answer).reshape(1, -1)
 
-def _secants(answer: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]) -> NDArray:
-    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
-    robot = answer.posture.robot
-    through = answer.joint_wrenches if isinstance(answer, Assembly) else answer.wrenches
-    give = []
-    for law in laws:
-        i = robot.index(law.frame)
-        load = abs(through[i] @ own_screw(robot.frames[i]))
-        give.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
-    return np.array(give)
+    def stress(yields: Yields) -> NDArray:
+        tight = replace(one.postures, robot=without_play(one.robot))
+        return flexibility(tight).self_stress(yields.places, yields.read)
 
-
-def _deflection(law: ContactLaw, load: float) -> float:
-    """[rad or m] under a load >= 0."""
-    return float((load / law.coefficient) ** (1 / law.exponent))
+    return settle_yields(one, solve, stress) if one.yields else assemble_row(one, 0)
 
 
 def _without_play(here: Conditions) -> tuple[NDArray, NDArray]:
     """(R, 6) platform screws of a robot without play, (R,) where they are solved."""
+    if not here.yields:
+        screws, _, solved = _linear(here)
+        return screws, solved
+    unsolved = np.full((len(here), 6), np.nan), np.zeros(len(here), dtype=bool)
+    if here.exact:
+        return unsolved  # row by row, under the wrenches of finite motions
+    distinct, which = in_groups(here.postures)
+
+    def solve(there: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
+        screws, wrenches, solved = _linear(there)
+        return (screws, solved), wrenches
+
+    def stress(yields: Yields) -> NDArray:
+        A = flexibility(distinct).self_stress(yields.places, yields.read)
+        return A[which]
+
+    try:
+        return settle_yields(here, solve, stress)
+    except SolverFailed:
+        return unsolved
+
+
+def _linear(here: Conditions) -> tuple[NDArray, NDArray, NDArray]:
+    """Robots without play and yields.
+
+    Returns:
+        (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
+        where they are solved.
+    """
     distinct, which = in_groups(here.postures)
     flexible = flexibility(distinct)
     forces = row_forces(here.postures, here.load_at_origin(), here.gravity)
     errors = here.errors.reshape(len(here), -1)
     answer = flexible.solve(which, errors, forces)
     screws, solved = answer.platform_screw, answer.solved
+    wrenches = answer.joint_wrenches
     give = np.zeros((len(here), 0))
     if here.laws:
-        columns = _law_columns(here)
-        w = answer.joint_wrenches @ columns
+        columns = contact_columns(here)
+        w = wrenches @ columns
         A = flexible.self_stress(columns)[which]
-        give, settled = _deflections(here.laws, w, A)
+        give, settled = contact_deflections(here.laws, w, A)
         reach = flexible.platform_of(columns)[which]
         screws = screws + np.einsum("rij,rj->ri", reach, give)
+        everywhere = flexible.self_stress(columns, np.eye(len(columns)))[which]
+        wrenches = wrenches + np.einsum("rij,rj->ri", everywhere, give)
         solved = solved & settled
     if here.exact:
         screws, found = solve_rows(here, give)
         solved = solved & found
-    return screws, solved
-
-
-def _law_columns(here: Conditions) -> NDArray:
-    """(6n, s) unit screws of the joints with a contact law."""
-    columns = np.zeros((6 * len(here.robot.frames), len(here.laws)))
-    for k, law in enumerate(here.laws):
-        i = here.robot.index(law.frame)
-        columns[6 * i : 6 * i + 6, k] = own_screw(here.robot.frames[i])
-    return columns
-
-
-def _deflections(
-    laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
-
-    Least of a strictly convex function (A is negative semidefinite): Newton's method,
-    each step halved until the gradient shrinks.
-
-    Returns:
-        (R, s) deflections, and (R,) whether they were found.
-    """
-    c = np.array([law.coefficient for law in laws])
-    n = np.array([law.exponent for law in laws])
-    scale = np.abs(w).max(axis=1, keepdims=True) + 1e-300
-
-    def gradient(d: NDArray) -> NDArray:
-        own = c * np.abs(d) ** n * np.sign(d)
-        return (own - w - np.einsum("rij,rj->ri", A, d)) / scale
-
-    d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
-    left = gradient(d)
-    tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
-    for _ in range(_STEPS):
-        norm = np.linalg.norm(left, axis=1)
-        if np.all(norm <= _SETTLED):
-            break
-        slope = c * n * np.abs(d) ** (n - 1) + tiny
-        H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
-        step = -np.linalg.solve(H, (left * scale)[..., None])[..., 0]
-        length = np.where(norm <= _SETTLED, 0.0, 1.0)
-        for _ in range(30):
-            there = gradient(d + length[:, None] * step)
-            worse = (np.linalg.norm(there, axis=1) > norm) & (length > 0)
-            if not worse.any():
-                break
-            length = np.where(worse, length / 2, length)
-        d, left = d + length[:, None] * step, there
-    return d, np.linalg.norm(left, axis=1) <= 1e-8
+    return screws, wrenches, solved

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.many_postures import Energies
-from assembly.effects import apply_effects
+from assembly.effects import apply_known
+from assembly.effects.acting import by_argument
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble
@@ -38,23 +39,24 @@ def situations(
         The situations, k rows.
     """
     many = Posture(
-        replace(robot, effects={}) if robot.effects else robot,
+        robot.without_effects(),
         np.array([posture.coordinates for posture in postures]),
         np.array([posture.transforms for posture in postures]),
         max(posture.mismatch for posture in postures),
     )
     off = [posture.mismatch for posture in postures]
     here = as_declared(
-        many, question.load, mismatch=off, gravity=question.gravity, **question.under
-    )
+        many, question.load, mismatch=off, gravity=question.gravity,
+        **by_argument(question.under),
+    )  # fmt: skip
     if errors is not None:
         here = replace(here, errors=errors)
-    return apply_effects(here, robot.effects)
+    return apply_known(here, robot)
 
 
 def is_loaded(here: Conditions) -> bool:
     """Whether anything pushes, or yields otherwise than in proportion."""
-    return bool(here.load.any() or here.gravity.any() or here.laws)
+    return bool(here.load.any() or here.gravity.any() or here.laws or here.yields)
 
 
 def assemble_situations(here: Conditions) -> tuple[Energies, NDArray]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.effects import apply_effects
+from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, settle
@@ -114,7 +114,7 @@ def _public(
 
 def adds_play(here: Conditions, members: Sequence[Hypothesis]) -> bool:
     """Whether a set puts play into closed chains, where it is found row by row."""
-    added = any(h.effect == "joint_clearance" for h in members)
+    added = any(LIBRARY[h.effect].clearance for h in members)
     return added and bool(here.robot.closures) and here.rest is None
 
 

@@ -350,9 +350,8 @@ def _shows(signature: Signature) -> bool:
 
 def _moves_base(h: Hypothesis) -> bool:
     """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
-    return h.effect == "registration" and any(
-        name.startswith("base.") for slot in h.slots for name in slot.names
-    )
+    device = LIBRARY[h.effect].device
+    return any(name in device for slot in h.slots for name in slot.names)
 
 
 class _Projector:
