@@ -74,7 +74,7 @@ class Conditions:
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
         mismatch: (R,) [rad, m] nominal closure error left.
         errors: (R, n, 6) [rad, m] screws that come without stress.
-        point: (3,) [m] reference point: loaded and measured, platform axes.
+        point: (3,) [m] reference point: loaded, platform axes.
         load: (R, 6) [N m, N] on the platform at the reference point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
         temperature: (R,) [K] above that of calibration; NaN where not known.
@@ -85,6 +85,8 @@ class Conditions:
         history: rows of a campaign in the order measured, these among them; None where
             situations have no past.
         row: (R,) which rows of the history these are.
+        target: (R, 3) [m] the point measured, platform axes; None for the reference
+            point.
         laws: contact springs in series with joints.
         yields: places that give by laws of their own.
         exact: finite motions instead of the linear model.
@@ -115,6 +117,7 @@ class Conditions:
     session: NDArray | None = None
     history: History | None = None
     row: NDArray | None = None
+    target: NDArray | None = None
     laws: tuple[ContactLaw, ...] = ()
     yields: tuple[Yield, ...] = ()
     exact: bool = False
@@ -147,6 +150,18 @@ class Conditions:
             self.transforms[row], float(self.mismatch[row]),
         )  # fmt: skip
 
+    @property
+    def measured_points(self) -> NDArray:
+        """(R, 3) [m] nominal places of the points measured, base axes."""
+        T = self.postures.platform
+        return T[:, :3, 3] + self.measured_arms
+
+    @property
+    def measured_arms(self) -> NDArray:
+        """(R, 3) [m] from the platform's nominal origin to the points measured."""
+        at = self.point if self.target is None else self.target
+        return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
+
     def load_at_origin(self) -> NDArray:
         """(R, 6) [N m, N] the load read at the platform's origin, base axes."""
         arm = self.postures.platform[:, :3, :3] @ self.point
@@ -169,7 +184,7 @@ class Conditions:
             values = getattr(self, name)
             if np.ndim(values) == 2:
                 kept[name] = values[index]
-        for name in ("rest", "session", "row"):
+        for name in ("rest", "session", "row", "target"):
             values = getattr(self, name)
             kept[name] = None if values is None else values[index]
         kept["covariates"] = {k: v[index] for k, v in self.covariates.items()}
@@ -195,6 +210,7 @@ def as_declared(
     approach: ArrayLike = np.nan,
     covariates: Mapping[str, ArrayLike] | None = None,
     session: ArrayLike | None = None,
+    target: ArrayLike | None = None,
 ) -> Conditions:
     """Conditions of a robot as its file declares it.
 
@@ -209,6 +225,8 @@ def as_declared(
         approach: -1 or 1.
         covariates: further ones by name, likewise.
         session: its name, or (R,) names.
+        target: (3,) or (R, 3) [m] the point measured, platform axes; the reference
+            point if absent.
 
     Returns:
         The conditions, R of them.
@@ -228,4 +246,5 @@ def as_declared(
         rows(temperature), rows(time), rows(approach),
         {name: rows(values) for name, values in (covariates or {}).items()},
         None if session is None else np.broadcast_to(np.asarray(session), (count,)),
+        target=None if target is None else rows(target, 3),
     )  # fmt: skip

@@ -216,12 +216,12 @@ def read(here: Conditions, screws: NDArray) -> NDArray:
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] the deviation read at the reference point.
+        (R, 6) [rad, m] the deviation read at the points measured.
     """
     platform = here.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
-    arm = R @ here.point
+    arm = here.measured_arms
     tool = _turned(R, here.tool)
     swung = np.einsum("rij,rj->ri", turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + swung + tool

@@ -15,7 +15,12 @@ from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from validation.campaign.campaign import LOAD, READING, Campaign, number_rows
-from validation.campaign.checks import check_commands, check_readings, extent_of
+from validation.campaign.checks import (
+    check_commands,
+    check_measured,
+    check_readings,
+    extent_of,
+)
 from validation.campaign.dialect import read_dialect
 from validation.campaign.measurement_table import MeasurementTable, read_table
 
@@ -42,13 +47,14 @@ def read_campaign(folder: Path | str) -> Campaign:
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
     path = file.parent / root.text("measurements", expected="a CSV file")
     point = root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4)
+    points = _read_points(root)
     registration = root.choice("registration", ("known", "unknown"), "known")
     noise = _read_noise(root)
     dialect = read_dialect(root)
     root.finish()
 
     robot = _read_robot(root, robot_name)
-    table = read_table(path, robot, dialect)
+    table = read_table(path, robot, dialect, points)
     commanded = _commanded(table, robot)
     check_commands(table, robot)
     configuration = number_rows(_command(table, robot, commanded))
@@ -57,36 +63,83 @@ def read_campaign(folder: Path | str) -> Campaign:
     coordinates = np.array([p.coordinates for p in postures])[configuration]
     transforms = np.array([p.transforms for p in postures])
     platform = transforms[:, robot.index(robot.platform)]
-    points = platform[:, :3, 3] + platform[:, :3, :3] @ point
     extent = extent_of(transforms, platform[:, :3, 3])
-    if np.linalg.norm(point) > 10 * extent:
-        message = f"found {np.linalg.norm(point):g} m from the platform, the robot is "
-        message += f"{extent:.3g} m across; expected a point in m"
-        raise root.bad("reference_point", message)
-    sigma = _sigma(table, noise)
-    check_readings(table, sigma, registration, extent_of(transforms, points))
-    loads = table.stack("load", LOAD, 0.0) + 0.0  # no negative zero
+    named = {"reference_point": point, **{f"points.{k}": p for k, p in points.items()}}
+    for place, at in named.items():
+        if np.linalg.norm(at) > 10 * extent:
+            message = f"found {np.linalg.norm(at):g} m from the platform, the robot is "
+            message += f"{extent:.3g} m across; expected a point in m"
+            raise root.bad(place, message)
+    check_measured(table, points)
+    row, which, measured, sigma = [], [], [], []
+    for name, at in {"": point, **points}.items():
+        readings, stated = _readings(table, name, noise)
+        seen = platform[:, :3, 3] + platform[:, :3, :3] @ at
+        check_readings(table, name, stated, registration, extent_of(transforms, seen))
+        chosen = np.flatnonzero(np.isfinite(readings).any(axis=1))
+        row.append(chosen)
+        which += [name] * len(chosen)
+        measured.append(readings[chosen])
+        sigma.append(stated[chosen])
+    # row after row of the file, the points of each in the order declared
+    order = np.argsort(np.concatenate(row), kind="stable")
+    row_of = np.concatenate(row)[order]
+    name_of = np.array(which, dtype=str)[order]
+    configuration = configuration[row_of]
+    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row_of]  # no negative zero
+    session = np.array(table.sessions)[row_of] if table.sessions else None
+    kinds = [np.unique(name_of, return_inverse=True)[1]]
+    if session is not None:
+        kinds.append(np.unique(session, return_inverse=True)[1])
     return Campaign(
         name=file.parent.resolve().name,
         robot=robot,
-        ids=table.ids,
+        ids=tuple(
+            f"{table.ids[i]}:{name}" if name else table.ids[i]
+            for i, name in zip(row_of, name_of, strict=True)
+        ),
         coordinates=coordinates,
         transforms=transforms[configuration],
         mismatch=np.array([p.mismatch for p in postures])[configuration],
         commanded=commanded,
         loads=loads,
-        measured=table.stack("meas", READING, np.nan),
-        sigma=sigma,
+        measured=np.concatenate(measured)[order],
+        sigma=np.concatenate(sigma)[order],
         covariates={
-            name.removeprefix("cov."): values
+            name.removeprefix("cov."): values[row_of]
             for name, values in table.columns.items()
             if name.startswith("cov.")
         },
         reference_point=point,
         registration=registration,
         configuration=configuration,
-        repeat=number_rows(configuration, loads),
+        repeat=number_rows(configuration, loads, *kinds),
+        session=session,
+        points=points,
+        point=name_of if points else None,
     )
+
+
+def _read_points(root: Table) -> dict[str, NDArray]:
+    """(3,) [m] each of ``[points]`` by name, platform axes; none if absent."""
+    if not root.has("points"):
+        return {}
+    table = root.table("points")
+    for name in table.content:
+        if not name or "." in name or ":" in name or name in READING:
+            message = "expected a name without . and :, other than those of readings"
+            raise table.bad("", f"found {quoted(name)}, {message}")
+    return {name: table.array(name, (3,), "m", largest=1e4) for name in table.content}
+
+
+def _readings(
+    table: MeasurementTable, point: str, noise: NDArray
+) -> tuple[NDArray, NDArray]:
+    """(R, 6) readings of a point, and [rad, m] sigma as stated or of the device."""
+    at = f".{point}" if point else ""
+    stated = table.stack(f"sigma{at}", READING, np.nan)
+    sigma = np.where(np.isnan(stated), noise, stated)
+    return table.stack(f"meas{at}", READING, np.nan), sigma
 
 
 def _read_noise(root: Table) -> NDArray:
@@ -160,9 +213,3 @@ def _place(table: MeasurementTable, robot: Robot, commanded: str,
             raise table.bad(int(row), "", f"{message}, expected < {_CLOSED:g}")
         found.append(posture)
     return found
-
-
-def _sigma(table: MeasurementTable, noise: NDArray) -> NDArray:
-    """(R, 6) [rad, m] as stated for the reading, else for the device."""
-    stated = table.stack("sigma", READING, np.nan)
-    return np.where(np.isnan(stated), noise, stated)

@@ -8,6 +8,7 @@ with the key that would declare it.
 import csv
 import io
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
 
+_TEXTS = ("id", "session")  # columns that are no numbers
 _LARGEST = 1e15  # no reading in any unit
 
 
@@ -35,6 +37,7 @@ class MeasurementTable:
         columns: (R,) by name, in the order of the file, without ``id``; NaN where a
             cell is empty.
         dialect: how it was written.
+        sessions: name of the session of each row; none where the file has none.
     """
 
     file: str
@@ -42,6 +45,7 @@ class MeasurementTable:
     lines: tuple[int, ...]
     columns: dict[str, NDArray]
     dialect: Dialect
+    sessions: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -60,13 +64,16 @@ class MeasurementTable:
         ])
 
 
-def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementTable:
+def read_table(
+    path: Path | str, robot: Robot, dialect: Dialect, points: Iterable[str] = ()
+) -> MeasurementTable:
     """A table of measurements.
 
     Args:
         path: a CSV file with a header.
         robot: whose actuated joints may be columns.
         dialect: how it is written.
+        points: names of further points measured.
 
     Returns:
         The table in SI.
@@ -78,7 +85,7 @@ def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementT
     lines, rows = _cells(path, dialect)
     if not rows:
         raise BadInput(f"{path}: empty; expected a header and one row a measurement")
-    header = _header(path, rows[0], robot, dialect)
+    header = _header(path, rows[0], robot, tuple(points))
     lines, rows = lines[1:], rows[1:]
     if not rows:
         raise BadInput(f"{path}: no rows; expected one row a measurement")
@@ -89,9 +96,14 @@ def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementT
                 f"as in the header{_dialect_hint(row, len(header), dialect)}"
             )
     ids = tuple(row[header.index("id")] for row in rows)
-    table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect)
+    sessions: tuple[str, ...] = ()
+    if "session" in header:
+        sessions = tuple(row[header.index("session")] for row in rows)
+    table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect, sessions)
+    for i in [i for i, name in enumerate(sessions) if not name][:1]:
+        raise table.bad(i, "session", "empty; expected the name of a session")
     for k, name in enumerate(header):
-        if name != "id":
+        if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
     _check_labels(table)  # after the numbers: a table of another dialect is that first
     return table
@@ -126,11 +138,15 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
             )
 
 
-def _header(path: Path, names: list[str], robot: Robot, dialect: Dialect) -> list[str]:
+def _header(
+    path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
+) -> list[str]:
     """The first line, if every name in it is a column's."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups = {"pose": POSE, "load": LOAD, "meas": READING, "sigma": READING}
-    known = ["id", *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
+    for point in points:
+        groups |= dict.fromkeys((f"meas.{point}", f"sigma.{point}"), READING[3:])
+    known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
         # not printed: it may be a file that was never meant to be read
@@ -241,7 +257,8 @@ def _unit_key(name: str, robot: Robot) -> str:
     """Which key of ``[units]`` a column follows, empty for none."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
-        return "rotation" if rest[0] == "r" else "position"
+        turns = rest.rpartition(".")[2][0] == "r"
+        return "rotation" if turns else "position"
     if group == "pose":
         return "command_rotation" if rest[0] == "r" else "command_position"
     if group == "q":

@@ -63,8 +63,7 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
 def _coarse(campaign: Campaign, here: Conditions) -> dict[str, float]:
     """A first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(here).deviation
-    platform = here.postures.platform
-    nominal = platform[:, :3, 3] + platform[:, :3, :3] @ here.point
+    nominal = here.measured_points
     full = np.isfinite(campaign.measured[:, 3:]).all(axis=1)
     full &= np.isfinite(model).all(axis=1)
     turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)

@@ -61,7 +61,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
         BadInput: a function of the robot depends on a covariate that is not there.
     """
     known = campaign.covariates
-    for name, function in covariates_of(campaign.robot, ()).items():
+    for name, function in covariates_of(campaign.robot, campaign.sessions).items():
         if name not in known and name != "approach":
             raise BadInput(
                 f'{campaign.name}: effect "{function}" depends on {name}; expected a '
@@ -81,6 +81,8 @@ def conditions_of(campaign: Campaign) -> Conditions:
         temperature=known.get("temperature", np.nan),
         time=known.get("time", np.nan),
         approach=known.get("approach", np.nan),
+        session=campaign.session,
+        target=None if campaign.point is None else campaign.targets,
         covariates={k: v for k, v in known.items() if k not in COMMON},
     )
     return apply_known(with_history(declared), campaign.robot)
