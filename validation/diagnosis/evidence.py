@@ -179,7 +179,7 @@ class Evidence:
             cells: number of readings N.
         """
         self.terms = tuple(terms)
-        self._sure = [np.isfinite(term.given).any() for term in terms]
+        self._sure = [term.sure for term in terms]
         self._penalty = 0.5 * np.log(max(cells, 2))  # of each size asked for
         self._begin = np.cumsum([0, *(len(term) for term in terms)])
         group = [
@@ -286,6 +286,6 @@ class Evidence:
             if u.any():
                 size = np.where(np.isin(own, asked), (shows * np.exp(logs))[own], 0.0)
                 scales[term.name] = (float(size[0]), float(size[1]))
-                cost += 0.0 if np.isfinite(term.given[u]).any() else _FURTHER
+                cost += 0.0 if term.sure else _FURTHER
         evidence = rest - 0.5 * float(y @ a - y @ y) - cost
         return Prior(tuple(used), scales, -cost, evidence), values, logs

@@ -33,6 +33,7 @@ class SmallTerm:
         columns: (N, k) change of the whitened readings per unknown.
         given: (k,) standard deviation of the prior, NaN where it is asked for.
         lower: the unknowns' lower bound: springs only add compliance.
+        sure: whether it is there whatever the readings say.
     """
 
     name: str
@@ -41,6 +42,7 @@ class SmallTerm:
     columns: NDArray
     given: NDArray
     lower: float
+    sure: bool = False
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -116,8 +118,9 @@ def _term(
     shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
     frame = np.repeat(np.arange(count), 6)
     return SmallTerm(
-        name, frame[shown], axis[shown], columns[:, shown], known[shown], lower
-    )
+        name, frame[shown], axis[shown], columns[:, shown], known[shown], lower,
+        bool(np.isfinite(known[shown]).any()),
+    )  # fmt: skip
 
 
 def added(
