@@ -4,11 +4,12 @@ Geometry, springs, effects and functions found so far are taken out of residual 
 candidates by their priors; a block B of m columns with a prior of one size t is then
 worth, in logarithms of probability,
 
-    sum b_i^2 t^2/(1 + t^2 l_i)/2 - sum ln(1 + t^2 l_i)/2 - ln(n)/2 - ln(candidates),
+    (z'z - L/v - n ln v - sum ln(1 + t^2 l_i) - ln n)/2 - ln(candidates),
+    L = z'z - sum b_i^2 t^2/(1 + t^2 l_i),
 
-l, b the eigenvalues of B'B and the residual along its eigenvectors.  Noise is what is
-left, where that is more than sigma says, so that scatter teaches nothing.  The best
-block must foretell configurations it was not fitted to before it is believed.
+l, b the eigenvalues of B'B and the residual z along its eigenvectors.  The noise v is
+what is left, L/n, where that is more than sigma says, so that scatter teaches nothing.
+The best block must foretell configurations it was not fitted to before it is believed.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -223,9 +224,15 @@ def _worth(school: _School, one: Candidate) -> float:
     B = school.seen(raw / size)
     values, vectors = np.linalg.eigh(B.T @ B)
     along = (vectors.T @ (B.T @ school.whitened)) ** 2
-    grown = 1 + np.multiply.outer((_SIZES * school.noise) ** 2, np.maximum(values, 0.0))
-    gains = (along * ((_SIZES * school.noise) ** 2)[:, None] / grown - np.log(grown)) / 2
-    return float(gains.sum(axis=1).max())
+    t = (_SIZES[:, None] * school.noise) ** 2
+    grown = 1 + t * np.maximum(values, 0.0)
+    before = float(school.whitened @ school.whitened)
+    left = before - (along * t / grown).sum(axis=1)
+    # the noise is what this candidate leaves, and no less than sigma says
+    count = len(school.whitened)
+    noise = np.clip(left / count, school.noise**-2.0, 1.0)
+    gains = before - left / noise - count * np.log(noise) - np.log(grown).sum(axis=1)
+    return float(gains.max() / 2)
 
 
 def _foretells(school: _School, one: Learned) -> bool:
