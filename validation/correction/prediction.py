@@ -99,6 +99,9 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     Args:
         commands: whose names are wanted; only what is measured somewhere, all if
             nothing is.
+
+    Returns:
+        A triple for each.
     """
     points = [""] if commands.point is None else list(dict.fromkeys(commands.point))
     names = []
