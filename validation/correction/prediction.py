@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.measurement.predict import Prediction, predict
+from assembly.linear.closure import virtual_joints
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import Prediction, predict, with_finite_motions
 from forcefit.inputs.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.diagnosis.registration import register
@@ -63,12 +65,28 @@ def foretell(commands: Campaign) -> Foretold:
     Raises:
         BadInput: the registration is unknown, and the rows do not tell it.
     """
-    here = conditions_of(commands)
+    here = finite_conditions(commands)
     measured = commands.cells.any(axis=1)
     if commands.registration == "unknown" and measured.any():
         here = register(commands.take(measured), here)
     prediction = predict(here)
     return Foretold(commands, prediction, error_of(commands, prediction.deviation))
+
+
+def finite_conditions(campaign: Campaign) -> Conditions:
+    """What acts in a campaign, motions finite as those of a machine are.
+
+    Args:
+        campaign: of R rows.
+
+    Returns:
+        R conditions; of a robot with clearance the linear model's, since where it
+        rests without a load is open.
+    """
+    here = conditions_of(campaign)
+    if here.exact or virtual_joints(here.robot).cones.shape[1]:
+        return here
+    return with_finite_motions(here)
 
 
 def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:
