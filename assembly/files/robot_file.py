@@ -128,8 +128,9 @@ def _frame(table: Table) -> Frame:
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
     actuated = table.boolean("actuated", False)
-    if joint == "fixed" and (actuated or table.has("position")):
-        key = "actuated" if actuated else "position"
+    given = [key for key in ("position", "limits") if table.has(key)]
+    if joint == "fixed" and (actuated or given):
+        key = "actuated" if actuated else given[0]
         message = 'found one on a fixed joint; expected joint = "revolute" | '
         raise table.bad(key, message + '"prismatic", or no such key')
     translation, rotation = _placement(table)
@@ -143,6 +144,7 @@ def _frame(table: Table) -> Frame:
         joint=joint,
         actuated=actuated,
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
+        limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
         tolerance=_tolerance(table),
         clearance=read_clearance(table),
@@ -161,6 +163,17 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
     """Lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _limits(table: Table) -> tuple[float, float] | None:
+    """Least and largest coordinate that may be commanded, None if not given."""
+    if not table.has("limits"):
+        return None
+    least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
+    if not least < most:
+        message = f"found [{least:g}, {most:g}], expected the smaller one first"
+        raise table.bad("limits", message)
+    return float(least), float(most)
 
 
 def _tolerance(table: Table) -> NDArray | None:
@@ -301,6 +314,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         table |= {"joint": frame.joint, "position": frame.position}
         if frame.actuated:
             table["actuated"] = True
+        if frame.limits is not None:
+            table["limits"] = list(frame.limits)
     if np.any(frame.geometric_error):
         table["geometric_error"] = frame.geometric_error.tolist()
     if frame.tolerance is not None:

@@ -177,7 +177,14 @@ def with_finite_motions(here: Conditions) -> Conditions:
 
 
 def _finite_part(here: Conditions, one_by_one: int | None = None) -> NDArray:
-    """(R, 6) exact minus linear platform screws; none where one has no answer."""
+    """(R, 6) exact minus linear platform screws; none where one has no answer.
+
+    Places that give by laws of their own are left to the linear model.
+
+    Returns:
+        What finite motions add.
+    """
+    here = replace(here, yields=())
     exact, linear = (
         _platform_screws(replace(here, exact=finite), one_by_one)[0]
         for finite in (True, False)

@@ -144,6 +144,7 @@ class Frame:
         joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
         actuated: a locked, commanded joint; otherwise its motion is free.
         position: [rad or m] joint coordinate in the home pose.
+        limits: [rad or m] least and largest coordinate that may be commanded, or None.
         geometric_error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of delta l about the value given,
             0 where it is exact; None where they are not known.
@@ -162,6 +163,7 @@ class Frame:
     joint: str = "fixed"
     actuated: bool = False
     position: float = 0.0
+    limits: tuple[float, float] | None = None
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
     tolerance: NDArray | None = None
     clearance: Clearance | None = None

@@ -8,7 +8,7 @@ with the key that would declare it.
 import csv
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +38,7 @@ class MeasurementTable:
             cell is empty.
         dialect: how it was written.
         sessions: name of the session of each row; none where the file has none.
+        files: of each row, where there are several.
     """
 
     file: str
@@ -46,6 +47,7 @@ class MeasurementTable:
     columns: dict[str, NDArray]
     dialect: Dialect
     sessions: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -54,7 +56,8 @@ class MeasurementTable:
         """The error for a cell, to be raised by the caller."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
-        return BadInput(f"{self.file}: {where}: {message}")
+        file = self.files[row] if self.files else self.file
+        return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
         """(R, k) the columns of a group; ``absent`` where there is no such column."""
@@ -107,6 +110,45 @@ def read_table(
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
     _check_labels(table)  # after the numbers: a table of another dialect is that first
     return table
+
+
+def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
+    """Tables one below the other, each a session unless it says otherwise.
+
+    Args:
+        tables: of one campaign, at least one.
+
+    Returns:
+        The only one as it is; of several, labels begin with the file's name.
+
+    Raises:
+        BadInput: one lacks a column of the others that may not be empty.
+    """
+    if len(tables) == 1:
+        return tables[0]
+    names = list(dict.fromkeys(name for t in tables for name in t.columns))
+    columns = {}
+    for name in names:
+        may_lack = name.startswith(("meas.", "sigma.", "load."))
+        for table in tables:
+            if name not in table.columns and not may_lack:
+                message = f"line 1: missing column {quoted(name)}, which others have"
+                raise BadInput(f"{table.file}: {message}")
+        absent = 0.0 if name.startswith("load.") else math.nan
+        columns[name] = np.concatenate([
+            t.columns.get(name, np.full(len(t), absent)) for t in tables
+        ])
+    stems = [Path(table.file).stem for table in tables]
+    pairs = list(zip(stems, tables, strict=True))
+    return MeasurementTable(
+        tables[0].file,
+        tuple(f"{stem}/{label}" for stem, t in pairs for label in t.ids),
+        tuple(line for t in tables for line in t.lines),
+        columns,
+        tables[0].dialect,
+        tuple(s for stem, t in pairs for s in (t.sessions or (stem,) * len(t))),
+        tuple(t.file for t in tables for _ in t.ids),
+    )
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:

@@ -121,6 +121,12 @@ REFUSED = {
     "negative tolerance": (
         "mass = 1.2", "mass = 1.2\ntolerance = [0, 0, 1e-3, -1e-3, 0, 0]",
         'frame "coupler".tolerance: found -0.001 in it, expected 6 numbers >= 0 '),
+    "limits the wrong way round": (
+        "mass = 1.2", "mass = 1.2\njoint = \"revolute\"\nlimits = [1.0, -1.0]",
+        'frame "coupler".limits: found [1, -1], expected the smaller one first'),
+    "limits of a fixed joint": (
+        "mass = 1.2", "mass = 1.2\nlimits = [-1.0, 1.0]",
+        'frame "coupler".limits: found one on a fixed joint'),
     "tolerance of another shape": (
         "mass = 1.2", "mass = 1.2\ntolerance = [1e-3]",
         'frame "coupler".tolerance: found [0.001] of length 1, expected 6 finite '),
@@ -791,6 +797,7 @@ def robots(draw):
                 actuated=actuated,
                 position=0.0,
                 geometric_error=np.array([*draw(vectors), *draw(vectors)]),
+                limits=draw(st.none() | st.just((-1.5, 2.0))) if moves else None,
                 tolerance=draw(st.none() | sixes.map(np.abs)),
                 link=draw(links),
                 mass=draw(st.just(0.0) | positive),

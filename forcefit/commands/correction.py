@@ -1,0 +1,103 @@
+"""The commands ``forcefit validation predict``, ``carry``, ``compensate``, ``explain``.
+
+Each parses, calls one function, prints or saves.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from forcefit.commands.options import JsonOption, RobotArgument
+from forcefit.inputs.writing import TABLE, check_writable, write_json, write_text
+
+CommandsArgument = Annotated[
+    Path,
+    typer.Argument(metavar="CAMPAIGN|CSV", help="Commands; readings may be missing."),
+]
+
+
+def predict(
+    robot: RobotArgument,
+    commands: CommandsArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Table of readings (CSV).")
+    ],
+    json: JsonOption = None,
+) -> None:
+    """Foretell the readings of a campaign, or of a table of commands.
+
+    With the geometric errors, effects and functions of the robot's file.  Where rows
+    are measured, the error of the foretelling is printed.  Exit status 1 if a row has
+    no answer; its cells are empty.
+    """
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_commands
+    from validation.correction.prediction import foretell, reading_table
+
+    check_writable(output, TABLE)
+    found = foretell(read_commands(commands, load_robot(robot)))
+    table = found.table()
+    write_text(reading_table(found), output)
+    write_json(table, json)
+    if json != "-":
+        print(f"{output}: {len(found.commands)} readings")
+        position, rotation, sigma = found.error
+        if position == position:
+            print(f"rms of measured minus foretold: {1e6 * position:.4g} um")
+        if rotation == rotation:
+            print(f"  rotation: {1e6 * rotation:.4g} urad")
+        if sigma == sigma:
+            print(f"  in sigma: {sigma:.4g}")
+        for row in table["without_answer"]:
+            print(f"{row['id']}: {row['reason']}")
+    if table["without_answer"]:
+        raise typer.Exit(1)
+
+
+def compensate(
+    robot: RobotArgument,
+    targets: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TARGETS", help="Commands to be corrected: a table or a campaign."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Corrected commands (CSV).")
+    ],
+    offsets: Annotated[
+        Path | None,
+        typer.Option(help="Also what is to be added to each drive, row by row (CSV)."),
+    ] = None,
+    as_read: Annotated[
+        bool,
+        typer.Option(
+            "--as-read", help="Correct also what only the measuring device shows."
+        ),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Find the commands that bring the robot where it would stand without errors.
+
+    ROBOT is the corrected robot.  TARGETS command the poses wanted, as if nothing were
+    wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
+    row has no answer; its command is unchanged.
+    """
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_commands
+    from validation.correction import compensation_table as tables
+    from validation.correction.compensation import compensate as correct
+
+    check_writable(output, TABLE)
+    if offsets is not None:
+        check_writable(offsets, TABLE)
+    found = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
+    write_text(tables.command_table(found), output)
+    if offsets is not None:
+        write_text(tables.offset_table(found), offsets)
+    write_json(tables.summary(found), json)
+    if json != "-":
+        print(tables.summary_text(found))
+    if any(found.reason):
+        raise typer.Exit(1)
