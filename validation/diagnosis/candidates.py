@@ -1,5 +1,6 @@
-"""What a machine may do beside the library: a small screw, or a compliance, at a place,
-as a function of something that was varied.
+"""What a machine may do beside the library, as candidates to be learned.
+
+A small screw, or a compliance, at a place, as a function of something that was varied.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
@@ -83,7 +84,14 @@ class Candidate:
         """The functions of a robot file, their numbers still to be found."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
-            Function(p.where, p.components, (p.variable,), self.shape.form, numbers, self.kind)
+            Function(
+                p.where,
+                p.components,
+                (p.variable,),
+                self.shape.form,
+                numbers,
+                self.kind,
+            )
             for p in self.parts
         ]
 
@@ -209,14 +217,16 @@ def variables_of(here: Conditions) -> list[str]:
     return varied
 
 
-def places_of(robot: Robot, variables: Sequence[str]) -> Iterator[tuple[str, tuple[Part, ...]]]:
+def places_of(
+    robot: Robot, variables: Sequence[str]
+) -> Iterator[tuple[str, tuple[Part, ...]]]:
     """Kinds and parts of all candidates, variable by variable.
 
     Args:
         robot: any.
         variables: names of what was varied.
 
-    Returns:
+    Yields:
         Kind, and where with what: components one by one and by three, drives together
         each with its own coordinate, beams together along their axes.
     """
@@ -289,8 +299,14 @@ def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
         ]
     if not name.startswith(("load", "position")):
         levels = np.quantile(x, np.linspace(0.1, 0.9, 9))
-        shapes += [Shape("step", ("size",), (("at", float(v)),)) for v in np.unique(levels)]
-    if name.startswith("cov.") and np.isfinite(here.time).all() and np.ptp(here.time) > 0:
+        shapes += [
+            Shape("step", ("size",), (("at", float(v)),)) for v in np.unique(levels)
+        ]
+    if (
+        name.startswith("cov.")
+        and np.isfinite(here.time).all()
+        and np.ptp(here.time) > 0
+    ):
         span = float(np.ptp(here.time))
         shapes += [
             Shape("lag", ("gain", "start"), (("time_constant", part * span),))

@@ -32,6 +32,7 @@ from validation.diagnosis.lack_of_fit import (
     lack_of_fit,
     outlying,
 )
+from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
@@ -41,6 +42,7 @@ from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import screws_of
 from validation.diagnosis.structure import Trend, trends
+from validation.diagnosis.teaching import taught
 from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
@@ -54,7 +56,7 @@ class Diagnosis:
 
     Attributes:
         campaign: what was measured; its sigma as believed, see ``noise_factor``.
-        verdict: ``"explained"``, ``"none_needed"``, ``"ambiguous"`` or
+        verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"`` or
             ``"outside_library"``.
         model: the best set of effects, fitted in the full model, with the machine's
             geometric errors and springs.
@@ -179,19 +181,24 @@ def diagnose(
         far = np.zeros_like(outliers)
         most = len(campaign) // _BLUNDERS - int(outliers.sum())
         far[used] = outlying(fitting, left, most)
-        larger = believed_noise(fitting, left)
         bent = _with_errors(campaign, here, found, complete)
         change = np.abs((bent.second_order - here.second_order) / campaign.sigma)
         if far.any():
             outliers |= far
-        elif np.any(larger > 1.0):
-            factor = factor * larger
-            campaign = replace(campaign, sigma=campaign.sigma * larger)
-        elif np.nanmax(change, initial=0.0) > _BENT:
+            continue
+        if np.nanmax(change, initial=0.0) > _BENT:
             here = bent
-        else:
+            continue
+        found, learned = taught(campaign, here, used, found, update)
+        left = found.behind.left(found.fit.residual)
+        larger = believed_noise(fitting, left)
+        if not np.any(larger > 1.0):
             break
-    return _judge(campaign, declared, here, parts, outliers, factor, found, finite)
+        factor = factor * larger
+        campaign = replace(campaign, sigma=campaign.sigma * larger)
+    return _judge(
+        campaign, declared, here, parts, outliers, factor, found, learned, finite
+    )
 
 
 def _with_errors(
@@ -212,7 +219,8 @@ def _with_errors(
 
 def _judge(
     campaign: Campaign, unregistered: Conditions, here: Conditions, parts: Split,
-    outliers: NDArray, factor: NDArray, found: Selection, finite: bool,
+    outliers: NDArray, factor: NDArray, found: Selection,
+    learned: tuple[Learned, ...], finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
     used = parts.fitted & ~outliers
@@ -236,7 +244,12 @@ def _judge(
     lack = lack_of_fit(fitting, left, unknowns)
     small = bool(found.behind)
     said, claimed = verdict(sets, probability, lack.significant, small=small)
-    model = Model(here, responses(here), found.fit, found.behind)
+    if learned:  # the library's own scores speak of it without what was learned
+        sets = ((best, 1.0),)
+        probability = {name: float(name in best) for name in probability}
+    if learned and said != "outside_library":
+        said, claimed = "learned", best
+    model = Model(here, responses(here), found.fit, found.behind, learned)
     explained = predict(apply_effects(here, found.fit.effects))
     residual_after = model.residual(campaign)
     open_ = declared_model.open | explained.open

@@ -33,7 +33,7 @@ from validation.diagnosis.candidates import (
     places_of,
     variables_of,
 )
-from validation.diagnosis.evidence import Background, Evidence, Prior, background
+from validation.diagnosis.evidence import Evidence, Prior, background
 from validation.diagnosis.small_terms import SmallTerm
 
 MOST = 4  # functions that are learned
@@ -77,12 +77,20 @@ class Lesson:
         terms: small terms of the rows fitted, those of the functions last.
         prior: of all of them.
         left: [-] squared whitened residual that stays.
+        unknowns: [-] that the readings say, effects among them.
     """
 
     learned: tuple[Learned, ...]
     terms: tuple[SmallTerm, ...]
     prior: Prior
     left: float
+    unknowns: float
+
+    @property
+    def cost(self) -> float:
+        """[-] least is best: n ln(noise left) and the unknowns, as in BIC."""
+        n = len(self.terms[0].columns)
+        return n * np.log(max(self.left / n, 1.0)) + self.unknowns * np.log(n)
 
 
 class _School:
@@ -170,14 +178,22 @@ def learn(
         school.terms.append(_term(school, found, len(school.learned)))
         school.update()
     update("functions learned", MOST, MOST)
-    return Lesson(tuple(school.learned), tuple(school.terms), school.prior, school.left)
+    unknowns = school.effects.shape[1] + school.behind.unknowns
+    return Lesson(
+        tuple(school.learned), tuple(school.terms), school.prior, school.left, unknowns
+    )
+
+
+def term_name(number: int) -> str:
+    """Name of the term of the function learned as the first, second .."""
+    return f"function {number}"
 
 
 def _term(school: _School, one: Learned, number: int) -> SmallTerm:
     """A learned function as a small term."""
     m = len(one.axis)
     return SmallTerm(
-        f"function {number}", np.zeros(m, int), one.axis, school.columns(one.changes),
+        term_name(number), np.zeros(m, int), one.axis, school.columns(one.changes),
         np.full(m, np.nan), -np.inf, sure=True,
     )  # fmt: skip
 

@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
+from assembly.effects.functions import columns_of, parameters_of
+from assembly.model.function import Function
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
+from validation.diagnosis.candidates import Answers
 from validation.diagnosis.diagnose import Diagnosis, Errors
+from validation.diagnosis.learning import term_name
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
 from validation.diagnosis.verdict import Calibration
 
+LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
 
@@ -29,7 +34,7 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
     Returns:
         Plain values.
     """
-    listed = found.verdict in {"explained", "ambiguous"}
+    listed = found.verdict in LISTED
     held = ~found.split.fitted
     return {
         "campaign": found.campaign.name,
@@ -59,6 +64,7 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
         "ladder": steps(found),
         "geometry": small(found, GEOMETRY),
         "springs": small(found, SPRINGS),
+        "learned": learned(found),
         "held_out": {"rows": int(held.sum()), "how": found.split.how},
         "lack_of_fit": {
             "rms": found.lack.rms,
@@ -180,7 +186,82 @@ def corrected(found: Diagnosis) -> Robot:
     for name, values in found.fit.effects.items():
         if name in found.claimed:
             merged[name] = {**merged.get(name, {}), **values}
-    return replace(robot, effects=merged)
+    functions = (*robot.functions, *_functions(found))
+    return replace(robot, effects=merged, functions=functions)
+
+
+def _fitted(found: Diagnosis) -> list[list[Function]]:
+    """The functions of every learned effect, with their numbers."""
+    behind, model = found.behind, found.model
+    places = Answers(model.here, found.campaign.robot, model.answers)
+    everyone = zip(
+        behind.terms,
+        behind.values(found.fit.residual),
+        behind.deviations(),
+        strict=True,
+    )
+    known = {term.name: (x, std) for term, x, std in everyone}
+    return [
+        places.fitted(one.candidate, *known[term_name(k + 1)])
+        for k, one in enumerate(model.learned)
+    ]
+
+
+def _functions(found: Diagnosis) -> list[Function]:
+    return [function for one in _fitted(found) for function in one]
+
+
+def learned(found: Diagnosis) -> list[dict[str, Any]]:
+    """What was learned, in the public format: a function of a robot file each."""
+    rungs = [r.error for r in found.ladder if r.term == "learned effects"]
+    first = next(r.error for r in found.ladder if r.term == "library effects")
+    shown = []
+    for k, functions in enumerate(_fitted(found)):
+        same = found.model.learned[k].equivalent
+        for function in functions:
+            shown.append({
+                "where": function.where,
+                "components": list(function.components),
+                "variables": list(function.variables),
+                "kind": function.kind,
+                "form": function.form,
+                "formula": formula(function),
+                "parameters": dict(function.parameters),
+                "std": dict(function.std),
+                "equivalent_places": [
+                    [{"where": p.where, "components": list(p.components),
+                      "variables": [p.variable]} for p in parts]
+                    for parts in same
+                ],
+                "before": _errors([first, *rungs][k]),
+                "after": _errors(rungs[k]),
+            })  # fmt: skip
+    return shown
+
+
+def formula(function: Function) -> str:
+    """A function in words, by component: numbers times what they multiply."""
+    name = function.variables[0].rpartition(".")[2]
+    told = []
+    for component in function.components:
+        numbers = parameters_of(function, component)
+        terms = [
+            f"{numbers[key]:.4g} {_column_text(function.form, key, name)}".rstrip()
+            for key in columns_of(function, component)
+        ]
+        told.append(f"{component} = {' + '.join(terms)}")
+    times = " (times the wrench there)" if function.kind == "compliance" else ""
+    return "; ".join(told) + times
+
+
+def _column_text(form: str, key: str, name: str) -> str:
+    """What a column of a form is, in words."""
+    head, _, word = key.rpartition(".")
+    if form == "powers":
+        return {"0": "", "1": name}.get(key, f"{name}^{key}")
+    if form == "waves":
+        return f"{'sin' if word == 'sine' else 'cos'}({head} {name})"
+    return f"{form}.{key}({name})"
 
 
 def _errors(errors: Errors) -> dict[str, float]:
@@ -219,6 +300,14 @@ def sentence(found: Diagnosis) -> str:
             f"The declared model lacks {names}; {kept}, {found.after.normalised:.2f} "
             "after (1 is noise)."
         )
+    if found.verdict == "learned":
+        names = " and ".join(
+            [*found.claimed, *(f.title for f in _functions(found))][:6]
+        )
+        return (
+            f"The library lacks what was learned: {names}; {kept}, "
+            f"{found.after.normalised:.2f} after (1 is noise)."
+        )
     if found.verdict == "ambiguous":
         sets = " or ".join(
             " + ".join(names) or "nothing" for names, _ in found.alternatives[:4]
@@ -255,7 +344,7 @@ def calibration_text(tally: Calibration) -> str:
 def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     """The diagnosis for a terminal."""
     lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
-    for effect in effects(found) if found.verdict in {"explained", "ambiguous"} else []:
+    for effect in effects(found) if found.verdict in LISTED else []:
         lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
         for p in effect["parameters"]:
             lines.append(
@@ -263,6 +352,13 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
             )
     for name in (GEOMETRY, SPRINGS):
         lines += _small_text(small(found, name), name)
+    for one in learned(found):
+        where = f"{one['where']} {', '.join(one['components'])}"
+        lines.append(f"learned: {where} of {', '.join(one['variables'])}")
+        told = one["formula"]
+        lines.append(f"  {told if len(told) < 160 else told[:157] + '...'}")
+        if one["equivalent_places"]:
+            lines.append(f"  {len(one['equivalent_places'])} other places do as well")
     lines += ["", "sets of effects, by probability:"]
     for names, p in found.alternatives:
         lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")

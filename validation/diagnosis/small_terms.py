@@ -6,7 +6,7 @@ of one size for all rotations and one for all translations that the readings are
 for (:mod:`validation.diagnosis.evidence`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,6 +126,7 @@ def _term(
 def added(
     campaign: Campaign, answers: Responses, here: Conditions,
     terms: Sequence[SmallTerm], values: Sequence[NDArray],
+    changes: Mapping[str, NDArray],
 ) -> NDArray:  # fmt: skip
     """What small unknowns add to the readings of any rows.
 
@@ -135,6 +136,7 @@ def added(
         here: its conditions.
         terms: found on these rows or on others of the same robot.
         values: (k,) of each term.
+        changes: (R, 6, k) of the readings per unknown of other terms, by their names.
 
     Returns:
         (R, 6) [rad, m].
@@ -142,6 +144,9 @@ def added(
     total = np.zeros((len(here), 6))
     own = np.array([here.robot.index(frame.name) for frame in campaign.robot.frames])
     for term, x in zip(terms, values, strict=True):
+        if term.name in changes:
+            total += changes[term.name] @ x
+            continue
         rows = own[term.frame]
         amount = np.broadcast_to(x, (len(here), len(x)))
         if term.name == SPRINGS:
@@ -168,7 +173,7 @@ def with_small(
 
     Args:
         robot: as declared.
-        terms: of its campaign.
+        terms: of its campaign; others than geometry and springs are passed over.
         values: (k,) of each term.
 
     Returns:
@@ -177,6 +182,8 @@ def with_small(
     """
     frames = list(robot.frames)
     for term, x in zip(terms, values, strict=True):
+        if term.name not in {GEOMETRY, SPRINGS}:
+            continue
         for i, axis, value in zip(term.frame, term.axis, x, strict=True):
             frame = frames[i]
             if term.name == GEOMETRY:
