@@ -126,7 +126,7 @@ class Diagnosis:
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
-        from validation.diagnosis.results import text
+        from validation.diagnosis.text import text
 
         return text(self)
 

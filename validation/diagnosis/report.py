@@ -13,7 +13,8 @@ from validation.diagnosis.figures import (
     vector_figure,
 )
 from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.results import calibration_text, effects, open_text, sentence
+from validation.diagnosis.results import effects
+from validation.diagnosis.sentence import calibration_text, open_text, sentence
 from validation.diagnosis.verdict import Calibration
 from validation.html import html_figure, html_page, html_table
 

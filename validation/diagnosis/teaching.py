@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
+from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Answers
 from validation.diagnosis.evidence import background
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.kept_aside import Model
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, Lesson, learn
+from validation.diagnosis.learning import Learned, Lesson, learn, term_name
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -127,3 +128,24 @@ def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -
     ])
     error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
     return bool(gains.sum() > _ERROR * error)
+
+
+def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
+    """The functions of a robot file that were learned, with their numbers.
+
+    Args:
+        campaign: whose robot.
+        model: with what was learned.
+
+    Returns:
+        For every effect learned one function, or several of one kind.
+    """
+    behind = model.behind
+    places = Answers(model.here, campaign.robot, model.answers)
+    values = behind.values(model.fit.residual)
+    everyone = zip(behind.terms, values, behind.deviations(), strict=True)
+    known = {term.name: (x, std) for term, x, std in everyone}
+    return [
+        places.fitted(one.candidate, *known[term_name(k + 1)])
+        for k, one in enumerate(model.learned)
+    ]

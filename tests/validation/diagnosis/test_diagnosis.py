@@ -29,7 +29,9 @@ from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.holdout import Split
 from validation.diagnosis.report import report_page
-from validation.diagnosis.results import corrected, effects, sentence, table, text
+from validation.diagnosis.results import corrected, effects, table
+from validation.diagnosis.sentence import sentence
+from validation.diagnosis.text import text
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))
