@@ -47,6 +47,7 @@ from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
 _BLUNDERS = 20  # one row in so many may be called a blunder, in all
+_LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
 _BENT = 0.3  # [sigma] change of what finite geometric errors add that is looked at
 
 
@@ -172,7 +173,7 @@ def diagnose(
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
     outliers = np.zeros(len(campaign), dtype=bool)
-    factor = np.ones(6)
+    factor, slack = np.ones(6), 1.0
     for _ in range(_PASSES):
         used = parts.fitted & ~outliers
         fitting = campaign.take(used)
@@ -192,13 +193,33 @@ def diagnose(
         found, learned = taught(campaign, here, used, found, update)
         left = found.behind.left(found.fit.residual)
         larger = believed_noise(fitting, left)
-        if not np.any(larger > 1.0):
+        lack = lack_of_fit(fitting, left, found.unknowns + round(found.behind.unknowns))
+        if np.any(larger > 1.0):
+            factor = factor * larger
+        elif slack == 1.0 and lack.significant and lack.rms > _LOOSE:
+            # what nothing explains must not be fitted as if it were known to a sigma
+            slack = lack.rms
+            larger = np.full(6, slack)
+        else:
             break
-        factor = factor * larger
         campaign = replace(campaign, sigma=campaign.sigma * larger)
     return _judge(
-        campaign, declared, here, parts, outliers, factor, found, learned, finite
+        campaign,
+        declared,
+        here,
+        parts,
+        outliers,
+        (factor, slack),
+        found,
+        learned,
+        finite,
     )
+
+
+def _in_sigmas(rung: Rung, slack: float) -> Rung:
+    """A rung whose error is in sigmas that were not made larger."""
+    error = replace(rung.error, normalised=slack * rung.error.normalised)
+    return replace(rung, error=error)
 
 
 def _with_errors(
@@ -219,13 +240,14 @@ def _with_errors(
 
 def _judge(
     campaign: Campaign, unregistered: Conditions, here: Conditions, parts: Split,
-    outliers: NDArray, factor: NDArray, found: Selection,
+    outliers: NDArray, noise: tuple[NDArray, float], found: Selection,
     learned: tuple[Learned, ...], finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
+    factor, slack = noise  # repeats said; nothing explained
     used = parts.fitted & ~outliers
     fitting, measured = campaign.take(used), campaign.measured
-    declared = lack_of_fit(fitting, found.tangents.residual, 0)
+    declared = lack_of_fit(fitting, slack * found.tangents.residual, 0)
     sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
     best = named(found.screen, found.sets[0])
@@ -241,7 +263,7 @@ def _judge(
             found, best = replace(found, fit=fit), (FINITE,)
     left = found.behind.left(found.fit.residual)
     unknowns = found.unknowns + round(found.behind.unknowns)
-    lack = lack_of_fit(fitting, left, unknowns)
+    lack = lack_of_fit(fitting, slack * left, unknowns)
     small = bool(found.behind)
     said, claimed = verdict(sets, probability, lack.significant, small=small)
     if learned:  # the library's own scores speak of it without what was learned
@@ -275,6 +297,8 @@ def _judge(
     rungs = ladder(
         campaign, unregistered, model, found.terms, used, held, found.sets[0].rank
     )
+    rungs = [_in_sigmas(rung, slack) for rung in rungs]
+    campaign = replace(campaign, sigma=campaign.sigma / slack)
     return Diagnosis(
         campaign, said, model, claimed, probability, sets, best, lack,
         declared, errors_of(campaign, before, held), errors_of(campaign, shown, held),
