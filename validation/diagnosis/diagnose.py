@@ -48,7 +48,7 @@ from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
 _BLUNDERS = 20  # one row in so many may be called a blunder, in all
 _LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
-_BENT = 0.3  # [sigma] change of what finite geometric errors add that is looked at
+_BENT = 0.1  # [sigma] change of what finite geometric errors add that is looked at
 
 
 @dataclass(frozen=True, eq=False)
