@@ -295,7 +295,14 @@ def _judge(
     outliers = outliers | far
     shown = before if said == "none_needed" else residual_after
     rungs = ladder(
-        campaign, unregistered, model, found.terms, used, held, found.sets[0].rank
+        campaign,
+        unregistered,
+        model,
+        found.terms,
+        used,
+        held,
+        found.sets[0].rank,
+        residual_after,
     )
     rungs = [_in_sigmas(rung, slack) for rung in rungs]
     campaign = replace(campaign, sigma=campaign.sigma / slack)
