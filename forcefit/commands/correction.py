@@ -8,8 +8,16 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption, RobotArgument
-from forcefit.inputs.writing import TABLE, check_writable, write_json, write_text
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from forcefit.inputs.writing import (
+    ROBOT,
+    TABLE,
+    check_writable,
+    write_json,
+    write_text,
+)
 
 CommandsArgument = Annotated[
     Path,
@@ -100,4 +108,57 @@ def compensate(
     if json != "-":
         print(tables.summary_text(found))
     if any(found.reason):
+        raise typer.Exit(1)
+
+
+def carry(
+    robot: RobotArgument,
+    campaign: CampaignArgument,
+    setup: Annotated[
+        str,
+        typer.Option(
+            help="Set-up rows: the first N of each session, or 1-20,31, or labels."
+        ),
+    ],
+    fit: Annotated[
+        str, typer.Option(help="What is the session's: registration,tool,zeros.")
+    ] = "registration",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="The robot in these sessions (TOML)."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Carry a saved robot over to a new session, by a few set-up rows.
+
+    Where the device stands (and what --fit names) is fitted to the set-up rows of each
+    session; the error is that of its other rows, beside the declared robot's.  Exit
+    status 1, and no robot written, where the set-up rows do not suffice or the saved
+    robot is worse than the declared one.
+    """
+    from assembly.files.robot_file import write_robot
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_campaign, read_commands
+    from validation.correction import carrying, carrying_table
+
+    if output is not None:
+        check_writable(output, ROBOT)
+    fitted = [name.strip() for name in fit.split(",")]
+    for name in fitted:
+        if name not in carrying.OF_A_SESSION:
+            hint = nearest(name, carrying.OF_A_SESSION)
+            raise BadInput(f"--fit: found {quoted(name)}{hint}")
+    declared = read_campaign(campaign)
+    data = read_commands(campaign, load_robot(robot))
+    data = data.take(data.cells.any(axis=1))
+    found = carrying.carry(data, declared, carrying.setup_rows(data, setup), fitted)
+    good = all(one.suffices and one.better for one in found)
+    if output is not None and good:
+        write_robot(carrying.carried_robot(data.robot, found), output)
+    write_json(carrying_table.table(found), json)
+    if json != "-":
+        print(carrying_table.text(found))
+        if output is not None and not good:
+            print(f"{output}: not written")
+    if not good:
         raise typer.Exit(1)
