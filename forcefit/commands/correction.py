@@ -4,7 +4,7 @@ Each parses, calls one function, prints or saves.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,12 +12,17 @@ from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption, RobotArgument
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import (
+    PICTURE,
     ROBOT,
     TABLE,
     check_writable,
+    save_figure,
     write_json,
     write_text,
 )
+
+if TYPE_CHECKING:
+    from assembly.model.function import Function
 
 CommandsArgument = Annotated[
     Path,
@@ -162,3 +167,55 @@ def carry(
             print(f"{output}: not written")
     if not good:
         raise typer.Exit(1)
+
+
+def explain(
+    robot: RobotArgument,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(help="Range of a variable: q.drive=-1:1,cov.tilt=0:0.1."),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the curves, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Show the functions of a robot's file as curves, with their bands.
+
+    A function that remembers is shown as its answer to a step of one unit.
+    """
+    from assembly.robots import load_robot
+    from validation.correction import curves
+
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    machine = load_robot(robot)
+    if not machine.functions:
+        raise BadInput(f"{robot}: has no function to explain")
+    found = curves.curves_of(machine, _ranges(machine.functions, over or []))
+    if figure is not None:
+        save_figure(curves.figure_of(found), figure)
+    write_json({"functions": curves.table(machine, found)}, json)
+    if json != "-":
+        print(curves.text(found))
+
+
+def _ranges(
+    functions: tuple["Function", ...], texts: list[str]
+) -> dict[str, tuple[float, float]]:
+    """Ranges by variable from ``--over``."""
+    valid = {name for function in functions for name in (*function.variables, "time")}
+    found = {}
+    for part in ",".join(texts).split(",") if texts else ():
+        name, _, ends = (piece.strip() for piece in part.partition("="))
+        if name not in valid:
+            raise BadInput(f"--over: found {quoted(name)}{nearest(name, valid)}")
+        try:
+            least, most = (float(end) for end in ends.split(":"))
+        except ValueError:
+            least = most = 0.0
+        if not -1e15 < least < most < 1e15:
+            expected = "expected LEAST:LARGEST"
+            raise BadInput(f"--over {name}: found {quoted(ends)}, {expected}")
+        found[name] = (least, most)
+    return found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forcefit.commands.correction import carry, compensate, predict
+from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
 from forcefit.commands.generate import generate
 from forcefit.commands.inspect import inspect
@@ -37,6 +37,7 @@ app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
 app.command()(carry)
+app.command()(explain)
 app.command()(predict)
 app.command()(compensate)
 
