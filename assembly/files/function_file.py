@@ -16,7 +16,7 @@ from assembly.effects.functions import (
     variable_names,
 )
 from assembly.effects.units import result_unit, variable_unit, whole_unit
-from assembly.measurement.variables import LOADS
+from assembly.measurement.variables import FORCE, LOADS
 from assembly.model.function import KINDS, PLACES, Function
 from assembly.model.robot import BASE, Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted
@@ -24,7 +24,7 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted
 FUNCTION = "function"
 _POSITIVE = ("time_constant", "period")
 _KINDS_OF_VARIABLES = (
-    "q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, position.<x..z>, time, "
+    "q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, load.force, position.<x..z>, time, "
     "approach, cov.<name>"
 )
 
@@ -101,7 +101,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
     if kind == "q":
         valid = [f"q.{f.name}" for f in robot.frames if f.joint != "fixed"]
     elif kind == "load":
-        valid = [f"load.{axis}" for axis in LOADS]
+        valid = [*(f"load.{axis}" for axis in LOADS), FORCE]
     elif kind == "position":
         valid = [f"position.{axis}" for axis in "xyz"]
     elif kind == "wrench":

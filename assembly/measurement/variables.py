@@ -14,6 +14,7 @@ from assembly.measurement.history import History, in_order
 from stiffness.screws import WRENCH
 
 COMMON = ("temperature", "time", "approach")  # covariates with a column of their own
+FORCE = "load.force"  # the size of the force
 LOADS = tuple(name.lower() for name in WRENCH)
 
 
@@ -30,6 +31,8 @@ def variable(here: Conditions, name: str) -> NDArray:
     kind, _, rest = name.partition(".")
     if kind == "q":
         return here.coordinates[:, here.robot.index(rest)]
+    if name == FORCE:
+        return np.linalg.norm(here.load[:, 3:], axis=1)
     if kind == "load":
         return here.load[:, LOADS.index(rest)]
     if kind == "position":
@@ -70,6 +73,7 @@ def with_history(here: Conditions) -> Conditions:
     """
     names = [f"q.{frame.name}" for frame in here.robot.frames]
     names += [f"load.{name}" for name in LOADS]
+    names.append(FORCE)
     names += [f"position.{axis}" for axis in "xyz"]
     names += ["time", "approach", *(f"cov.{c}" for c in (*COMMON, *here.covariates))]
     values = {name: variable(here, name) for name in names}
