@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
+from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.functions import columns_of, parameters_of
+from assembly.effects.registration import BASE
 from assembly.model.function import Function
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
@@ -187,7 +188,35 @@ def corrected(found: Diagnosis) -> Robot:
         if name in found.claimed:
             merged[name] = {**merged.get(name, {}), **values}
     functions = (*robot.functions, *_functions(found))
-    return replace(robot, effects=merged, functions=functions)
+    robot = replace(robot, effects=merged, functions=functions)
+    unknown = found.campaign.registration == "unknown"
+    return _registered(found, robot) if unknown else robot
+
+
+def _registered(found: Diagnosis, robot: Robot) -> Robot:
+    """The robot with the measuring frame as it was found, in each session its own."""
+    fitted = {"registration": found.fit.effects.get("registration", {})}
+    base = apply_effects(found.model.here, fitted).base
+    base = np.broadcast_to(base, (len(found.campaign), 6))
+    tool = {
+        k: v for k, v in robot.effects.get("registration", {}).items() if k not in BASE
+    }
+
+    def placed(row: int) -> dict[str, float]:
+        return dict(zip(BASE, base[row].tolist(), strict=True))
+
+    if found.campaign.session is None:
+        effects = {**robot.effects, "registration": {**tool, **placed(0)}}
+        return replace(robot, effects=effects)
+    effects = {k: v for k, v in robot.effects.items() if k != "registration"}
+    if tool:
+        effects["registration"] = tool
+    sessions = dict(robot.session_effects)
+    for session in found.campaign.sessions:
+        row = int(np.flatnonzero(found.campaign.session == session)[0])
+        own = {**sessions.get(session, {}), "registration": placed(row)}
+        sessions[session] = own
+    return replace(robot, effects=effects, session_effects=sessions)
 
 
 def _fitted(found: Diagnosis) -> list[list[Function]]:
