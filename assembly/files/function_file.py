@@ -24,8 +24,8 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted
 FUNCTION = "function"
 _POSITIVE = ("time_constant", "period")
 _KINDS_OF_VARIABLES = (
-    "q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, load.force, position.<x..z>, time, "
-    "approach, cov.<name>"
+    "q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, load.force, position.<x..z>, "
+    "time, approach, cov.<name>"
 )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from forcefit.commands.correction import compensate, predict
+from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
 from forcefit.commands.generate import generate
 from forcefit.commands.inspect import inspect
@@ -36,6 +36,8 @@ app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
+app.command()(carry)
+app.command()(explain)
 app.command()(predict)
 app.command()(compensate)
 

@@ -73,14 +73,14 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
 
 def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
     """Parameters of the measuring frame, coarse and what is then left."""
-    start = _coarse(campaign, own)
+    start = coarse_frame(campaign, own)
     placed = apply_effects(own, {"registration": start})
     frame = device_frame(placed)
     fine = refit(campaign, placed, [frame], frame.start)
     return [start, dict(fine.effects["registration"])]
 
 
-def _coarse(campaign: Campaign, here: Conditions) -> dict[str, float]:
+def coarse_frame(campaign: Campaign, here: Conditions) -> dict[str, float]:
     """A first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(here).deviation
     nominal = here.measured_points

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects import LIBRARY
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.registration import BASE
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
 from validation.diagnosis.diagnose import Diagnosis, Errors
@@ -183,7 +184,35 @@ def corrected(found: Diagnosis) -> Robot:
             merged[name] = {**merged.get(name, {}), **values}
     new = functions_of(found.campaign, found.model)
     functions = (*robot.functions, *(f for some in new for f in some))
-    return replace(robot, effects=merged, functions=functions)
+    robot = replace(robot, effects=merged, functions=functions)
+    unknown = found.campaign.registration == "unknown"
+    return _registered(found, robot) if unknown else robot
+
+
+def _registered(found: Diagnosis, robot: Robot) -> Robot:
+    """The robot with the measuring frame as it was found, in each session its own."""
+    fitted = {"registration": found.fit.effects.get("registration", {})}
+    base = apply_effects(found.model.here, fitted).base
+    base = np.broadcast_to(base, (len(found.campaign), 6))
+    tool = {
+        k: v for k, v in robot.effects.get("registration", {}).items() if k not in BASE
+    }
+
+    def placed(row: int) -> dict[str, float]:
+        return dict(zip(BASE, base[row].tolist(), strict=True))
+
+    if found.campaign.session is None:
+        effects = {**robot.effects, "registration": {**tool, **placed(0)}}
+        return replace(robot, effects=effects)
+    effects = {k: v for k, v in robot.effects.items() if k != "registration"}
+    if tool:
+        effects["registration"] = tool
+    sessions = dict(robot.session_effects)
+    for session in found.campaign.sessions:
+        row = int(np.flatnonzero(found.campaign.session == session)[0])
+        own = {**sessions.get(session, {}), "registration": placed(row)}
+        sessions[session] = own
+    return replace(robot, effects=effects, session_effects=sessions)
 
 
 def learned(found: Diagnosis) -> list[dict[str, Any]]:
