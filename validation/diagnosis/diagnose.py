@@ -34,6 +34,7 @@ from validation.diagnosis.lack_of_fit import (
 )
 from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
+from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
 from validation.diagnosis.responses import responses
@@ -85,6 +86,7 @@ class Diagnosis:
         best: the best set there.
         trends: what the residual left varies with, if more than noise is left.
         next: the measurement that would decide, if the verdict is ambiguous.
+        remarks: numbers that no machine has, and readings that no sensor gives.
     """
 
     campaign: Campaign
@@ -112,6 +114,7 @@ class Diagnosis:
     best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
+    remarks: tuple[str, ...]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -172,7 +175,8 @@ def diagnose(
     declared = here = complete(declared)
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
-    outliers = np.zeros(len(campaign), dtype=bool)
+    impossible = impossible_rows(campaign)
+    outliers = impossible.copy()
     factor, slack = np.ones(6), 1.0
     for _ in range(_PASSES):
         used = parts.fitted & ~outliers
@@ -180,7 +184,8 @@ def diagnose(
         found = select(fitting, here.take(used), update, finite=finite)
         left = found.behind.left(found.fit.residual)
         far = np.zeros_like(outliers)
-        most = len(campaign) // _BLUNDERS - int(outliers.sum())
+        called = int((outliers & ~impossible).sum())
+        most = max(0, len(campaign) // _BLUNDERS - called)
         far[used] = outlying(fitting, left, most)
         bent = _with_errors(campaign, here, found, complete)
         change = np.abs((bent.second_order - here.second_order) / campaign.sigma)
@@ -271,6 +276,13 @@ def _judge(
         probability = {name: float(name in best) for name in probability}
     if learned and said != "outside_library":
         said, claimed = "learned", best
+    remarks = implausible(campaign, found.fit, found.behind)
+    if remarks and said in {"explained", "learned"}:
+        said, claimed = "outside_library", ()
+    impossible = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
+    if impossible:
+        listed = ", ".join(impossible[:10])
+        remarks += (f"a temperature that no sensor has, left out: {listed}",)
     model = Model(here, responses(here), found.fit, found.behind, learned)
     explained = predict(apply_effects(here, found.fit.effects))
     residual_after = model.residual(campaign)
@@ -290,7 +302,7 @@ def _judge(
         held = used
     far = np.zeros_like(held)
     judged = campaign.take(held)
-    most = len(campaign) // _BLUNDERS - int(outliers.sum())
+    most = max(0, len(campaign) // _BLUNDERS - int(outliers.sum()))
     far[held] = outlying(judged, whiten(judged, residual_after[held]), most)
     outliers = outliers | far
     shown = before if said == "none_needed" else residual_after
@@ -313,5 +325,5 @@ def _judge(
         (errors_of(campaign, before, held & ~outliers),
          errors_of(campaign, shown, held & ~outliers)),
         factor, tuple(rungs), parts, outliers, here, open_, before, residual_after,
-        found.screen, found.sets[0], varies, further,
+        found.screen, found.sets[0], varies, further, remarks,
     )  # fmt: skip

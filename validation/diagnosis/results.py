@@ -67,6 +67,7 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
             "probability": found.lack.probability,
             "between_repeats": found.lack.repeats,
         },
+        "remarks": list(found.remarks),
         "outliers": [
             i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
         ],

@@ -54,7 +54,7 @@ def text(found: Diagnosis, tally: Calibration | None = None) -> str:
     if (found.outliers & ~found.split.fitted).any():
         cut = [f"{e.normalised:>12.3g}" for e in found.trimmed]
         lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
-    lines += ["", *_ladder_text(found)]
+    lines += ["", *_ladder_text(found), *found.remarks]
     if np.any(found.noise_factor > 1):
         lines += ["", noise_text(found.noise_factor)]
     if far:
