@@ -230,6 +230,7 @@ def places_of(
         Kind, and where with what: components one by one and by three, drives together
         each with its own coordinate, beams together along their axes.
     """
+    single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
     single += [("reading", (axis,)) for axis in AXES] + [("reading", AXES)]
     for name in (*(f.name for f in robot.frames), "base"):

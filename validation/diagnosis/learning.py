@@ -103,7 +103,8 @@ class _School:
         self.campaign, self.used, self.answers = campaign, used, answers
         self.fitting = campaign.take(used)
         self.residual, self.effects = residual, effects
-        self.terms, self.learned = list(terms), []
+        self.terms = list(terms)
+        self.learned: list[Learned] = []
         self._Q = np.linalg.qr(effects)[0] if effects.shape[1] else effects
         self.noise = 1.0
         self.update()

@@ -177,8 +177,8 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
 def corrected(found: Diagnosis) -> Robot:
     """The declared robot with what was found built in, beside any effects it had."""
     behind = found.behind
-    values = behind.values(found.fit.residual)
-    robot = with_small(found.campaign.robot, behind.terms, values)
+    unknowns = behind.values(found.fit.residual)
+    robot = with_small(found.campaign.robot, behind.terms, unknowns)
     merged = {name: dict(values) for name, values in robot.effects.items()}
     for name, values in found.fit.effects.items():
         if name in found.claimed:
