@@ -187,12 +187,11 @@ def diagnose(
         called = int((outliers & ~impossible).sum())
         most = max(0, len(campaign) // _BLUNDERS - called)
         far[used] = outlying(fitting, left, most)
-        bent = _with_errors(campaign, here, found, complete)
-        change = np.abs((bent.second_order - here.second_order) / campaign.sigma)
+        bent = _with_errors(campaign, here, used, found, complete)
         if far.any():
             outliers |= far
             continue
-        if np.nanmax(change, initial=0.0) > _BENT:
+        if bent is not here:
             here = bent
             continue
         found, learned = taught(campaign, here, used, found, update)
@@ -228,19 +227,28 @@ def _in_sigmas(rung: Rung, slack: float) -> Rung:
 
 
 def _with_errors(
-    campaign: Campaign, here: Conditions, found: Selection,
+    campaign: Campaign, here: Conditions, used: NDArray, found: Selection,
     complete: Callable[[Conditions], Conditions],
 ) -> Conditions:  # fmt: skip
     """Conditions whose finite part is that of the geometric errors found, too."""
-    values = found.behind.values(found.fit.residual)
-    errors = screws_of(campaign, found.behind.terms, values)
-    if not errors.any():
-        return here
-    there = here.errors.copy()
-    for frame, error in zip(campaign.robot.frames, errors, strict=True):
-        there[:, here.robot.index(frame.name)] += error
-    bent = complete(replace(here, errors=there))
-    return replace(here, second_order=bent.second_order)
+    # the errors change with it, and are followed until it stays
+    behind, fitting = found.behind, campaign.take(used)
+    raw = behind.raw(found.fit.residual)
+    own = [here.robot.index(frame.name) for frame in campaign.robot.frames]
+    for _ in range(_PASSES):
+        values = behind.values(behind.whitened(raw))
+        errors = screws_of(campaign, behind.terms, values)
+        if not errors.any():
+            break
+        there = here.errors.copy()
+        there[:, own] += errors
+        bent = complete(replace(here, errors=there))
+        bent = replace(here, second_order=bent.second_order)
+        change = predict(bent.take(used)).deviation - predict(here.take(used)).deviation
+        if np.nanmax(np.abs(change / fitting.sigma), initial=0.0) < _BENT:
+            break
+        here, raw = bent, raw - np.nan_to_num(whiten(fitting, change))
+    return here
 
 
 def _judge(
