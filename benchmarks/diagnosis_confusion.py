@@ -51,7 +51,7 @@ TRIES = 12  # draws of a case until its robot can have the effects
 FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
 VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
 WITHIN_90 = 1.645  # [-] standard deviations
-VERDICTS = ("explained", "none_needed", "ambiguous", "outside_library")
+VERDICTS = ("explained", "learned", "none_needed", "ambiguous", "outside_library")
 
 
 def draw_case(seed: int) -> tuple[str, Synthetic]:
@@ -207,6 +207,7 @@ def score(folder: Path) -> dict[str, Any]:
     outcome: dict[str, Counter] = defaultdict(Counter)
     inside: list[bool] = []
     ratios: list[float] = []
+    outside: list[float] = []
     brier: list[float] = []
     seconds: list[float] = []
     wrong: list[str] = []
@@ -227,6 +228,8 @@ def score(folder: Path) -> dict[str, Any]:
                 f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
                 f"{said['verdict']} {claimed}: {result}"
             )
+        if truth["kind"] == "outside":
+            outside.append(said["error"]["after"]["normalised"])
         if result == "right" and said["verdict"] == "explained":
             ratios.append(said["error"]["after"]["normalised"])
             inside += _inside(truth, said)
@@ -239,6 +242,7 @@ def score(folder: Path) -> dict[str, Any]:
         "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
         "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
         "after_over_noise": _spread(ratios),
+        "outside_after_over_noise": _spread(outside),
         "brier": _spread(brier),
         "seconds": _spread(seconds),
         "wrong": wrong,
@@ -255,7 +259,7 @@ def _judge(truth: dict, said: dict) -> str:
     loose = len(truth["accept_verdicts"]) == len(VERDICTS)
     if verdict == "ambiguous":
         return "right" if verdict in truth["accept_verdicts"] else "abstained"
-    if verdict == "outside_library":
+    if verdict in {"outside_library", "learned"}:
         outside = truth["kind"] == "outside"
         return "right" if outside else "false outside"
     if verdict == "none_needed":

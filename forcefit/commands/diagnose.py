@@ -32,8 +32,8 @@ def diagnose(
 ) -> None:
     """Trace measured deviations to the effect the model lacks.
 
-    The verdict is explained, none_needed, ambiguous or outside_library; errors before
-    and after are on rows that played no part in choosing or fitting.
+    The verdict is explained, learned, none_needed, ambiguous or outside_library; errors
+    before and after are on rows that played no part in choosing or fitting.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
@@ -56,13 +56,15 @@ def diagnose(
             )  # fmt: skip
     write_json(results.table(found, tally), json)
     if json != "-":
-        print(results.text(found, tally))
+        from validation.diagnosis.text import text
+
+        print(text(found, tally))
     if report is not None:
         from validation.diagnosis.report import write_report
 
         write_report(found, report, tally)
     if save is not None:
-        if found.verdict != "explained":
+        if found.verdict not in {"explained", "learned"}:
             typer.echo(f"{save}: not written, the verdict is {found.verdict}", err=True)
             raise typer.Exit(1)
         from assembly.files.robot_file import write_robot

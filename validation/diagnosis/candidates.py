@@ -131,7 +131,7 @@ class Answers:
         """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
         numbers = dict.fromkeys(shape.names, 0.0) | dict(shape.given)
         function = Function("reading", ("tx",), (name,), shape.form, numbers)
-        raw = basis(self.here, function, shape.names)
+        raw = np.nan_to_num(basis(self.here, function, shape.names))
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -265,12 +265,17 @@ def _powers(*powers: int) -> Shape:
     return Shape("powers", tuple(str(k) for k in powers))
 
 
+REVERSAL = Shape("reversal", ("0",))
+
+
 def first_shapes(robot: Robot, name: str) -> list[Shape]:
     """Forms general enough to show whether a variable counts at all."""
     if name == "approach":
         return [_powers(1)]
     if is_angle(robot, name):
-        return [_waves(1, 2, 3, 4), _powers(0, 1, 2)]
+        return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
+    if name.startswith("q."):
+        return [_powers(0, 1, 2, 3), REVERSAL]
     return [_powers(0, 1, 2, 3)]
 
 
@@ -282,6 +287,8 @@ def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
         return [_powers(1)]
     shapes = [_powers(1), _powers(2), _powers(3), _powers(0, 1), _powers(0, 1, 2),
               _powers(0, 1, 2, 3)]  # fmt: skip
+    if name.startswith("q."):
+        shapes.append(REVERSAL)
     if is_angle(here.robot, name):
         shapes += [_waves(k) for k in range(1, 9)]
         shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]

@@ -34,6 +34,7 @@ from validation.diagnosis.lack_of_fit import (
 )
 from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
+from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
 from validation.diagnosis.responses import responses
@@ -47,7 +48,8 @@ from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
 _BLUNDERS = 20  # one row in so many may be called a blunder, in all
-_BENT = 0.3  # [sigma] change of what finite geometric errors add that is looked at
+_LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
+_BENT = 0.1  # [sigma] change of what finite geometric errors add that is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,7 @@ class Diagnosis:
         best: the best set there.
         trends: what the residual left varies with, if more than noise is left.
         next: the measurement that would decide, if the verdict is ambiguous.
+        remarks: numbers that no machine has, and readings that no sensor gives.
     """
 
     campaign: Campaign
@@ -111,6 +114,7 @@ class Diagnosis:
     best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
+    remarks: tuple[str, ...]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -126,7 +130,7 @@ class Diagnosis:
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
-        from validation.diagnosis.results import text
+        from validation.diagnosis.text import text
 
         return text(self)
 
@@ -171,15 +175,17 @@ def diagnose(
     declared = here = complete(declared)
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
-    outliers = np.zeros(len(campaign), dtype=bool)
-    factor = np.ones(6)
+    impossible = impossible_rows(campaign)
+    outliers = impossible.copy()
+    factor, slack = np.ones(6), 1.0
     for _ in range(_PASSES):
         used = parts.fitted & ~outliers
         fitting = campaign.take(used)
         found = select(fitting, here.take(used), update, finite=finite)
         left = found.behind.left(found.fit.residual)
         far = np.zeros_like(outliers)
-        most = len(campaign) // _BLUNDERS - int(outliers.sum())
+        called = int((outliers & ~impossible).sum())
+        most = max(0, len(campaign) // _BLUNDERS - called)
         far[used] = outlying(fitting, left, most)
         bent = _with_errors(campaign, here, found, complete)
         change = np.abs((bent.second_order - here.second_order) / campaign.sigma)
@@ -192,13 +198,33 @@ def diagnose(
         found, learned = taught(campaign, here, used, found, update)
         left = found.behind.left(found.fit.residual)
         larger = believed_noise(fitting, left)
-        if not np.any(larger > 1.0):
+        lack = lack_of_fit(fitting, left, found.unknowns + round(found.behind.unknowns))
+        if np.any(larger > 1.0):
+            factor = factor * larger
+        elif slack == 1.0 and lack.significant and lack.rms > _LOOSE:
+            # what nothing explains must not be fitted as if it were known to a sigma
+            slack = lack.rms
+            larger = np.full(6, slack)
+        else:
             break
-        factor = factor * larger
         campaign = replace(campaign, sigma=campaign.sigma * larger)
     return _judge(
-        campaign, declared, here, parts, outliers, factor, found, learned, finite
+        campaign,
+        declared,
+        here,
+        parts,
+        outliers,
+        (factor, slack),
+        found,
+        learned,
+        finite,
     )
+
+
+def _in_sigmas(rung: Rung, slack: float) -> Rung:
+    """A rung whose error is in sigmas that were not made larger."""
+    error = replace(rung.error, normalised=slack * rung.error.normalised)
+    return replace(rung, error=error)
 
 
 def _with_errors(
@@ -219,13 +245,14 @@ def _with_errors(
 
 def _judge(
     campaign: Campaign, unregistered: Conditions, here: Conditions, parts: Split,
-    outliers: NDArray, factor: NDArray, found: Selection,
+    outliers: NDArray, noise: tuple[NDArray, float], found: Selection,
     learned: tuple[Learned, ...], finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
+    factor, slack = noise  # repeats said; nothing explained
     used = parts.fitted & ~outliers
     fitting, measured = campaign.take(used), campaign.measured
-    declared = lack_of_fit(fitting, found.tangents.residual, 0)
+    declared = lack_of_fit(fitting, slack * found.tangents.residual, 0)
     sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
     best = named(found.screen, found.sets[0])
@@ -241,7 +268,7 @@ def _judge(
             found, best = replace(found, fit=fit), (FINITE,)
     left = found.behind.left(found.fit.residual)
     unknowns = found.unknowns + round(found.behind.unknowns)
-    lack = lack_of_fit(fitting, left, unknowns)
+    lack = lack_of_fit(fitting, slack * left, unknowns)
     small = bool(found.behind)
     said, claimed = verdict(sets, probability, lack.significant, small=small)
     if learned:  # the library's own scores speak of it without what was learned
@@ -249,6 +276,13 @@ def _judge(
         probability = {name: float(name in best) for name in probability}
     if learned and said != "outside_library":
         said, claimed = "learned", best
+    remarks = implausible(campaign, found.fit, found.behind)
+    if remarks and said in {"explained", "learned"}:
+        said, claimed = "outside_library", ()
+    impossible = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
+    if impossible:
+        listed = ", ".join(impossible[:10])
+        remarks += (f"a temperature that no sensor has, left out: {listed}",)
     model = Model(here, responses(here), found.fit, found.behind, learned)
     explained = predict(apply_effects(here, found.fit.effects))
     residual_after = model.residual(campaign)
@@ -268,13 +302,22 @@ def _judge(
         held = used
     far = np.zeros_like(held)
     judged = campaign.take(held)
-    most = len(campaign) // _BLUNDERS - int(outliers.sum())
+    most = max(0, len(campaign) // _BLUNDERS - int(outliers.sum()))
     far[held] = outlying(judged, whiten(judged, residual_after[held]), most)
     outliers = outliers | far
     shown = before if said == "none_needed" else residual_after
     rungs = ladder(
-        campaign, unregistered, model, found.terms, used, held, found.sets[0].rank
+        campaign,
+        unregistered,
+        model,
+        found.terms,
+        used,
+        held,
+        found.sets[0].rank,
+        residual_after,
     )
+    rungs = [_in_sigmas(rung, slack) for rung in rungs]
+    campaign = replace(campaign, sigma=campaign.sigma / slack)
     return Diagnosis(
         campaign, said, model, claimed, probability, sets, best, lack,
         declared, errors_of(campaign, before, held), errors_of(campaign, shown, held),
@@ -282,5 +325,5 @@ def _judge(
         (errors_of(campaign, before, held & ~outliers),
          errors_of(campaign, shown, held & ~outliers)),
         factor, tuple(rungs), parts, outliers, here, open_, before, residual_after,
-        found.screen, found.sets[0], varies, further,
+        found.screen, found.sets[0], varies, further, remarks,
     )  # fmt: skip

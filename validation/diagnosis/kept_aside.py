@@ -24,7 +24,7 @@ from validation.diagnosis.evidence import (
 )
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.learning import Learned, term_name
-from validation.diagnosis.refit import Fit, refit
+from validation.diagnosis.refit import Fit, refit, with_play_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import Responses
 from validation.diagnosis.signatures import whiten
@@ -114,7 +114,7 @@ class Model:
 
 def ladder(
     campaign: Campaign, declared: Conditions, model: Model, terms: Sequence[SmallTerm],
-    used: NDArray, held: NDArray, rank: int,
+    used: NDArray, held: NDArray, rank: int, residual: NDArray,
 ) -> list[Rung]:  # fmt: skip
     """The steps up to a model.
 
@@ -126,51 +126,60 @@ def ladder(
         used: mask (R,) of the rows fitted.
         held: mask (R,) of the rows scored.
         rank: unknowns of the library's effects that the readings can tell apart.
+        residual: (R, 6) [rad, m] what the model leaves.
 
     Returns:
         One rung a step; a step that nothing asked for repeats the one before.
     """
-    fitting, some = campaign.take(used), model.here.take(used)
+    fitting = campaign.take(used)
+    here = with_play_held(model.here, model.fit)
+    some = here.take(used)
+    names = [term.name for term in model.behind.terms]
+    first = [name for name in (GEOMETRY, SPRINGS) if name in names]
 
-    def fitted(behind: Background, members: Sequence[Hypothesis]) -> Model:
+    def rung(name: str, behind: Background, members: Sequence[Hypothesis]) -> None:
         same = len(members) == len(model.fit.hypotheses)
         begin = np.concatenate([np.zeros(0), *(h.start for h in members)])
         start = model.fit.values if same else begin
         fit = refit(fitting, some, members, start, behind=behind)
-        return replace(model, fit=fit, behind=behind)
-
-    def rung(name: str, unknowns: float, step: Model) -> None:
+        step = Model(here, model.answers, fit, behind, model.learned)
         error = errors_of(campaign, step.residual(campaign), held)
-        rungs.append(Rung(name, unknowns, error))
+        rungs.append(Rung(name, behind.unknowns - known, error))
 
     before = campaign.measured - predict(declared).deviation
     rungs = [Rung("declared", 0, errors_of(campaign, before, held))]
+    known = 0.0
     nuisance: list[Hypothesis] = []
     if campaign.registration == "unknown":
         nuisance = [device_frame(some)]
-        rung("registration", 6, fitted(NOTHING, nuisance))
-    names = [term.name for term in model.behind.terms]
-    first = [name for name in (GEOMETRY, SPRINGS) if name in names]
+        rung("registration", NOTHING, nuisance)
+        rungs[-1] = replace(rungs[-1], unknowns=6)
     z = whiten(fitting, fitting.measured - predict(some).deviation)
-    known = 0.0
     for name in (GEOMETRY, SPRINGS):
         if name not in first:
             rungs.append(replace(rungs[-1], term=name, unknowns=0))
             continue
         own = [t for t in terms if t.name in first[: first.index(name) + 1]]
         behind = background(own, Evidence(own, len(z)).best(z))
-        rung(name, behind.unknowns - known, fitted(behind, nuisance))
+        rung(name, behind, nuisance)
         known = behind.unknowns
+    end = errors_of(campaign, residual, held)
+    later = names[len(first) :]
     behind = _with_terms(model.behind, first)
-    if rank:
-        rung("library effects", rank, fitted(behind, model.fit.hypotheses))
-    else:
+    if not rank:
         rungs.append(replace(rungs[-1], term="library effects", unknowns=0))
+    elif later:
+        rung("library effects", behind, model.fit.hypotheses)
+        rungs[-1] = replace(rungs[-1], unknowns=rank)
+    else:
+        rungs.append(Rung("library effects", rank, end))
     known = behind.unknowns
-    for k in range(len(first), len(names)):
-        behind = _with_terms(model.behind, names[: k + 1])
-        step = fitted(behind, model.fit.hypotheses)
-        rung("learned effects", behind.unknowns - known, step)
+    for k in range(len(later)):
+        behind = _with_terms(model.behind, names[: len(first) + k + 1])
+        if k < len(later) - 1:
+            rung("learned effects", behind, model.fit.hypotheses)
+        else:
+            rungs.append(Rung("learned effects", behind.unknowns - known, end))
         known = behind.unknowns
     return rungs
 

@@ -129,6 +129,20 @@ class _School:
             self.freedom = max(1, round(freedom))
             self.noise = max(1.0, np.sqrt(self.left / self.freedom))
 
+    def part(self) -> "_School":
+        """The same of fewer rows, for a first look."""
+        rows = np.flatnonzero(self.used)
+        if len(rows) <= _LOOKED:
+            return self
+        kept = rows[np.linspace(0, len(rows) - 1, _LOOKED).astype(int)]
+        used = np.isin(np.arange(len(self.used)), kept)
+        cells = used[rows[np.nonzero(self.fitting.cells)[0]]]
+        terms = [t.take(np.ones(len(t), bool), cells) for t in self.terms]
+        return _School(
+            self.campaign, used, self.answers, terms, self.residual[cells],
+            self.effects[cells],
+        )  # fmt: skip
+
     @property
     def done(self) -> bool:
         """Whether what is left is noise."""
@@ -203,11 +217,11 @@ def _best(
 ) -> Learned | None:
     """The likeliest function, of those worth it."""
     robot = school.campaign.robot
-    looked = []
+    looked, few = [], school.part()
     for kind, parts in every:
         for shape in first_shapes(robot, parts[0].variable):
             looked.append(Candidate(parts, kind, shape))
-    first = sorted(((_worth(school, c), c) for c in looked), key=lambda one: -one[0])
+    first = sorted(((_worth(few, c), c) for c in looked), key=lambda one: -one[0])
     chosen = list(dict.fromkeys((c.kind, c.parts) for _, c in first))[:_REFINED]
     refined = []
     fitted = here.take(school.used)

@@ -134,6 +134,21 @@ def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDAr
     return there.rest[:, -len(here.robot.frames) :]
 
 
+def with_play_held(here: Conditions, fit: Fit) -> Conditions:
+    """Conditions in which play that a fit adds to closed chains rests where it does.
+
+    Args:
+        here: without the fit's effects.
+        fit: any.
+
+    Returns:
+        The same where the fit adds no such play.
+    """
+    if not adds_play(here, fit.hypotheses):
+        return here
+    return replace(here, rest=resting(here, fit.hypotheses, fit.values))
+
+
 def in_full(
     campaign: Campaign, here: Conditions, fit: Fit, behind: Background = NOTHING
 ) -> Fit:

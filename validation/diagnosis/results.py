@@ -1,27 +1,22 @@
-"""A diagnosis for machines, and the honest sentence for people."""
+"""A diagnosis for machines, in the public format."""
 
 import math
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.functions import columns_of, parameters_of
 from assembly.effects.registration import BASE
-from assembly.model.function import Function
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
-from validation.diagnosis.candidates import Answers
 from validation.diagnosis.diagnose import Diagnosis, Errors
-from validation.diagnosis.learning import term_name
-from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.sentence import formula, sentence
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
+from validation.diagnosis.teaching import functions_of
 from validation.diagnosis.verdict import Calibration
 
 LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
-_WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
 
 
@@ -72,6 +67,7 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
             "probability": found.lack.probability,
             "between_repeats": found.lack.repeats,
         },
+        "remarks": list(found.remarks),
         "outliers": [
             i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
         ],
@@ -187,7 +183,8 @@ def corrected(found: Diagnosis) -> Robot:
     for name, values in found.fit.effects.items():
         if name in found.claimed:
             merged[name] = {**merged.get(name, {}), **values}
-    functions = (*robot.functions, *_functions(found))
+    new = functions_of(found.campaign, found.model)
+    functions = (*robot.functions, *(f for some in new for f in some))
     robot = replace(robot, effects=merged, functions=functions)
     unknown = found.campaign.registration == "unknown"
     return _registered(found, robot) if unknown else robot
@@ -219,33 +216,12 @@ def _registered(found: Diagnosis, robot: Robot) -> Robot:
     return replace(robot, effects=effects, session_effects=sessions)
 
 
-def _fitted(found: Diagnosis) -> list[list[Function]]:
-    """The functions of every learned effect, with their numbers."""
-    behind, model = found.behind, found.model
-    places = Answers(model.here, found.campaign.robot, model.answers)
-    everyone = zip(
-        behind.terms,
-        behind.values(found.fit.residual),
-        behind.deviations(),
-        strict=True,
-    )
-    known = {term.name: (x, std) for term, x, std in everyone}
-    return [
-        places.fitted(one.candidate, *known[term_name(k + 1)])
-        for k, one in enumerate(model.learned)
-    ]
-
-
-def _functions(found: Diagnosis) -> list[Function]:
-    return [function for one in _fitted(found) for function in one]
-
-
 def learned(found: Diagnosis) -> list[dict[str, Any]]:
     """What was learned, in the public format: a function of a robot file each."""
     rungs = [r.error for r in found.ladder if r.term == "learned effects"]
     first = next(r.error for r in found.ladder if r.term == "library effects")
     shown = []
-    for k, functions in enumerate(_fitted(found)):
+    for k, functions in enumerate(functions_of(found.campaign, found.model)):
         same = found.model.learned[k].equivalent
         for function in functions:
             shown.append({
@@ -268,31 +244,6 @@ def learned(found: Diagnosis) -> list[dict[str, Any]]:
     return shown
 
 
-def formula(function: Function) -> str:
-    """A function in words, by component: numbers times what they multiply."""
-    name = function.variables[0].rpartition(".")[2]
-    told = []
-    for component in function.components:
-        numbers = parameters_of(function, component)
-        terms = [
-            f"{numbers[key]:.4g} {_column_text(function.form, key, name)}".rstrip()
-            for key in columns_of(function, component)
-        ]
-        told.append(f"{component} = {' + '.join(terms)}")
-    times = " (times the wrench there)" if function.kind == "compliance" else ""
-    return "; ".join(told) + times
-
-
-def _column_text(form: str, key: str, name: str) -> str:
-    """What a column of a form is, in words."""
-    head, _, word = key.rpartition(".")
-    if form == "powers":
-        return {"0": "", "1": name}.get(key, f"{name}^{key}")
-    if form == "waves":
-        return f"{'sin' if word == 'sine' else 'cos'}({head} {name})"
-    return f"{form}.{key}({name})"
-
-
 def _errors(errors: Errors) -> dict[str, float]:
     return {
         "position": errors.position,
@@ -311,177 +262,3 @@ def _next(found: Diagnosis) -> dict[str, Any] | None:
         "covariates": found.next.covariates,
         "power": found.next.power,
     }
-
-
-def sentence(found: Diagnosis) -> str:
-    """What may be said, and no more."""
-    where = _judged_on(found)
-    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
-    if found.verdict == "none_needed":
-        return (
-            "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({found.before.normalised:.2f} sigma on {where})."
-        )
-    if found.verdict == "explained":
-        small_ones = [_WORDS[term.name] for term in found.behind.terms]
-        names = " and ".join([*found.claimed, *small_ones])
-        return (
-            f"The declared model lacks {names}; {kept}, {found.after.normalised:.2f} "
-            "after (1 is noise)."
-        )
-    if found.verdict == "learned":
-        names = " and ".join(
-            [*found.claimed, *(f.title for f in _functions(found))][:6]
-        )
-        return (
-            f"The library lacks what was learned: {names}; {kept}, "
-            f"{found.after.normalised:.2f} after (1 is noise)."
-        )
-    if found.verdict == "ambiguous":
-        sets = " or ".join(
-            " + ".join(names) or "nothing" for names, _ in found.alternatives[:4]
-        )
-        return f"This design cannot tell which effect it is: {sets}; {kept}."
-    seen = ", ".join(t.against for t in found.trends[:3]) or "nothing that was recorded"
-    return (
-        "No effect of the library explains the residual: at best "
-        f"{found.lack.rms:.2f} sigma are left, which vary with {seen}; {kept}, "
-        f"{found.after.normalised:.2f} with what was found."
-    )
-
-
-def _judged_on(found: Diagnosis) -> str:
-    """Which rows the errors before and after are of."""
-    aside = ~found.split.fitted
-    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
-
-
-def calibration_text(tally: Calibration) -> str:
-    """How often the method is right on this design, in words."""
-
-    def counts(said: dict[str, int]) -> str:
-        return ", ".join(f"{name} {n}" for name, n in sorted(said.items()))
-
-    named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
-    return (
-        f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
-        f"{counts(tally.without)}; with what was found {counts(tally.with_found)}"
-        f"{named}; false claims {100 * tally.false_claims:.1f} %"
-    )
-
-
-def text(found: Diagnosis, tally: Calibration | None = None) -> str:
-    """The diagnosis for a terminal."""
-    lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
-    for effect in effects(found) if found.verdict in LISTED else []:
-        lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
-        for p in effect["parameters"]:
-            lines.append(
-                f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
-            )
-    for name in (GEOMETRY, SPRINGS):
-        lines += _small_text(small(found, name), name)
-    for one in learned(found):
-        where = f"{one['where']} {', '.join(one['components'])}"
-        lines.append(f"learned: {where} of {', '.join(one['variables'])}")
-        told = one["formula"]
-        lines.append(f"  {told if len(told) < 160 else told[:157] + '...'}")
-        if one["equivalent_places"]:
-            lines.append(f"  {len(one['equivalent_places'])} other places do as well")
-    lines += ["", "sets of effects, by probability:"]
-    for names, p in found.alternatives:
-        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
-    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
-    for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
-        row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
-        if name == "normalised":
-            row[2] = 1.0
-        shown = "".join(
-            f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
-        )
-        lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
-    if (found.outliers & ~found.split.fitted).any():
-        cut = [f"{e.normalised:>12.3g}" for e in found.trimmed]
-        lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
-    lines += ["", *_ladder_text(found)]
-    if np.any(found.noise_factor > 1):
-        lines += ["", noise_text(found.noise_factor)]
-    if far:
-        lines += ["", f"left out as outliers: {', '.join(far)}"]
-    if found.open.any():
-        lines += ["", open_text(found.open)]
-    for trend in found.trends:
-        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
-    if found.next is not None:
-        where = ", ".join(f"{k}={v:.4g}" for k, v in found.next.configuration.items())
-        covariates = "".join(f", {k} {v:g}" for k, v in found.next.covariates.items())
-        lines += [
-            "",
-            f"measure next: {where}; load {load_text(found.next.load)}{covariates}",
-            f"  {found.next.why}",
-        ]
-    if tally is not None:
-        lines += ["", calibration_text(tally)]
-    return "\n".join(lines)
-
-
-def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
-    """Geometry or springs in a few lines."""
-    if one is None:
-        return []
-    sizes = ", ".join(
-        f"{size:.2g} {one['unit'][kind]}" for kind, size in one["scale"].items()
-    )
-    frames = sorted(one["frames"], key=lambda f: -f["identifiable"])[:6]
-    where = ", ".join(f"{f['frame']} {f['identifiable']:.1f}" for f in frames)
-    return [
-        f"{_WORDS[name]}  (size {sizes or 'as the tolerances say'})",
-        f"  {one['identifiable']:.1f} of {one['unknowns']} known: {where}",
-    ]
-
-
-def _ladder_text(found: Diagnosis) -> list[str]:
-    """What every step bought, on the rows kept aside."""
-    rows = steps(found)
-    unit = rows[-1]["unit"]
-    head = f"{'step':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'bought':>10}"
-    lines = [head]
-    last = math.nan
-    for row in rows:
-        rms, sigma = row["kept_aside_rms"], row["kept_aside_sigma"]
-        bought = f"{last - rms:>10.3g}" if math.isfinite(last) else f"{'':>10}"
-        lines.append(
-            f"{row['term']:<20}{row['unknowns']:>10.0f}{rms:>12.3g}{sigma:>10.3g}{bought}"
-        )
-        last = rms
-    return lines
-
-
-def noise_text(factor: NDArray) -> str:
-    """That repeats were believed rather than the sigma stated."""
-    parts = {"rotations": factor[0], "positions": factor[3]}
-    said = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
-    return f"repeats scatter more than the sigma stated, which was taken {said}"
-
-
-def _number(value: float) -> str:
-    """Three digits, or a dash where nothing was measured."""
-    return f"{value:.3g}" if math.isfinite(value) else "-"
-
-
-def open_text(open_: NDArray) -> str:
-    """In which rows play leaves the pose free, and what is then predicted.
-
-    Args:
-        open_: (R,) bool, by row.
-
-    Returns:
-        One line.
-    """
-    return (
-        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
-        "(marked open): of the poses of least energy one is predicted there, in a "
-        "closed chain the nearest to nominal, in an open one that of play in the middle"
-    )

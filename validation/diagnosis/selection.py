@@ -51,6 +51,8 @@ class Selection:
         tangents: about the declared model.
         behind: small terms and the sizes of their priors.
         terms: small terms with all their unknowns.
+        columns: (N, k) whitened change of the readings per unknown of the best set, the
+            device's frame first.
     """
 
     screen: Screen
@@ -61,6 +63,7 @@ class Selection:
     tangents: Tangents
     behind: Background
     terms: tuple[SmallTerm, ...]
+    columns: NDArray
 
 
 def select(
@@ -170,8 +173,12 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
         chosen = in_full(campaign, here, chosen, behind)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rivals = _rivals(screen, sets, fits)
+    tangent = [tangents.at_start(h) for h in nuisance]
+    tangent += [signatures[i] for i in sets[0].members]
+    columns = np.hstack([np.zeros((len(tangents.residual), 0)),
+                         *(s.columns for s in tangent)])  # fmt: skip
     return Selection(
-        screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms
+        screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms, columns
     )
 
 

@@ -5,25 +5,22 @@ machine as if there were no library.  The simpler story of both is kept, if it f
 what was kept aside better than the library alone.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
+from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Answers
 from validation.diagnosis.evidence import background
-from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.kept_aside import Model
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, Lesson, learn
-from validation.diagnosis.refit import refit
+from validation.diagnosis.learning import Learned, learn, term_name
+from validation.diagnosis.refit import refit, with_play_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
-from validation.diagnosis.scoring import FINITE, Scored
 from validation.diagnosis.selection import Selection, Update
 from validation.diagnosis.signatures import whiten
 
@@ -58,58 +55,34 @@ def taught(
     answers = responses(here)
     places = Answers(here, campaign.robot, answers)
     device = [device_frame(some)] if campaign.registration == "unknown" else []
-    library = [h for h in found.fit.hypotheses if h.effect != FINITE]
-    stories = [library] + ([device] if len(library) > len(device) else [])
-    lessons: list[tuple[float, Lesson, Selection]] = []
-    for members in stories:
-        start = found.fit.values if members is library else _start(device)
-        fit = refit(fitting, some, members, start)
-        columns = _columns(found, members, fit.values)
-        lesson = learn(
-            campaign, used, here, places, found.terms, fit.residual, columns, update
-        )
-        behind = background(lesson.terms, lesson.prior)
-        fit = refit(fitting, some, members, fit.values, behind=behind)
-        sets = found.sets if members is library else [_nothing(found), *found.sets]
-        story = replace(found, fit=fit, behind=behind, terms=lesson.terms, sets=sets)
-        if members is not library:
-            story = replace(story, unknowns=6 * len(device))
-        lessons.append((lesson.cost, lesson, story))
-    _, lesson, story = min(lessons, key=lambda one: one[0])
+    begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
+    alone = refit(fitting, some, device, begin)
+    stories = [(alone, found.columns[:, : len(begin)])]
+    if found.sets[0].members and found.sets[0].rank:
+        raw = found.behind.raw(found.fit.residual)
+        stories.append((replace(found.fit, residual=raw), found.columns))
+    lessons = [
+        learn(campaign, used, here, places, found.terms, fit.residual, columns, update)
+        for fit, columns in stories
+    ]
+    best = min(range(len(stories)), key=lambda k: lessons[k].cost)
+    lesson, fit = lessons[best], stories[best][0]
     if not lesson.learned:
         return found, ()
-    before = Model(here, answers, found.fit, found.behind)
-    after = Model(here, answers, story.fit, story.behind, lesson.learned)
+    behind = background(lesson.terms, lesson.prior)
+    fit = refit(
+        fitting, with_play_held(some, fit), fit.hypotheses, fit.values, behind=behind
+    )
+    story = replace(found, fit=fit, behind=behind, terms=lesson.terms)
+    if best == 0:
+        nothing = found.screen.fit(())
+        story = replace(story, sets=[nothing, *found.sets], unknowns=len(begin))
+    held = with_play_held(here, found.fit)
+    before = Model(held, answers, found.fit, found.behind)
+    after = Model(here, answers, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
         return found, ()
     return story, lesson.learned
-
-
-def _start(members: Sequence[Hypothesis]) -> NDArray:
-    """(k,) where a fit begins."""
-    return np.concatenate([np.zeros(0), *(h.start for h in members)])
-
-
-def _nothing(found: Selection) -> Scored:
-    """The set without any effect."""
-    return found.screen.fit(())
-
-
-def _columns(
-    found: Selection, members: Sequence[Hypothesis], values: NDArray
-) -> NDArray:
-    """(N, k) whitened change of the readings per unknown of fitted effects."""
-    robot, blocks, at = found.tangents.here.robot, [], 0
-    own: list[tuple[Hypothesis, NDArray]] = []
-    for h in members:
-        own.append((h, values[at : at + len(h.slots)]))
-        at += len(h.slots)
-    for h, x in own:
-        others: Mapping[str, Values] = {
-            o.effect: o.public(robot, v) for o, v in own if o.effect != h.effect
-        }
-        blocks.append(np.nan_to_num(found.tangents.about(h, x, others).columns))
-    return np.hstack([np.zeros((len(found.tangents.residual), 0)), *blocks])
 
 
 def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -> bool:
@@ -127,3 +100,24 @@ def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -
     ])
     error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
     return bool(gains.sum() > _ERROR * error)
+
+
+def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
+    """The functions of a robot file that were learned, with their numbers.
+
+    Args:
+        campaign: whose robot.
+        model: with what was learned.
+
+    Returns:
+        For every effect learned one function, or several of one kind.
+    """
+    behind = model.behind
+    places = Answers(model.here, campaign.robot, model.answers)
+    values = behind.values(model.fit.residual)
+    everyone = zip(behind.terms, values, behind.deviations(), strict=True)
+    known = {term.name: (x, std) for term, x, std in everyone}
+    return [
+        places.fitted(one.candidate, *known[term_name(k + 1)])
+        for k, one in enumerate(model.learned)
+    ]
