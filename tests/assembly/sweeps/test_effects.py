@@ -103,7 +103,8 @@ def test_functions_act_at_every_point(load):
         )
         plain = replace(posture, robot=robot.without_effects())
         other = solve_assembly(plain, load).platform_screw
-        assert np.abs(one.platform_screw - other).max() > 2e-2 * size
+        change = (one.platform_screw - other)[3:]  # the rods keep it from turning
+        assert np.abs(change).max() > 0.02 * np.abs(other[3:]).max()
 
 
 def test_what_a_device_reads_stands_beside_the_pose():
