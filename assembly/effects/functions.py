@@ -158,8 +158,9 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
     numbers = parameters_of(function, component)
     if function.form == FORMULA:
         aliases = variable_names(function.variables)
-        known = {name: inputs[k] for name, k in aliases.items()}
-        answer = evaluate(_parsed(function.formula), {**numbers, **known})
+        known = {name: np.asarray(number) for name, number in numbers.items()}
+        known |= {name: inputs[k] for name, k in aliases.items()}
+        answer = evaluate(_parsed(function.formula), known)
         return np.broadcast_to(answer, inputs[0].shape)
     names = columns_of(function, component)
     columns = FORMS[function.form].basis(names, inputs, numbers)
