@@ -180,9 +180,9 @@ def corrected(found: Diagnosis) -> Robot:
     unknowns = behind.values(found.fit.residual)
     robot = with_small(found.campaign.robot, behind.terms, unknowns)
     merged = {name: dict(values) for name, values in robot.effects.items()}
-    for name, values in found.fit.effects.items():
+    for name, fitted in found.fit.effects.items():
         if name in found.claimed:
-            merged[name] = {**merged.get(name, {}), **values}
+            merged[name] = {**merged.get(name, {}), **fitted}
     new = functions_of(found.campaign, found.model)
     functions = (*robot.functions, *(f for some in new for f in some))
     robot = replace(robot, effects=merged, functions=functions)
