@@ -52,7 +52,7 @@ FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too w
 VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
 SMALL = 1e-2  # scale of errors and load at which the machine is linear
 WITHIN_90 = 1.645  # [-] standard deviations
-VERDICTS = ("explained", "none_needed", "ambiguous", "outside_library")
+VERDICTS = ("explained", "learned", "none_needed", "ambiguous", "outside_library")
 
 
 def finite_part(campaign: Synthetic) -> NDArray:
@@ -225,6 +225,7 @@ def score(folder: Path) -> dict[str, Any]:
     outcome: dict[str, Counter] = defaultdict(Counter)
     inside: list[bool] = []
     ratios: list[float] = []
+    outside: list[float] = []
     brier: list[float] = []
     seconds: list[float] = []
     wrong: list[str] = []
@@ -245,6 +246,8 @@ def score(folder: Path) -> dict[str, Any]:
                 f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
                 f"{diagnosis['verdict']} {claimed}: {result}"
             )
+        if truth["kind"] == "outside":
+            outside.append(diagnosis["error"]["after"]["normalised"])
         if result == "right" and diagnosis["verdict"] == "explained":
             ratios.append(diagnosis["error"]["after"]["normalised"])
             inside += _inside(truth, diagnosis)
@@ -257,6 +260,7 @@ def score(folder: Path) -> dict[str, Any]:
         "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
         "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
         "after_over_noise": _spread(ratios),
+        "outside_after_over_noise": _spread(outside),
         "brier": _spread(brier),
         "seconds": _spread(seconds),
         "wrong": wrong,
@@ -273,7 +277,7 @@ def _judge(truth: dict, diagnosis: dict) -> str:
     loose = len(truth["accept_verdicts"]) == len(VERDICTS)
     if verdict == "ambiguous":
         return "right" if verdict in truth["accept_verdicts"] else "abstained"
-    if verdict == "outside_library":
+    if verdict in {"outside_library", "learned"}:
         outside = truth["kind"] == "outside"
         return "right" if outside else "false outside"
     if verdict == "none_needed":

@@ -25,6 +25,7 @@ from examples.hilti.convert import convert as convert_hilti
 from examples.ipa_ur10 import study as ipa
 from examples.ipa_ur10.convert import convert as convert_ipa
 from examples.ipa_ur10.convert import last_direction
+from examples.serial_robots.convert import convert as convert_serial
 from examples.study_output import rms_position
 from examples.voron import study as voron
 from examples.voron.convert import convert as convert_voron
@@ -260,3 +261,38 @@ def test_ur10_is_the_published_one():
                  [0, sa, ca, d], [0, 0, 0, 1]]  # fmt: skip
     found = place_robot(robot, joints=dict(zip(ipa.JOINTS, q, strict=True))).platform
     np.testing.assert_allclose(found, T, atol=1e-12)
+
+
+# -- two serial robots ----------------------------------------------------------------
+
+
+def serial_table(path, q, length=0.031):
+    """A row of the data set's columns, of a UR5 with all angles given [degrees]."""
+    # arm straight along -x at zero, the wrist down and back: the maker's drawing
+    reach, height = 0.425 + 0.39225, 0.089159 - 0.09465
+    aside = 0.10915 + 0.0823 + length
+    x, y = -reach * np.cos(np.radians(q)), -reach * np.sin(np.radians(q))
+    x, y = x + aside * np.sin(np.radians(q)), y - aside * np.cos(np.radians(q))
+    names = [f"joint_{k}" for k in range(1, 7)]
+    head = ["step_order", "x_t", "y_t", "z_t", "x_dif", "y_dif", "z_dif", *names]
+    cells = [0, 1e3 * x, 1e3 * y, 1e3 * height, 2.0, -1.0, 0.5, q, 0, 0, 0, 0, 0]
+    path.write_text(",".join(head) + "\n" + ",".join(map(str, cells)) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("q", [0.0, 35.0])
+def test_a_table_of_the_ur5_becomes_a_campaign(q, tmp_path):
+    folder = convert_serial(serial_table(tmp_path / "a.csv", q), tmp_path / "out")
+    campaign = read_campaign(folder)
+    assert campaign.ids == ("m0",)
+    assert campaign.measured[0, 3:] == pytest.approx([-2e-3, 1e-3, -5e-4])
+    with pytest.raises(BadInput, match=r"targets are 0\.01 m off"):
+        convert_serial(serial_table(tmp_path / "b.csv", 0.0, 0.041), tmp_path / "b")
+
+
+@needs("serial_robots")
+def test_targets_of_both_robots_are_where_their_angles_lead(tmp_path):
+    """The converter refuses targets that are 0.1 mm off."""
+    for path in data_folder("serial_robots").glob("*.csv"):
+        campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
+        assert len(campaign) in {1000, 216}

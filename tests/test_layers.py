@@ -22,8 +22,8 @@ FLOORS = (
     "validation/html", "validation/multibody", "validation/crosscheck",
     "validation/assumptions", "validation/campaign", "validation/exchange",
     "validation/standards", "validation/synthetic",
-    "validation/diagnosis", "validation/inspection", "validation/study",
-    "forcefit/commands",
+    "validation/diagnosis", "validation/correction", "validation/inspection",
+    "validation/study", "forcefit/commands",
 )  # fmt: skip
 PACKAGES = ("forcefit", "stiffness", "assembly", "validation")
 SIMULATION = "validation/multibody/simulation.py"

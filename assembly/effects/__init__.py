@@ -14,6 +14,7 @@ from assembly.effects.effect import Effect, Values
 from assembly.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from assembly.effects.encoder_offset import ENCODER_OFFSET
 from assembly.effects.friction_hysteresis import FRICTION_HYSTERESIS
+from assembly.effects.functions import apply_functions, in_session_alone
 from assembly.effects.geometric_stiffening import GEOMETRIC_STIFFENING
 from assembly.effects.joint_clearance import JOINT_CLEARANCE
 from assembly.effects.link_length import LINK_LENGTH
@@ -23,6 +24,7 @@ from assembly.effects.registration import REGISTRATION
 from assembly.effects.self_weight import SELF_WEIGHT
 from assembly.effects.thermal_expansion import THERMAL_EXPANSION
 from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 
 LIBRARY: dict[str, Effect] = {
     effect.name: effect
@@ -66,3 +68,21 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
         if name in effects:
             conditions = effect.apply(conditions, effects[name])
     return conditions
+
+
+def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
+    """Conditions with everything that a robot's file says the machine has.
+
+    Args:
+        conditions: of the robot without effects, R rows.
+        robot: with them.
+
+    Returns:
+        Conditions with its effects, those of each session and its functions.
+    """
+    recorded = conditions
+    conditions = apply_effects(conditions, robot.effects)
+    for session, effects in robot.session_effects.items():
+        changed = apply_effects(conditions, effects)
+        conditions = in_session_alone(conditions, changed, session)
+    return apply_functions(conditions, robot.functions, recorded)

@@ -14,7 +14,28 @@ _AXES = tuple(axis.lower() for axis in SCREW)
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
-    robot = with_foundation(conditions.robot, values)
+    return _standing(conditions, with_foundation(conditions.robot, values))
+
+
+def on_foundation(conditions: Conditions) -> Conditions:
+    """Conditions of a robot with a frame at the base that carries all the others.
+
+    Args:
+        conditions: R rows.
+
+    Returns:
+        The conditions, changed only if there is no such frame yet; it is the first.
+    """
+    feet = [f for f in conditions.robot.frames if f.parent == BASE]
+    foot = feet[0]
+    placed = foot.translation.any() or foot.rotation.any()
+    if len(feet) > 1 or placed or foot.joint != "fixed" or foot.link is not None:
+        conditions = _standing(conditions, with_foundation(conditions.robot, {}))
+    return conditions
+
+
+def _standing(conditions: Conditions, robot: Robot) -> Conditions:
+    """The rows with a frame before all others that does not move them."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -73,4 +94,5 @@ BASE_COMPLIANCE = Effect(
         Unknown(f"compliance.{axis}", 1e-6, 0.0, 1.0) for axis in _AXES
     ),
     public=_public,
+    splits=True,
 )

@@ -39,4 +39,5 @@ DRIFT = Effect(
     ),
     needs=("time",),
     linear=False,
+    by_row=True,
 )

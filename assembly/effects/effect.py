@@ -57,6 +57,14 @@ class Effect:
         needs: covariates without which it can be neither applied nor identified.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
+        by_row: whether it changes situations one by one, so that it can act in some of
+            them alone; otherwise it changes the robot.
+        finite: whether it asks for finite motions.
+        clearance: whether it gives joints clearance.
+        device: unknowns that move the measuring frame as a whole.
+        splits: whether each of its unknowns may act alone.
+        follows_load: whether its unknowns ``offset.<c>`` belong to components of the
+            load that a campaign records.
     """
 
     name: str
@@ -68,6 +76,12 @@ class Effect:
     public: Callable[[Robot, Values], dict[str, float]] = _as_they_are
     needs: tuple[str, ...] = ()
     linear: bool = True
+    by_row: bool = False
+    finite: bool = False
+    clearance: bool = False
+    device: tuple[str, ...] = ()
+    splits: bool = False
+    follows_load: bool = False
 
 
 def at(frame: str, kind: str) -> str:

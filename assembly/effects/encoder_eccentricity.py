@@ -44,4 +44,5 @@ ENCODER_ECCENTRICITY = Effect(
     components=("amplitude", "phase"),
     unknowns=lambda robot: (Unknown("sine", 1e-4), Unknown("cosine", 1e-4)),
     public=_public,
+    by_row=True,
 )

@@ -21,4 +21,5 @@ ENCODER_OFFSET = Effect(
     frames=drives,
     components=("",),
     unknowns=lambda robot: (Unknown("", 1e-4),),
+    by_row=True,
 )

@@ -46,4 +46,5 @@ FRICTION_HYSTERESIS = Effect(
     components=("",),
     unknowns=lambda robot: (Unknown("", 1.0),),
     needs=("approach",),
+    by_row=True,
 )

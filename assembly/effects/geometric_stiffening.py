@@ -11,4 +11,5 @@ GEOMETRIC_STIFFENING = Effect(
     frames=None,
     components=(),
     unknowns=lambda robot: (),
+    finite=True,
 )

@@ -63,4 +63,5 @@ JOINT_CLEARANCE = Effect(
     ),
     public=_public,
     linear=False,
+    clearance=True,
 )  # fmt: skip

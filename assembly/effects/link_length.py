@@ -20,4 +20,5 @@ LINK_LENGTH = Effect(
     frames=beams,
     components=("",),
     unknowns=lambda robot: (Unknown("", 1e-4),),
+    by_row=True,
 )

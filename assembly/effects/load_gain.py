@@ -34,4 +34,6 @@ LOAD_GAIN = Effect(
     unknowns=lambda robot: (
         Unknown("factor", 0.1, 0.0, 10.0, 1.0), *(Unknown(n, 1.0) for n in _OFFSET),
     ),
+    by_row=True,
+    follows_load=True,
 )  # fmt: skip

@@ -16,10 +16,11 @@ TOOL = ("tool.tx", "tool.ty", "tool.tz")
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     b = np.array([values.get(name, 0.0) for name in BASE])
     R = rotation_matrix(b[:3])
-    turn = rotation_vector(R @ rotation_matrix(conditions.base[:3]))
-    shift = R @ conditions.base[3:] + b[3:]
+    turn = rotation_vector(R @ rotation_matrix(conditions.base[..., :3]))
+    shift = conditions.base[..., 3:] @ R.T + b[3:]
     tool = conditions.tool + [values.get(name, 0.0) for name in TOOL]
-    return replace(conditions, base=np.concatenate([turn, shift]), tool=tool)
+    base = np.concatenate([turn, shift], axis=-1)
+    return replace(conditions, base=base, tool=tool)
 
 
 def _unit(robot: Robot, name: str) -> str:
@@ -33,4 +34,6 @@ REGISTRATION = Effect(
     frames=None,
     components=BASE + TOOL,
     unknowns=lambda robot: tuple(Unknown(name, 1e-4) for name in BASE + TOOL),
+    by_row=True,
+    device=BASE,
 )

@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import LIBRARY, apply_known
+from assembly.effects.functions import covariates_of
 from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
-from forcefit.inputs.table import BadInput, nearest
+from forcefit.inputs.table import BadInput, nearest, quoted
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ def apply_robot_effects(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    covariates: Mapping[str, float] | None = None,
+    covariates: Mapping[str, float | str] | None = None,
     *,
     finite: bool = False,
 ) -> AppliedEffects:
@@ -53,7 +55,8 @@ def apply_robot_effects(
         posture: of the robot as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, added to that of the effects.
-        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``.
+        covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
+            others that functions depend on, and ``session``, by name.
         finite: whether the exact model is used.
 
     Returns:
@@ -64,30 +67,43 @@ def apply_robot_effects(
             motions, which belong to ``exact``.
     """
     given = dict(covariates or {})
-    effects = posture.robot.effects
-    check_covariates(posture.robot, given, finite=finite)
-    declared_only = replace(posture, robot=replace(posture.robot, effects={}))
+    robot = posture.robot
+    check_covariates(robot, given, finite=finite)
+    declared_only = replace(posture, robot=robot.without_effects())
     declared = as_declared(
         declared_only,
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        covariates=given,
+        **by_argument(given),
     )
-    conditions = apply_effects(declared, effects)
+    conditions = apply_known(declared, robot)
     g = conditions.gravity[0] if conditions.gravity.any() else None
-    effective = (
-        assemble_row(conditions, 0).posture
-        if conditions.laws
-        else conditions.posture(0)
-    )
-    if not effects:
+    effective = conditions.posture(0)
+    if conditions.laws or conditions.yields:
+        yields_exactly = finite and bool(conditions.yields)
+        settled = replace(conditions, exact=yields_exactly)
+        effective = assemble_row(settled, 0).posture
+    if not robot.has_effects:
         effective = posture
     return AppliedEffects(effective, conditions.load_at_origin()[0], g, conditions)
 
 
+def by_argument(under: Mapping[str, float | str]) -> dict[str, Any]:
+    """The values of ``--under``, as :func:`as_declared` takes them.
+
+    Args:
+        under: numbers by name, and ``session``.
+
+    Returns:
+        Its arguments ``covariates`` and ``session``.
+    """
+    numbers = {name: value for name, value in under.items() if name != "session"}
+    return {"covariates": numbers, "session": under.get("session")}
+
+
 def check_covariates(
-    robot: Robot, given: Mapping[str, float], *, finite: bool = False
+    robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
     """Refuse effects that cannot be applied under the covariates given.
 
@@ -100,19 +116,27 @@ def check_covariates(
         BadInput: an unknown covariate, one that an effect needs and is not given, or
             an effect that needs finite motions.
     """
+    session = given.get("session")
+    needed = covariates_of(robot, [str(session)])
+    known = [*COVARIATES, *needed, *(["session"] if robot.sessions else [])]
     for name in given:
-        if name not in COVARIATES:
-            hint = nearest(name, COVARIATES)
+        if name not in known:
+            hint = nearest(name, known)
             raise BadInput(f'--under: unknown covariate "{name[:60]}"{hint}')
-    if "geometric_stiffening" in robot.effects and not finite:
+    if session is not None and session not in robot.sessions:
+        hint = nearest(str(session), robot.sessions)
+        raise BadInput(f"--under session: found {quoted(str(session))}{hint}")
+    finite_ones = [name for name in robot.effects if LIBRARY[name].finite]
+    if finite_ones and not finite:
         raise BadInput(
-            f'{robot.name}: effect "geometric_stiffening" asks for finite '
+            f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
             "motions; expected the command forcefit assembly exact"
         )
-    for name in robot.effects:
-        for needed in LIBRARY[name].needs:
-            if needed not in given:
-                raise BadInput(
-                    f'{robot.name}: effect "{name}" depends on {needed}; '
-                    f"expected --under {needed}=NUMBER"
-                )
+    for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
+        needed |= dict.fromkeys(LIBRARY[name].needs, name)
+    for covariate, effect in needed.items():
+        if covariate not in given:
+            raise BadInput(
+                f'{robot.name}: effect "{effect}" depends on {covariate}; '
+                f"expected --under {covariate}=NUMBER"
+            )

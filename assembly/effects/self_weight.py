@@ -22,4 +22,6 @@ SELF_WEIGHT = Effect(
     frames=None,
     components=_AXES,
     unknowns=lambda robot: tuple(Unknown(a, 9.81, -20.0, 20.0) for a in _AXES),
+    by_row=True,
+    splits=True,
 )

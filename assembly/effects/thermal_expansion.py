@@ -22,4 +22,5 @@ THERMAL_EXPANSION = Effect(
     components=("",),
     unknowns=lambda robot: (Unknown("", 1e-5, -5e-4, 5e-4),),
     needs=("temperature",),
+    by_row=True,
 )

@@ -1,45 +1,90 @@
 """``[[effect]]`` of a robot file: known effects of the machine."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from assembly.effects import LIBRARY
-from assembly.effects.effect import at
+from assembly.effects.effect import Values, at
+from assembly.files.function_file import FUNCTION, function_table, read_function
 from assembly.model.robot import Robot
 from forcefit.inputs.table import Table, nearest, quoted
 
 
-def read_effects(tables: Sequence[Table], robot: Robot) -> dict[str, dict[str, float]]:
-    """Effects of a robot file.
+def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
+    """A robot with the effects of its file.
 
     Args:
+        robot: of the same file, without them.
         tables: every ``[[effect]]``.
-        robot: of the same file.
 
     Returns:
-        Parameters by their public names, by effect.
+        The robot.
 
     Raises:
         BadInput: an unknown effect or parameter, an effect given twice or at a frame
             where it cannot act, or a value that is not a finite number.
     """
-    effects: dict[str, dict[str, float]] = {}
+    everywhere: dict[str, Values] = {}
+    sessions: dict[str, dict[str, Values]] = {}
+    functions = []
     for table in tables:
-        name = table.choice("name", tuple(LIBRARY))
+        name = table.choice("name", (*LIBRARY, FUNCTION))
         table.place = f"effect {quoted(name)}"
+        if name == FUNCTION:
+            functions.append(read_function(table, robot))
+            continue
+        session = table.text("session", longest=200) if table.has("session") else None
+        if session is not None and not LIBRARY[name].by_row:
+            raise table.bad(
+                "session", f"found one, and {name} changes the robot in all"
+            )
+        effects = everywhere if session is None else sessions.setdefault(session, {})
         if name in effects:
             raise table.bad("name", "found twice; expected one [[effect]] of each name")
-        allowed = parameter_names(robot, name)
-        inner = table.table("parameters") if table.has("parameters") else None
-        table.finish()
-        effects[name] = {}
-        for key in inner.content if inner is not None else ():
-            if key not in allowed:
-                hint = nearest(key, allowed)
-                message = f"found {quoted(key)}, which is no parameter of {name} here"
-                raise table.bad("parameters", f"{message}{hint}")
-            assert inner is not None
-            effects[name][key] = inner.number(key, "SI")
-    return effects
+        effects[name] = _parameters(table, robot, name)
+    return replace(
+        robot, effects=everywhere, session_effects=sessions, functions=tuple(functions)
+    )
+
+
+def _parameters(table: Table, robot: Robot, effect: str) -> Values:
+    """The parameters of one effect of the library."""
+    allowed = parameter_names(robot, effect)
+    inner = table.table("parameters") if table.has("parameters") else None
+    table.finish()
+    if inner is None:
+        return {}
+    for key in inner.content:
+        if key not in allowed:
+            hint = nearest(key, allowed)
+            message = f"found {quoted(key)}, which is no parameter of {effect} here"
+            raise table.bad("parameters", f"{message}{hint}")
+    return {key: inner.number(key, "SI") for key in inner.content}
+
+
+def effect_tables(robot: Robot) -> list[dict[str, Any]]:
+    """What a robot file says of a robot's effects.
+
+    Args:
+        robot: any.
+
+    Returns:
+        One table each; :func:`with_effects` reads them back to the same.
+    """
+
+    def listed(
+        effects: Mapping[str, Values], **more: str
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        return [
+            {"name": name, "parameters": dict(values), **more}
+            for name, values in effects.items()
+        ]
+
+    tables = listed(robot.effects)
+    for session, effects in robot.session_effects.items():
+        tables += listed(effects, session=session)
+    return tables + [function_table(function) for function in robot.functions]
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:

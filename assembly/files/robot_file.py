@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.effect_file import read_effects
+from assembly.files.effect_file import effect_tables, with_effects
 from assembly.files.joint_file import read_clearance, read_joint_stiffness
 from assembly.files.link_file import link_table, read_link
 from assembly.kinematics.posture import home_posture
@@ -104,7 +103,7 @@ def declared_robot(root: Table, name: str) -> Robot:
     try:
         remarks = _remarks(tables[0])
         robot = Robot(name, platform, frames, closures, description, remarks=remarks)
-        robot = replace(robot, effects=read_effects(effects, robot))
+        robot = with_effects(robot, effects)
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -129,8 +128,9 @@ def _frame(table: Table) -> Frame:
     table.place = f"frame {quoted(name)}"
     joint = table.choice("joint", JOINTS, "fixed")
     actuated = table.boolean("actuated", False)
-    if joint == "fixed" and (actuated or table.has("position")):
-        key = "actuated" if actuated else "position"
+    given = [key for key in ("position", "limits") if table.has(key)]
+    if joint == "fixed" and (actuated or given):
+        key = "actuated" if actuated else given[0]
         message = 'found one on a fixed joint; expected joint = "revolute" | '
         raise table.bad(key, message + '"prismatic", or no such key')
     translation, rotation = _placement(table)
@@ -144,7 +144,9 @@ def _frame(table: Table) -> Frame:
         joint=joint,
         actuated=actuated,
         position=table.number("position", "rad or m", 0.0, largest=LARGEST_LENGTH),
+        limits=_limits(table),
         geometric_error=_numbers(table, "geometric_error", 6, "rad, m"),
+        tolerance=_tolerance(table),
         clearance=read_clearance(table),
         joint_stiffness=read_joint_stiffness(table, own),
         link=read_link(table),
@@ -161,6 +163,28 @@ def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
     """Lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
+
+
+def _limits(table: Table) -> tuple[float, float] | None:
+    """Least and largest coordinate that may be commanded, None if not given."""
+    if not table.has("limits"):
+        return None
+    least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
+    if not least < most:
+        message = f"found [{least:g}, {most:g}], expected the smaller one first"
+        raise table.bad("limits", message)
+    return float(least), float(most)
+
+
+def _tolerance(table: Table) -> NDArray | None:
+    """Standard deviations of the geometric error, None where none are given."""
+    if not table.has("tolerance"):
+        return None
+    sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
+    if sigma.min() < 0:
+        message = f"found {sigma.min():g} in it, expected 6 numbers >= 0 [rad, m]"
+        raise table.bad("tolerance", message)
+    return sigma
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
@@ -268,11 +292,8 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]
-    if robot.effects:
-        table["effect"] = [
-            {"name": name, "parameters": dict(values)}
-            for name, values in robot.effects.items()
-        ]
+    if robot.has_effects:
+        table["effect"] = effect_tables(robot)
     return table
 
 
@@ -293,8 +314,12 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
         table |= {"joint": frame.joint, "position": frame.position}
         if frame.actuated:
             table["actuated"] = True
+        if frame.limits is not None:
+            table["limits"] = list(frame.limits)
     if np.any(frame.geometric_error):
         table["geometric_error"] = frame.geometric_error.tolist()
+    if frame.tolerance is not None:
+        table["tolerance"] = frame.tolerance.tolist()
     if frame.clearance is not None:
         given = vars(frame.clearance).items()
         table["clearance"] = {k: v for k, v in given if v is not None}

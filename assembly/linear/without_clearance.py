@@ -110,19 +110,22 @@ class Flexibility:
             solved=closed & within & ~self.ambiguous[posture],
         )
 
-    def self_stress(self, columns: NDArray) -> NDArray:
+    def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
         """Generalised forces by which the closed structure resists stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
+            read: (6n, t) screws on which the forces are asked for; the same if absent.
 
         Returns:
-            (c, s, s) generalised force on each per unit of each; negative semidefinite.
+            (c, t, s) generalised force on each per unit of each; of the same, negative
+            semidefinite.
         """
         through = np.einsum("cki,is->cks", self.rows, columns)
+        met = through if read is None else np.einsum("cki,it->ckt", self.rows, read)
         count = self.rows.shape[1]
         inner = self.inverse[:, :count, :count] / self.softness
-        return -np.einsum("cks,ckl,clt->cst", through, inner, through)
+        return -np.einsum("cks,ckl,clt->cst", met, inner, through)
 
     def platform_of(self, columns: NDArray) -> NDArray:
         """Platform screw that stress-free screws at the frames cause.

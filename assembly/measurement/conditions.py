@@ -14,13 +14,14 @@ g       ``gravity``           (R, 3)     base axes
 ======  ====================  =========  =============================================
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.measurement.history import History
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 
@@ -45,6 +46,27 @@ class ContactLaw:
 
 
 @dataclass(frozen=True, eq=False)
+class Yield:
+    """A place that gives under what goes through it, by a law of its own.
+
+    Attributes:
+        frame: where.
+        component: row of the screw there that it changes, in the frame's axes.
+        through: frames and rows of the wrenches that its law reads.
+        inputs: (R, k) what else the law depends on, row by row.
+        law: [rad or m] of the inputs (R, k) and wrenches (R, s); by row, smooth.
+        linear: whether it is a spring: a compliance times one wrench, at its place.
+    """
+
+    frame: str
+    component: int
+    through: tuple[tuple[str, int], ...]
+    inputs: NDArray
+    law: Callable[[NDArray, NDArray], NDArray]
+    linear: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class Conditions:
     """R rows of conditions of one robot; without effects, as its file declares it.
 
@@ -54,21 +76,30 @@ class Conditions:
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
         mismatch: (R,) [rad, m] nominal closure error left.
         errors: (R, n, 6) [rad, m] stress-free screws.
-        point: (3,) [m] reference point: loaded and measured, platform axes.
+        point: (3,) [m] reference point: loaded, platform axes.
         load: (R, 6) [N m, N] on the platform at the reference point, base axes.
         gravity: (R, 3) [m/s^2] base axes.
         temperature: (R,) [K] above that of calibration; NaN where not known.
         time: (R,) [s] since the first measurement; NaN where not known.
         approach: (R,) -1 or 1; NaN where not known.
+        covariates: (R,) each, further ones by name.
+        session: (R,) names of the sessions; None where not known.
+        history: rows of a campaign in the order measured, these among them; None where
+            they have no past.
+        row: (R,) which rows of the history these are.
+        target: (R, 3) [m] the point measured, platform axes; None for the reference
+            point.
         laws: contact springs in series with joints.
+        yields: places that give by laws of their own.
         exact: finite motions instead of the linear model.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances, in units of their bounds; None
             where they follow from the least energy.
-        base: (6,) [rad, m] rotation and shift of the measuring frame, acting on the
-            left.
-        tool: (3,) [m] from the reference point to the one measured, platform axes.
+        base: (6,) or (R, 6) [rad, m] rotation and shift of the measuring frame, acting
+            on the left.
+        tool: (3,) or (R, 3) [m] from the reference point to the one measured, platform
+            axes.
         reading: (R, 6) [rad, m] added to the reading.
     """
 
@@ -83,7 +114,13 @@ class Conditions:
     temperature: NDArray
     time: NDArray
     approach: NDArray
+    covariates: Mapping[str, NDArray] = field(default_factory=dict)
+    session: NDArray | None = None
+    history: History | None = None
+    row: NDArray | None = None
+    target: NDArray | None = None
     laws: tuple[ContactLaw, ...] = ()
+    yields: tuple[Yield, ...] = ()
     exact: bool = False
     second_order: NDArray | float = 0.0
     rest: NDArray | None = None
@@ -114,6 +151,18 @@ class Conditions:
             self.transforms[row], float(self.mismatch[row]),
         )  # fmt: skip
 
+    @property
+    def measured_points(self) -> NDArray:
+        """(R, 3) [m] nominal places of the points measured, base axes."""
+        T = self.postures.platform
+        return T[:, :3, 3] + self.measured_arms
+
+    @property
+    def measured_arms(self) -> NDArray:
+        """(R, 3) [m] from the platform's nominal origin to the points measured."""
+        at = self.point if self.target is None else self.target
+        return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
+
     def load_at_origin(self) -> NDArray:
         """(R, 6) [N m, N] the load read at the platform's origin, base axes."""
         arm = self.postures.platform[:, :3, :3] @ self.point
@@ -132,12 +181,15 @@ class Conditions:
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
-        for name in ("reading", "second_order"):
+        for name in ("reading", "second_order", "base", "tool"):
             values = getattr(self, name)
-            if isinstance(values, np.ndarray):
+            if np.ndim(values) == 2:
                 kept[name] = values[index]
-        if self.rest is not None:
-            kept["rest"] = self.rest[index]
+        for name in ("rest", "session", "row", "target"):
+            values = getattr(self, name)
+            kept[name] = None if values is None else values[index]
+        kept["covariates"] = {k: v[index] for k, v in self.covariates.items()}
+        kept["yields"] = tuple(replace(y, inputs=y.inputs[index]) for y in self.yields)
         return replace(self, **kept)
 
 
@@ -155,6 +207,8 @@ def as_declared(
     point: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     covariates: Mapping[str, ArrayLike] | None = None,
+    session: ArrayLike | None = None,
+    target: ArrayLike | None = None,
 ) -> Conditions:
     """Conditions of a robot as its file declares it.
 
@@ -164,8 +218,11 @@ def as_declared(
         mismatch: (R,) [rad, m] nominal closure error left.
         point: (3,) [m] the reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] base axes.
-        covariates: (R,) or one number for all rows, of :data:`COVARIATES`:
-            ``temperature`` [K], ``time`` [s], ``approach`` -1 or 1; NaN if absent.
+        covariates: (R,) or one number for all rows, by name: ``temperature`` [K],
+            ``time`` [s], ``approach`` -1 or 1, NaN if absent; and any others.
+        session: its name, or (R,) names.
+        target: (3,) or (R, 3) [m] the point measured, platform axes; the reference
+            point if absent.
 
     Returns:
         R rows.
@@ -188,7 +245,10 @@ def as_declared(
         point=np.array(point, dtype=float),
         load=rows(np.zeros(6) if load is None else load, 6),
         gravity=rows(gravity, 3),
-        temperature=rows(given["temperature"]),
-        time=rows(given["time"]),
-        approach=rows(given["approach"]),
+        temperature=rows(given.pop("temperature")),
+        time=rows(given.pop("time")),
+        approach=rows(given.pop("approach")),
+        covariates={name: rows(values) for name, values in given.items()},
+        session=None if session is None else np.broadcast_to(session, (count,)),
+        target=None if target is None else rows(target, 3),
     )

@@ -16,21 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly, solve_exact
-from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.without_clearance import flexibility, in_groups
-from assembly.measurement.conditions import Conditions, ContactLaw
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.contacts import (
+    contact_columns,
+    contact_deflections,
+    secants,
+    softened,
+    wrenches_through,
+)
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.settled_clearance import (
     fractions,
     with_clearances_at_rest,
     with_clearances_taken_up,
+    without_joint_clearances,
 )
-from assembly.model.links import in_series, own_screw
+from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
@@ -187,7 +194,14 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """(R, 6) exact minus linear platform screws; zero where one has no solution."""
+    """(R, 6) exact minus linear platform screws; zero where one has no solution.
+
+    Places that give by laws of their own are left to the linear model.
+
+    Returns:
+        The difference.
+    """
+    conditions = replace(conditions, yields=())
     exact, linear = (
         _platform_screws(replace(conditions, exact=finite), one_by_one)[0]
         for finite in (True, False)
@@ -226,25 +240,27 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] the deviation read at the reference point.
+        (R, 6) [rad, m] the deviation read at the points measured.
     """
     platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
-    arm = R @ conditions.point
-    lever = np.einsum(
-        "rij,rj->ri", turn - np.eye(3), R @ (conditions.point + conditions.tool)
-    )
-    shift = screws[:, 3:] + lever + R @ conditions.tool
-    base = rotation_matrix(conditions.base[:3])
+    arm = conditions.measured_arms
+    tool = _turned(R, conditions.tool)
+    lever = _turned(turn - np.eye(3), arm + tool)
+    shift = screws[:, 3:] + lever + tool
+    base = rotation_matrix(conditions.base[..., :3])
     # the device's rotation acts on the position itself; without one, no rounding
-    translation = (
-        (p + arm) @ (base - np.eye(3)).T + shift @ base.T + conditions.base[3:]
-    )
-    rotation = (
-        rotation_vector(base @ turn) if conditions.base[:3].any() else screws[:, :3]
-    )
+    translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
+    translation += conditions.base[..., 3:]
+    turns = conditions.base[..., :3].any()
+    rotation = rotation_vector(base @ turn) if turns else screws[:, :3]
     return np.concatenate([rotation, translation], axis=1) + conditions.reading
+
+
+def _turned(R: NDArray, vectors: NDArray) -> NDArray:
+    """(R, 3) vectors turned by one matrix, or each by its own."""
+    return (R @ vectors[..., None])[..., 0]
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
@@ -262,67 +278,79 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the solver failed, or contacts did not converge.
     """
+    if conditions.yields:
+        return _assemble_yielding(with_springs(conditions, row))
     posture = conditions.posture(row)
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
     if conditions.exact and conditions.laws:  # close to converged by the linear model
         linear = assemble_row(replace(conditions, exact=False), row)
-        compliances = _secants(linear, conditions.laws)
+        compliances = secants(linear, conditions.laws)
     assembly: Assembly | ExactAssembly
     for _ in range(_ITERATIONS):
-        softened = _softened(posture, conditions.laws, compliances)
+        there = softened(posture, conditions.laws, compliances)
         if conditions.exact:
             assembly = solve_exact(
-                softened, conditions.load[row], gravity=gravity, point=conditions.point
+                there, conditions.load[row], gravity=gravity, point=conditions.point
             )
         else:
-            assembly = solve_assembly(softened, load, gravity=gravity)
-        before, compliances = compliances, _secants(assembly, conditions.laws)
+            assembly = solve_assembly(there, load, gravity=gravity)
+        before, compliances = compliances, secants(assembly, conditions.laws)
         tolerance = _CONVERGED_FINITE if conditions.exact else _CONVERGED
         if np.all(np.abs(compliances - before) <= tolerance * compliances):
             return assembly
     raise SolverFailed("contact", f"no convergence in {_ITERATIONS} iterations")
 
 
-def _softened(
-    posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
-) -> Posture:
-    """The posture with linear springs of the laws' secant compliance in series."""
-    if not compliances.any():
-        return posture
-    frames = list(posture.robot.frames)
-    for law, compliance in zip(laws, compliances, strict=True):
-        i = posture.robot.index(law.frame)
-        f = frames[i]
-        K = in_series(f.joint_stiffness, f.own_axis, float(compliance))
-        frames[i] = replace(f, joint_stiffness=K)
-    return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:
+    """One row whose places give by laws of their own."""
 
+    def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
+        assembly = assemble_row(held, 0)
+        return assembly, wrenches_through(assembly).reshape(1, -1)
 
-def _secants(
-    assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
-) -> NDArray:
-    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
-    robot = assembly.posture.robot
-    through = (
-        assembly.joint_wrenches if isinstance(assembly, Assembly) else assembly.wrenches
-    )
-    compliances = []
-    for law in laws:
-        i = robot.index(law.frame)
-        load = abs(through[i] @ own_screw(robot.frames[i]))
-        compliances.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
-    return np.array(compliances)
+    def stress(yields: Yields) -> NDArray:
+        tight = replace(row.postures, robot=without_joint_clearances(row.robot))
+        return flexibility(tight).self_stress(yields.places, yields.read)
 
-
-def _deflection(law: ContactLaw, load: float) -> float:
-    """[rad or m] under a load >= 0."""
-    return float((load / law.coefficient) ** (1 / law.exponent))
+    return settle_yields(row, solve, stress) if row.yields else assemble_row(row, 0)
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
     """(R, 6) platform screws of a robot without clearances, (R,) whether solved."""
+    if not conditions.yields:
+        screws, _, solved = _linear(conditions)
+        return screws, solved
+    unsolved = (
+        np.full((len(conditions), 6), np.nan),
+        np.zeros(len(conditions), dtype=bool),
+    )
+    if conditions.exact:
+        return unsolved  # row by row, under the wrenches of finite motions
+    distinct, which = in_groups(conditions.postures)
+
+    def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
+        screws, wrenches, solved = _linear(held)
+        return (screws, solved), wrenches
+
+    def stress(yields: Yields) -> NDArray:
+        A = flexibility(distinct).self_stress(yields.places, yields.read)
+        return A[which]
+
+    try:
+        return settle_yields(conditions, solve, stress)
+    except SolverFailed:
+        return unsolved
+
+
+def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
+    """Robots without clearances and yields.
+
+    Returns:
+        (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
+        whether solved.
+    """
     distinct, which = in_groups(conditions.postures)
     flexible = flexibility(distinct)
     forces = loads_with_weight(
@@ -331,65 +359,19 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
     errors = conditions.errors.reshape(len(conditions), -1)
     solution = flexible.solve(which, errors, forces)
     screws, solved = solution.platform_screw, solution.solved
+    wrenches = solution.joint_wrenches
     deflections = np.zeros((len(conditions), 0))
     if conditions.laws:
-        columns = _law_columns(conditions)
-        w = solution.joint_wrenches @ columns
+        columns = contact_columns(conditions)
+        w = wrenches @ columns
         A = flexible.self_stress(columns)[which]
-        deflections, settled = _deflections(conditions.laws, w, A)
+        deflections, settled = contact_deflections(conditions.laws, w, A)
         platform_screws = flexible.platform_of(columns)[which]
         screws = screws + np.einsum("rij,rj->ri", platform_screws, deflections)
+        everywhere = flexible.self_stress(columns, np.eye(len(columns)))[which]
+        wrenches = wrenches + np.einsum("rij,rj->ri", everywhere, deflections)
         solved = solved & settled
     if conditions.exact:
         screws, converged = solve_rows(conditions, deflections)
         solved = solved & converged
-    return screws, solved
-
-
-def _law_columns(conditions: Conditions) -> NDArray:
-    """(6n, s) unit screws of the joints with a contact law."""
-    columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
-    for k, law in enumerate(conditions.laws):
-        i = conditions.robot.index(law.frame)
-        columns[6 * i : 6 * i + 6, k] = own_screw(conditions.robot.frames[i])
-    return columns
-
-
-def _deflections(
-    laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
-
-    They minimise a strictly convex function (A is negative semidefinite): Newton's
-    method, each step halved until the gradient decreases.
-
-    Returns:
-        (R, s) deflections, and (R,) whether they converged.
-    """
-    c = np.array([law.coefficient for law in laws])
-    n = np.array([law.exponent for law in laws])
-    scale = np.abs(w).max(axis=1, keepdims=True) + 1e-300
-
-    def gradient(d: NDArray) -> NDArray:
-        own = c * np.abs(d) ** n * np.sign(d)
-        return (own - w - np.einsum("rij,rj->ri", A, d)) / scale
-
-    d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
-    residual = gradient(d)
-    tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
-    for _ in range(_ITERATIONS):
-        norm = np.linalg.norm(residual, axis=1)
-        if np.all(norm <= _CONVERGED):
-            break
-        slope = c * n * np.abs(d) ** (n - 1) + tiny
-        H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
-        step = -np.linalg.solve(H, (residual * scale)[..., None])[..., 0]
-        length = np.where(norm <= _CONVERGED, 0.0, 1.0)
-        for _ in range(30):
-            trial = gradient(d + length[:, None] * step)
-            worse = (np.linalg.norm(trial, axis=1) > norm) & (length > 0)
-            if not worse.any():
-                break
-            length = np.where(worse, length / 2, length)
-        d, residual = d + length[:, None] * step, trial
-    return d, np.linalg.norm(residual, axis=1) <= 1e-8
+    return screws, wrenches, solved

@@ -144,7 +144,10 @@ class Frame:
         joint: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along own z.
         actuated: a locked, commanded joint; otherwise its motion is free.
         position: [rad or m] joint coordinate in the home pose.
+        limits: [rad or m] least and largest coordinate that may be commanded, or None.
         geometric_error: (6,) [rad, m] delta l.
+        tolerance: (6,) [rad, m] standard deviations of delta l about the value given,
+            0 where it is exact; None where they are not known.
         clearance: of the joint, None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
@@ -160,7 +163,9 @@ class Frame:
     joint: str = "fixed"
     actuated: bool = False
     position: float = 0.0
+    limits: tuple[float, float] | None = None
     geometric_error: NDArray = field(default_factory=lambda: np.zeros(6))
+    tolerance: NDArray | None = None
     clearance: Clearance | None = None
     joint_stiffness: NDArray | None = None
     link: Link | None = None
@@ -215,6 +220,7 @@ _SHAPES = {
     "translation": (3,),
     "rotation": (3,),
     "geometric_error": (6,),
+    "tolerance": (6,),
     "joint_stiffness": (6, 6),
     "centre_of_mass": (3,),
 }

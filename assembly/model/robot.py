@@ -24,6 +24,7 @@ from assembly.model.frame import (
     beam_axis,
     locked,
 )
+from assembly.model.function import Function
 from forcefit.inputs.display import Figures, html_table, largest, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import rotation_matrix, transform
@@ -48,6 +49,8 @@ class Robot:
         description: one line.
         effects: parameters of the effects that the machine is known to have, by name;
             see :mod:`assembly.effects`.
+        session_effects: likewise those of one session alone, by session.
+        functions: general effects that it is known to have.
         remarks: defaults of its file that are easily overlooked.
     """
 
@@ -57,6 +60,10 @@ class Robot:
     closures: tuple[tuple[str, str], ...] = ()
     description: str = ""
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    session_effects: Mapping[str, Mapping[str, Mapping[str, float]]] = field(
+        default_factory=dict
+    )
+    functions: tuple[Function, ...] = ()
     remarks: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
@@ -65,6 +72,7 @@ class Robot:
         """The summary that is printed."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
+        titles = [function.title for function in self.functions]
         return {
             "frames": f"{len(self.frames)}, joints {' and '.join(count)}",
             "closures": str(len(self.closures)),
@@ -73,6 +81,7 @@ class Robot:
             "clearance": f"in {sum(map(_has_clearance, self.frames))} joints",
             "largest error": largest(self.errors),
             **({"effects": ", ".join(self.effects)} if self.effects else {}),
+            **({"functions": ", ".join(titles)} if titles else {}),
         }
 
     def __post_init__(self) -> None:
@@ -137,6 +146,23 @@ class Robot:
     def positions(self) -> NDArray:
         """(n,) [rad or m] joint coordinates from which the home pose is solved."""
         return np.array([f.position for f in self.frames])
+
+    @property
+    def has_effects(self) -> bool:
+        """Whether the machine is known to have any."""
+        return bool(self.effects or self.session_effects or self.functions)
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """Names of the sessions to which some effect belongs."""
+        named = [f.session for f in self.functions if f.session is not None]
+        return tuple(dict.fromkeys([*self.session_effects, *named]))
+
+    def without_effects(self) -> "Robot":
+        """The same robot with nothing but what its frames and closures declare."""
+        if not self.has_effects:
+            return self
+        return replace(self, effects={}, session_effects={}, functions=())
 
     def with_errors(self, errors: ArrayLike) -> "Robot":
         """The same robot with other geometric errors.

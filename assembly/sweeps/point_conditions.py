@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.many_postures import Energies
-from assembly.effects import apply_effects
+from assembly.effects import apply_known
+from assembly.effects.robot_effects import by_argument
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble
@@ -39,7 +40,7 @@ def point_conditions(
         k rows.
     """
     many = Posture(
-        replace(robot, effects={}) if robot.effects else robot,
+        robot.without_effects(),
         np.array([posture.coordinates for posture in postures]),
         np.array([posture.transforms for posture in postures]),
         max(posture.mismatch for posture in postures),
@@ -50,16 +51,17 @@ def point_conditions(
         question.load,
         mismatch=mismatch,
         gravity=question.gravity,
-        covariates=question.under,
+        **by_argument(question.under),
     )
     if errors is not None:
         conditions = replace(conditions, errors=errors)
-    return apply_effects(conditions, robot.effects)
+    return apply_known(conditions, robot)
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Whether there are loads, weights or nonlinear contacts."""
-    return bool(conditions.load.any() or conditions.gravity.any() or conditions.laws)
+    """Whether there are loads, weights, or compliances of effects and contacts."""
+    loaded = conditions.load.any() or conditions.gravity.any()
+    return bool(loaded or conditions.laws or conditions.yields)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Energies, NDArray]:

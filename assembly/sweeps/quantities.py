@@ -62,7 +62,7 @@ class Question:
     strength: float | None = None
     load: tuple[float, ...] = (0.0,) * 6
     gravity: tuple[float, ...] = (0.0,) * 3
-    under: Mapping[str, float] = field(default_factory=dict)
+    under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: bool = False
 
     __repr__, _repr_html_ = short_repr, html_table

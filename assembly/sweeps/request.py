@@ -49,7 +49,7 @@ def ask_sweep(
     yield_strength: float | None = None,
     load: Sequence[float] = (0.0,) * 6,
     gravity: Sequence[float] = (0.0,) * 3,
-    under: Mapping[str, float] | None = None,
+    under: Mapping[str, float | str] | None = None,
     stiffness: bool = False,
 ) -> Sweep:
     """The sweep of the options of ``forcefit assembly sweep``, by their names.
@@ -86,7 +86,7 @@ def ask_sweep(
     options |= {
         "load": _assigned((name.lower() for name in WRENCH), load),
         "gravity": _assigned("xyz", gravity),
-        "under": ",".join(f"{k}={v:g}" for k, v in under.items()) or None,
+        "under": ",".join(f"{k}={_short(v)}" for k, v in under.items()) or None,
     }
     if (grid is None) == (poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
@@ -140,6 +140,11 @@ def ask_sweep(
     return Sweep(
         question, targets, tuple(varied.values()), draws or 0, _command(robot, options)
     )
+
+
+def _short(value: float | str) -> str:
+    """A covariate as on the command line."""
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _check_readings(question: Question) -> None:

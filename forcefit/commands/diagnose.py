@@ -32,8 +32,8 @@ def diagnose(
 ) -> None:
     """Trace measured deviations to the effect the model lacks.
 
-    The verdict is explained, none_needed, ambiguous or outside_library; errors before
-    and after are on rows that played no part in choosing or fitting.
+    The verdict is explained, learned, none_needed, ambiguous or outside_library; errors
+    before and after are on rows that played no part in choosing or fitting.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
@@ -56,13 +56,15 @@ def diagnose(
             )  # fmt: skip
     write_json(results.table(diagnosis, tally), json)
     if json != "-":
-        print(results.text(diagnosis, tally))
+        from validation.diagnosis.text import text
+
+        print(text(diagnosis, tally))
     if report is not None:
         from validation.diagnosis.report import write_report
 
         write_report(diagnosis, report, tally)
     if save is not None:
-        if diagnosis.verdict != "explained":
+        if diagnosis.verdict not in {"explained", "learned"}:
             typer.echo(
                 f"{save}: not written, the verdict is {diagnosis.verdict}", err=True
             )

@@ -61,7 +61,8 @@ UnderOption = Annotated[
     list[str] | None,
     typer.Option(
         "--under",
-        help="What the robot's effects depend on: temperature=5,time=0,approach=1.",
+        help="What the robot's effects depend on: temperature=5,time=0,approach=1; "
+        "session=NAME.",
     ),
 ]
 
@@ -235,21 +236,29 @@ def declared_posture(
     )
 
 
-def parse_covariates(texts: list[str] | None) -> dict[str, float]:
+def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
     """Covariates from ``--under``.
 
     Args:
         texts: such as ``["temperature=5,approach=1"]``.
 
     Returns:
-        Numbers by name.
+        Numbers by name; ``session`` is a text.
 
     Raises:
         BadInput: not of that form.
     """
-    if not texts:
-        return {}
-    return parse_assignments(texts, "--under")
+    parts = [part.strip() for text in texts or () for part in text.split(",")]
+    named = [part.partition("=")[2].strip() for part in parts if _names_session(part)]
+    if len(named) > 1:
+        raise BadInput('--under: "session" is given twice')
+    numbers = [part for part in parts if not _names_session(part)]
+    given = parse_assignments(numbers, "--under") if numbers else {}
+    return {**given, **({"session": named[0]} if named else {})}
+
+
+def _names_session(assignment: str) -> bool:
+    return assignment.partition("=")[0].strip() == "session" and "=" in assignment
 
 
 def parse_assignments(

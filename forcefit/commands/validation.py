@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
 from forcefit.commands.exchange import import_, iso
 from forcefit.commands.generate import generate
@@ -38,6 +39,10 @@ app.command()(generate)
 app.command()(inspect)
 app.command("import")(import_)
 app.command()(iso)
+app.command()(carry)
+app.command()(explain)
+app.command()(predict)
+app.command()(compensate)
 
 
 @app.callback()

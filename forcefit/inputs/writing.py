@@ -45,6 +45,7 @@ PIXELS = Kind(
 )  # fmt: skip
 PAGE = Kind("an HTML page", (".html", ".htm"), (b"<!doctype html",))
 NETCDF = Kind("a NetCDF file of forcefit", (".nc",), (b"\x89hdf\r\n\x1a\n",))
+TABLE = Kind("a CSV table that begins with id", (".csv",), (b"id,",))
 ROBOT_MARK = "# Written by forcefit."
 ROBOT = Kind(
     "a robot file written by forcefit", (".toml",), (ROBOT_MARK.lower().encode(),)

@@ -1,6 +1,7 @@
 """Measured deviations of a machine: one row a measurement, checked at the door."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +40,10 @@ class Campaign:
         configuration: (R,) number of the commanded configuration, from 0 by first use.
         repeat: (R,) number of the configuration under one load, from 0 by first use:
             rows that share it were measured twice.
+        session: (R,) names of sessions; None where the file has none.
+        points: (3,) [m] each, further points measured, platform axes, by name.
+        point: (R,) names of the points that rows read, ``""`` for the reference
+            point; None where all are that.  A row of the file is a row for each point.
     """
 
     name: str
@@ -56,6 +61,9 @@ class Campaign:
     registration: str
     configuration: NDArray
     repeat: NDArray
+    session: NDArray | None = None
+    points: Mapping[str, NDArray] = field(default_factory=dict)
+    point: NDArray | None = None
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -76,6 +84,8 @@ class Campaign:
             "loaded": f"{int(self.loads.any(axis=1).sum())} rows",
             "covariates": ", ".join(self.covariates) or "none",
             "registration": self.registration,
+            **({"points": ", ".join(self.points)} if self.points else {}),
+            **({"sessions": ", ".join(self.sessions)} if self.sessions else {}),
         }
 
     def __post_init__(self) -> None:
@@ -87,6 +97,9 @@ class Campaign:
         }  # fmt: skip
         for name, shape in shapes.items():
             object.__setattr__(self, name, _locked(self, name, shape))
+        for name in ("session", "point"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _locked(self, name, (R,)))
         covariates = {k: _column(v, R, k) for k, v in self.covariates.items()}
         object.__setattr__(self, "covariates", covariates)
 
@@ -97,6 +110,19 @@ class Campaign:
     def cells(self) -> NDArray:
         """(R, 6) bool: what was measured."""
         return np.isfinite(self.measured)
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """Names of its sessions in the order of first use; none where it has none."""
+        return () if self.session is None else tuple(dict.fromkeys(self.session))
+
+    @property
+    def targets(self) -> NDArray:
+        """(R, 3) [m] the points that rows read, platform axes."""
+        if self.point is None:
+            return np.broadcast_to(self.reference_point, (len(self), 3))
+        places = {**self.points, "": self.reference_point}
+        return np.array([places[name] for name in self.point])
 
     def take(self, rows: ArrayLike | slice) -> "Campaign":
         """Some of the rows; ``configuration`` and ``repeat`` keep their numbers.
@@ -116,6 +142,8 @@ class Campaign:
             self,
             ids=tuple(self.ids[i] for i in chosen),
             covariates={k: v[chosen] for k, v in self.covariates.items()},
+            session=None if self.session is None else self.session[chosen],
+            point=None if self.point is None else self.point[chosen],
             **{name: getattr(self, name)[chosen] for name in names},
         )
 

@@ -4,6 +4,7 @@ The format is that of ``docs/campaigns.md``.
 """
 
 import os.path
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,43 @@ from assembly.files.robot_file import read_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
 from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN
-from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from forcefit.inputs.table import (
+    BadInput,
+    Table,
+    describe,
+    nearest,
+    quoted,
+    read_toml,
+)
 from validation.campaign.campaign import LOAD, READING, Campaign, number_rows
-from validation.campaign.checks import check_commands, check_readings, extent_of
-from validation.campaign.dialect import read_dialect
-from validation.campaign.measurement_table import MeasurementTable, read_table
+from validation.campaign.checks import (
+    check_commands,
+    check_measured,
+    check_readings,
+    extent_of,
+)
+from validation.campaign.dialect import Dialect, read_dialect
+from validation.campaign.measurement_table import (
+    MeasurementTable,
+    join_tables,
+    read_table,
+)
 
 _CLOSED = 1e-6  # [rad, m] what rounded robot files may leave open
+
+
+@dataclass(frozen=True, eq=False)
+class _Declared:
+    """What ``campaign.toml`` says of its table, or stands for it without one."""
+
+    root: Table
+    name: str
+    files: tuple[Path, ...]
+    point: NDArray
+    points: dict[str, NDArray]
+    registration: str
+    noise: NDArray
+    dialect: Dialect
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -35,58 +66,186 @@ def read_campaign(folder: Path | str) -> Campaign:
         BadInput: something in it breaks a rule of the format, is not plausible, or a
             configuration is out of reach; file, place, found and expected are named.
     """
-    file = Path(folder)
-    if not os.path.isfile(file):
-        file /= "campaign.toml"
-    root = read_toml(file)
+    root = read_toml(_declaration(folder))
     robot_name = root.text("robot", expected="a built-in robot or a robot file")
-    path = file.parent / root.text("measurements", expected="a CSV file")
-    point = root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4)
-    registration = root.choice("registration", ("known", "unknown"), "known")
-    noise = _read_noise(root)
-    dialect = read_dialect(root)
-    root.finish()
+    declared = _declared(root)
+    return _campaign(declared, _read_robot(root, robot_name))
 
-    robot = _read_robot(root, robot_name)
-    table = read_table(path, robot, dialect)
+
+def read_commands(source: Path | str, robot: Robot) -> Campaign:
+    """What is, or was, commanded to a machine; readings may be missing.
+
+    Args:
+        source: a campaign, or a table of the same columns alone (then of the
+            platform's origin, in SI).
+        robot: that is to answer, instead of the campaign's.
+
+    Returns:
+        A campaign with a row for each point of each row, NaN where nothing is measured.
+
+    Raises:
+        BadInput: as :func:`read_campaign`.
+    """
+    if Path(source).suffix.lower() == ".csv":
+        root = Table({"measurements": Path(source).name}, str(source), "")
+        return _campaign(_declared(root), robot, measured=False)
+    root = read_toml(_declaration(source))
+    root.text("robot", expected="a built-in robot or a robot file")
+    return _campaign(_declared(root), robot, measured=False)
+
+
+def _declaration(folder: Path | str) -> Path:
+    """The file ``campaign.toml`` of a folder, or the file given."""
+    file = Path(folder)
+    return file if os.path.isfile(file) else file / "campaign.toml"
+
+
+def _declared(root: Table) -> _Declared:
+    """All of ``campaign.toml`` but its robot."""
+    folder = Path(root.file).parent
+    declared = _Declared(
+        root,
+        folder.resolve().name,
+        tuple(folder / name for name in _table_names(root)),
+        root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4),
+        _read_points(root),
+        root.choice("registration", ("known", "unknown"), "known"),
+        _read_noise(root),
+        read_dialect(root),
+    )
+    root.finish()
+    return declared
+
+
+def _table_names(root: Table) -> list[str]:
+    """One table, or one for each session."""
+    given = root.get("measurements")
+    if not isinstance(given, list):
+        return [root.text("measurements", expected="a CSV file")]
+    proper = given and all(isinstance(v, str) and v.strip() for v in given)
+    if not proper or len({Path(v).stem for v in given}) < len(given):
+        message = f"found {describe(given)}, expected CSV files of different names"
+        raise root.bad("measurements", message)
+    return given
+
+
+def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
+    """The campaign of a declaration, with a robot.
+
+    Args:
+        declared: what the file says.
+        robot: that is to be commanded.
+        measured: whether something must have been measured in every row.
+
+    Returns:
+        The campaign, a row for each point read.
+    """
+    point, points = declared.point, declared.points
+    table = join_tables([
+        read_table(path, robot, declared.dialect, points) for path in declared.files
+    ])
     commanded = _commanded(table, robot)
     check_commands(table, robot)
     configuration = number_rows(_command(table, robot, commanded))
     _, first = np.unique(configuration, return_index=True)
     postures = _place(table, robot, commanded, first)
-    coordinates = np.array([p.coordinates for p in postures])[configuration]
     transforms = np.array([p.transforms for p in postures])
     platform = transforms[:, robot.index(robot.platform)]
-    points = platform[:, :3, 3] + platform[:, :3, :3] @ point
     extent = extent_of(transforms, platform[:, :3, 3])
-    if np.linalg.norm(point) > 10 * extent:
-        message = f"found {np.linalg.norm(point):g} m from the platform, the robot is "
-        message += f"{extent:.3g} m across; expected a point in m"
-        raise root.bad("reference_point", message)
-    sigma = _sigma(table, noise)
-    check_readings(table, sigma, registration, extent_of(transforms, points))
-    loads = table.stack("load", LOAD, 0.0) + 0.0  # no negative zero
+    named = {"reference_point": point, **{f"points.{k}": p for k, p in points.items()}}
+    for place, at in named.items():
+        if np.linalg.norm(at) > 10 * extent:
+            message = f"found {np.linalg.norm(at):g} m from the platform, the robot is "
+            message += f"{extent:.3g} m across; expected a point in m"
+            raise declared.root.bad(place, message)
+    if measured:
+        check_measured(table, points)
+    every: dict[str, tuple[NDArray, NDArray]] = {}
+    for name, at in {"": point, **points}.items():
+        every[name] = _readings(table, name, declared.noise)
+        reach = extent_of(transforms, platform[:, :3, 3] + platform[:, :3, :3] @ at)
+        check_readings(table, name, every[name][1], declared.registration, reach)
+    row, which = _rows_of_points(every, measured)
+    names = [*every]
+    configuration = configuration[row]
+    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # no negative zero
+    session = np.array(table.sessions)[row] if table.sessions else None
+    kinds = [which]
+    if session is not None:
+        kinds.append(np.unique(session, return_inverse=True)[1])
     return Campaign(
-        name=file.parent.resolve().name,
+        name=declared.name,
         robot=robot,
-        ids=table.ids,
-        coordinates=coordinates,
+        ids=tuple(
+            f"{table.ids[i]}:{names[k]}" if names[k] else table.ids[i]
+            for i, k in zip(row, which, strict=True)
+        ),
+        coordinates=np.array([p.coordinates for p in postures])[configuration],
         transforms=transforms[configuration],
         mismatch=np.array([p.mismatch for p in postures])[configuration],
         commanded=commanded,
         loads=loads,
-        measured=table.stack("meas", READING, np.nan),
-        sigma=sigma,
+        measured=np.array([readings for readings, _ in every.values()])[which, row],
+        sigma=np.array([sigma for _, sigma in every.values()])[which, row],
         covariates={
-            name.removeprefix("cov."): values
+            name.removeprefix("cov."): values[row]
             for name, values in table.columns.items()
             if name.startswith("cov.")
         },
         reference_point=point,
-        registration=registration,
+        registration=declared.registration,
         configuration=configuration,
-        repeat=number_rows(configuration, loads),
+        repeat=number_rows(configuration, loads, *kinds),
+        session=session,
+        points=points,
+        point=np.array(names, dtype=str)[which] if points else None,
     )
+
+
+def _rows_of_points(
+    every: dict[str, tuple[NDArray, NDArray]], measured: bool
+) -> tuple[NDArray, NDArray]:
+    """Rows of the file, each once for every point that it reads.
+
+    Args:
+        every: readings (R, 6) and their sigma, by point.
+        measured: whether only what was measured is kept; otherwise a row without a
+            reading stays, for all points that are declared.
+
+    Returns:
+        (C,) rows of the file, ascending, and (C,) number of the point.
+    """
+    taken = np.column_stack([
+        np.isfinite(readings).any(axis=1) for readings, _ in every.values()
+    ])
+    if not measured:
+        alone = not taken.any() and len(every) > 1  # points, and none measured yet
+        taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
+        taken[:, 0] &= not alone
+    rows, which = np.nonzero(taken)
+    return rows, which
+
+
+def _read_points(root: Table) -> dict[str, NDArray]:
+    """(3,) [m] each of ``[points]`` by name, platform axes; none if absent."""
+    if not root.has("points"):
+        return {}
+    table = root.table("points")
+    for name in table.content:
+        if not name or "." in name or ":" in name or name in READING:
+            message = "expected a name without . and :, other than those of readings"
+            raise table.bad("", f"found {quoted(name)}, {message}")
+    return {name: table.array(name, (3,), "m", largest=1e4) for name in table.content}
+
+
+def _readings(
+    table: MeasurementTable, point: str, noise: NDArray
+) -> tuple[NDArray, NDArray]:
+    """(R, 6) readings of a point, and [rad, m] sigma as stated or of the device."""
+    at = f".{point}" if point else ""
+    stated = table.stack(f"sigma{at}", READING, np.nan)
+    sigma = np.where(np.isnan(stated), noise, stated)
+    return table.stack(f"meas{at}", READING, np.nan), sigma
 
 
 def _read_noise(root: Table) -> NDArray:
@@ -160,9 +319,3 @@ def _place(table: MeasurementTable, robot: Robot, commanded: str,
             raise table.bad(int(row), "", f"{message}, expected < {_CLOSED:g}")
         found.append(posture)
     return found
-
-
-def _sigma(table: MeasurementTable, noise: NDArray) -> NDArray:
-    """(R, 6) [rad, m] as stated for the reading, else for the device."""
-    stated = table.stack("sigma", READING, np.nan)
-    return np.where(np.isnan(stated), noise, stated)

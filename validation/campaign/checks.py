@@ -4,6 +4,8 @@ Everything checked here is a well-formed number; what is refused is one that no 
 gives, with the mistake that usually makes it.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,12 +70,30 @@ def _check_covariates(table: MeasurementTable) -> None:
             raise table.bad(int(i), "cov.approach", found)
 
 
-def check_readings(table: MeasurementTable, sigma: NDArray, registration: str,
-                   extent: float) -> None:  # fmt: skip
+def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
+    """Refuse a row in which nothing was measured.
+
+    Args:
+        table: as read.
+        points: names of further points measured.
+
+    Raises:
+        BadInput: the first such row.
+    """
+    groups = ["meas", *(f"meas.{point}" for point in points)]
+    measured = np.hstack([table.stack(group, READING, np.nan) for group in groups])
+    for i in np.flatnonzero(np.isnan(measured).all(axis=1))[:1]:
+        message = "no measured cell; expected at least one of meas.rx ... meas.tz"
+        raise table.bad(int(i), "", message)
+
+
+def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
+                   registration: str, extent: float) -> None:  # fmt: skip
     """Refuse deviations larger than the robot, and sigma that is none.
 
     Args:
         table: as read.
+        point: name of the point read, ``""`` for the reference point.
         sigma: (R, 6) [rad, m] of each reading, NaN where none is stated.
         registration: ``"unknown"`` lets the device stand anywhere in a room.
         extent: [m] of the robot over all configurations.
@@ -81,10 +101,8 @@ def check_readings(table: MeasurementTable, sigma: NDArray, registration: str,
     Raises:
         BadInput: the first such reading, with what it may be.
     """
-    measured = table.stack("meas", READING, np.nan)
-    for i in np.flatnonzero(np.isnan(measured).all(axis=1))[:1]:
-        message = "no measured cell; expected at least one of meas.rx ... meas.tz"
-        raise table.bad(int(i), "", message)
+    at = f".{point}" if point else ""
+    measured = table.stack(f"meas{at}", READING, np.nan)
     for k, name in enumerate(READING):
         for i in np.flatnonzero(np.isfinite(measured[:, k]) & np.isnan(sigma[:, k]))[
             :1
@@ -93,21 +111,21 @@ def check_readings(table: MeasurementTable, sigma: NDArray, registration: str,
             message = (
                 f"no sigma; expected a cell here or [noise] {key} in campaign.toml"
             )
-            raise table.bad(int(i), f"sigma.{name}", message)
+            raise table.bad(int(i), f"sigma{at}.{name}", message)
         unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)
         for i in np.flatnonzero(~(sigma[:, k] >= _FINEST) & ~np.isnan(sigma[:, k]))[:1]:
             found = f"found {sigma[i, k]:g} {unit}"
             message = f"{found}, expected one standard deviation > 0"
-            raise table.bad(int(i), f"sigma.{name}", message)
+            raise table.bad(int(i), f"sigma{at}.{name}", message)
         expected = (
             f"at most half a turn in rad{_UNITS}"
             if k < 3
             else f"a length in m, at most the robot's {extent:.3g}{_UNITS}"
         )
-        _within(table, f"sigma.{name}", sigma[:, k], largest, expected)
+        _within(table, f"sigma{at}.{name}", sigma[:, k], largest, expected)
         if registration == "unknown" and k >= 3:
             largest, expected = max(_ROOM, extent), f"a length in m{_UNITS}"
-        _within(table, f"meas.{name}", measured[:, k], largest, expected)
+        _within(table, f"meas{at}.{name}", measured[:, k], largest, expected)
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:

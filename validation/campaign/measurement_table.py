@@ -8,6 +8,7 @@ with the key that would declare it.
 import csv
 import io
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
 
+_TEXTS = ("id", "session")  # columns that are no numbers
 _LARGEST = 1e15  # no reading in any unit
 
 
@@ -35,6 +37,8 @@ class MeasurementTable:
         columns: (R,) by name, in the order of the file, without ``id``; NaN where a
             cell is empty.
         dialect: how it was written.
+        sessions: name of the session of each row; none where the file has none.
+        files: of each row, where there are several.
     """
 
     file: str
@@ -42,6 +46,8 @@ class MeasurementTable:
     lines: tuple[int, ...]
     columns: dict[str, NDArray]
     dialect: Dialect
+    sessions: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -50,7 +56,8 @@ class MeasurementTable:
         """The error for a cell, to be raised by the caller."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
-        return BadInput(f"{self.file}: {where}: {message}")
+        file = self.files[row] if self.files else self.file
+        return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
         """(R, k) the columns of a group; ``absent`` where there is no such column."""
@@ -60,13 +67,16 @@ class MeasurementTable:
         ])
 
 
-def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementTable:
+def read_table(
+    path: Path | str, robot: Robot, dialect: Dialect, points: Iterable[str] = ()
+) -> MeasurementTable:
     """A table of measurements.
 
     Args:
         path: a CSV file with a header.
         robot: whose actuated joints may be columns.
         dialect: how it is written.
+        points: names of further points measured.
 
     Returns:
         The table in SI.
@@ -78,7 +88,7 @@ def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementT
     lines, rows = _cells(path, dialect)
     if not rows:
         raise BadInput(f"{path}: empty; expected a header and one row a measurement")
-    header = _header(path, rows[0], robot, dialect)
+    header = _header(path, rows[0], robot, tuple(points))
     lines, rows = lines[1:], rows[1:]
     if not rows:
         raise BadInput(f"{path}: no rows; expected one row a measurement")
@@ -89,12 +99,56 @@ def read_table(path: Path | str, robot: Robot, dialect: Dialect) -> MeasurementT
                 f"as in the header{_dialect_hint(row, len(header), dialect)}"
             )
     ids = tuple(row[header.index("id")] for row in rows)
-    table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect)
+    sessions: tuple[str, ...] = ()
+    if "session" in header:
+        sessions = tuple(row[header.index("session")] for row in rows)
+    table = MeasurementTable(str(path), ids, tuple(lines), {}, dialect, sessions)
+    for i in [i for i, name in enumerate(sessions) if not name][:1]:
+        raise table.bad(i, "session", "empty; expected the name of a session")
     for k, name in enumerate(header):
-        if name != "id":
+        if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
     _check_labels(table)  # after the numbers: a table of another dialect is that first
     return table
+
+
+def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
+    """Tables one below the other, each a session unless it says otherwise.
+
+    Args:
+        tables: of one campaign, at least one.
+
+    Returns:
+        The only one as it is; of several, labels begin with the file's name.
+
+    Raises:
+        BadInput: one lacks a column of the others that may not be empty.
+    """
+    if len(tables) == 1:
+        return tables[0]
+    names = list(dict.fromkeys(name for t in tables for name in t.columns))
+    columns = {}
+    for name in names:
+        may_lack = name.startswith(("meas.", "sigma.", "load."))
+        for table in tables:
+            if name not in table.columns and not may_lack:
+                message = f"line 1: missing column {quoted(name)}, which others have"
+                raise BadInput(f"{table.file}: {message}")
+        absent = 0.0 if name.startswith("load.") else math.nan
+        columns[name] = np.concatenate([
+            t.columns.get(name, np.full(len(t), absent)) for t in tables
+        ])
+    stems = [Path(table.file).stem for table in tables]
+    pairs = list(zip(stems, tables, strict=True))
+    return MeasurementTable(
+        tables[0].file,
+        tuple(f"{stem}/{label}" for stem, t in pairs for label in t.ids),
+        tuple(line for t in tables for line in t.lines),
+        columns,
+        tables[0].dialect,
+        tuple(s for stem, t in pairs for s in (t.sessions or (stem,) * len(t))),
+        tuple(t.file for t in tables for _ in t.ids),
+    )
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
@@ -126,11 +180,17 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
             )
 
 
-def _header(path: Path, names: list[str], robot: Robot, dialect: Dialect) -> list[str]:
+def _header(
+    path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
+) -> list[str]:
     """The first line, if every name in it is a column's."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
-    groups = {"pose": POSE, "load": LOAD, "meas": READING, "sigma": READING}
-    known = ["id", *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
+    groups: dict[str, tuple[str, ...]] = {
+        "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
+    }  # fmt: skip
+    for point in points:
+        groups |= dict.fromkeys((f"meas.{point}", f"sigma.{point}"), READING[3:])
+    known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
         # not printed: it may be a file that was never meant to be read
@@ -241,7 +301,8 @@ def _unit_key(name: str, robot: Robot) -> str:
     """Which key of ``[units]`` a column follows, empty for none."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
-        return "rotation" if rest[0] == "r" else "position"
+        turns = rest.rpartition(".")[2][0] == "r"
+        return "rotation" if turns else "position"
     if group == "pose":
         return "command_rotation" if rest[0] == "r" else "command_position"
     if group == "q":

@@ -11,6 +11,7 @@ Order of things, each opened once:
 6. errors before and after on the rows kept aside.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,32 +22,34 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_finite_motions, with_second_order
 from forcefit.inputs.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.evidence import Background
 from validation.diagnosis.holdout import Split, split
 from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
+from validation.diagnosis.kept_aside import Errors, Model, Rung, errors_of, ladder
+from validation.diagnosis.lack_of_fit import (
+    LackOfFit,
+    believed_noise,
+    lack_of_fit,
+    outlying,
+)
+from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
+from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.refit import Fit, refit
 from validation.diagnosis.registration import register
+from validation.diagnosis.responses import responses
 from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, named
 from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
+from validation.diagnosis.small_terms import screws_of
 from validation.diagnosis.structure import Trend, trends
+from validation.diagnosis.teaching import taught
 from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
 
-
-@dataclass(frozen=True)
-class Errors:
-    """Root mean squares over the rows kept aside.
-
-    Attributes:
-        position: [m] of the components measured.
-        rotation: [rad] likewise.
-        normalised: [-] of residual over sigma.
-    """
-
-    position: float
-    rotation: float
-    normalised: float
+_PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
+_BLUNDERS = 20  # one row in so many may be called a blunder, in all
+_LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
+_BENT = 0.1  # [sigma] change of what finite geometric errors add that is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,19 +57,23 @@ class Diagnosis:
     """What a campaign says about the machine, and what it cannot say.
 
     Attributes:
-        campaign: what was measured.
-        verdict: ``"explained"``, ``"none_needed"``, ``"ambiguous"`` or
+        campaign: what was measured; its sigma as believed, see ``noise_factor``.
+        verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"`` or
             ``"outside_library"``.
-        fit: the best set of effects, fitted in the full model.
+        model: the best set of effects, fitted in the full model, with the machine's
+            geometric errors and springs.
         claimed: names of the effects that are claimed.
         probability: of every effect of the library that the design can show.
         alternatives: sets of effects by name, with their probabilities, best first.
         best_by_score: the effects of the single best set, whatever its probability.
         lack: is what is left noise?
         declared: the same for the declared model.
-        before: on the rows kept aside, with the declared model.
-        after: with the effects claimed, or the best set where the verdict is ambiguous.
-        noise: by the stated sigma.
+        before: on all rows kept aside, with the declared model.
+        after: likewise, with the best set, whatever the verdict.
+        noise: by sigma.
+        trimmed: before and after without the rows called outliers.
+        noise_factor: (6,) by which repeats scatter more than the sigma stated.
+        ladder: what each step bought on the rows kept aside.
         split: which rows were kept aside.
         outliers: (R,) bool, rows left out of everything.
         conditions: the campaign's, as declared and registered.
@@ -79,11 +86,12 @@ class Diagnosis:
         best: the best set there.
         trends: what the residual left varies with, if more than noise is left.
         next: the measurement that would decide, if the verdict is ambiguous.
+        remarks: numbers that no machine has, and readings that no sensor gives.
     """
 
     campaign: Campaign
     verdict: str
-    fit: Fit
+    model: Model
     claimed: tuple[str, ...]
     probability: dict[str, float]
     alternatives: tuple[tuple[tuple[str, ...], float], ...]
@@ -93,6 +101,9 @@ class Diagnosis:
     before: Errors
     after: Errors
     noise: Errors
+    trimmed: tuple[Errors, Errors]
+    noise_factor: NDArray
+    ladder: tuple[Rung, ...]
     split: Split
     outliers: NDArray
     conditions: Conditions
@@ -103,12 +114,23 @@ class Diagnosis:
     best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
+    remarks: tuple[str, ...]
 
     __repr__, _repr_html_ = short_repr, html_table
 
+    @property
+    def fit(self) -> Fit:
+        """The best set of effects, fitted in the full model."""
+        return self.model.fit
+
+    @property
+    def behind(self) -> Background:
+        """The machine's geometric errors and springs."""
+        return self.model.behind
+
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
-        from validation.diagnosis.results import text
+        from validation.diagnosis.text import text
 
         return text(self)
 
@@ -147,53 +169,135 @@ def diagnose(
         BadInput: the measuring frame is not known and cannot be found.
     """
     parts = split(campaign)
-    here = conditions_of(campaign)
-    finite = finite or here.exact
-    here = with_finite_motions(here) if finite else with_second_order(here)
+    declared = conditions_of(campaign)
+    finite = finite or declared.exact
+    complete = with_finite_motions if finite else with_second_order
+    declared = here = complete(declared)
     if campaign.registration == "unknown":
         here = register(campaign.take(parts.fitted), here)
-    outliers = np.zeros(len(campaign), dtype=bool)
-    while True:
+    impossible = impossible_rows(campaign)
+    outliers = impossible.copy()
+    factor, slack = np.ones(6), 1.0
+    for _ in range(_PASSES):
         used = parts.fitted & ~outliers
-        found = select(campaign.take(used), here.take(used), update, finite=finite)
+        fitting = campaign.take(used)
+        found = select(fitting, here.take(used), update, finite=finite)
+        left = found.behind.left(found.fit.residual)
         far = np.zeros_like(outliers)
-        far[used] = outlying(campaign.take(used), found.fit.residual)
-        if not far.any():
+        called = int((outliers & ~impossible).sum())
+        most = max(0, len(campaign) // _BLUNDERS - called)
+        far[used] = outlying(fitting, left, most)
+        bent = _with_errors(campaign, here, used, found, complete)
+        if far.any():
+            outliers |= far
+            continue
+        if bent is not here:
+            here = bent
+            continue
+        found, learned = taught(campaign, here, used, found, update)
+        left = found.behind.left(found.fit.residual)
+        larger = believed_noise(fitting, left)
+        lack = lack_of_fit(fitting, left, found.unknowns + round(found.behind.unknowns))
+        if np.any(larger > 1.0):
+            factor = factor * larger
+        elif slack == 1.0 and lack.significant and lack.rms > _LOOSE:
+            # what nothing explains must not be fitted as if it were known to a sigma
+            slack = lack.rms
+            larger = np.full(6, slack)
+        else:
             break
-        outliers |= far
-    return _judge(campaign, here, parts, outliers, found, finite)
+        campaign = replace(campaign, sigma=campaign.sigma * larger)
+    return _judge(
+        campaign,
+        declared,
+        here,
+        parts,
+        outliers,
+        (factor, slack),
+        found,
+        learned,
+        finite,
+    )
+
+
+def _in_sigmas(rung: Rung, slack: float) -> Rung:
+    """A rung whose error is in sigmas that were not made larger."""
+    error = replace(rung.error, normalised=slack * rung.error.normalised)
+    return replace(rung, error=error)
+
+
+def _with_errors(
+    campaign: Campaign, here: Conditions, used: NDArray, found: Selection,
+    complete: Callable[[Conditions], Conditions],
+) -> Conditions:  # fmt: skip
+    """Conditions whose finite part is that of the geometric errors found, too."""
+    # the errors change with it, and are followed until it stays
+    behind, fitting = found.behind, campaign.take(used)
+    raw = behind.raw(found.fit.residual)
+    own = [here.robot.index(frame.name) for frame in campaign.robot.frames]
+    for _ in range(_PASSES):
+        values = behind.values(behind.whitened(raw))
+        errors = screws_of(campaign, behind.terms, values)
+        if not errors.any():
+            break
+        there = here.errors.copy()
+        there[:, own] += errors
+        bent = complete(replace(here, errors=there))
+        bent = replace(here, second_order=bent.second_order)
+        change = predict(bent.take(used)).deviation - predict(here.take(used)).deviation
+        if np.nanmax(np.abs(change / fitting.sigma), initial=0.0) < _BENT:
+            break
+        here, raw = bent, raw - np.nan_to_num(whiten(fitting, change))
+    return here
 
 
 def _judge(
-    campaign: Campaign, here: Conditions, parts: Split, outliers: NDArray,
-    found: Selection, finite: bool,
+    campaign: Campaign, unregistered: Conditions, here: Conditions, parts: Split,
+    outliers: NDArray, noise: tuple[NDArray, float], found: Selection,
+    learned: tuple[Learned, ...], finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
+    factor, slack = noise  # repeats said; nothing explained
     used = parts.fitted & ~outliers
     fitting, measured = campaign.take(used), campaign.measured
-    lack = lack_of_fit(fitting, found.fit.residual, found.unknowns)
-    declared = lack_of_fit(fitting, found.tangents.residual, 0)
+    declared = lack_of_fit(fitting, slack * found.tangents.residual, 0)
     sets = by_names(found.screen, found.sets)
     probability = inclusion(found.screen, found.sets)
     best = named(found.screen, found.sets[0])
     linear = here if finite else replace(here, second_order=0.0)
     declared_model = predict(linear)
     before = measured - declared_model.deviation
-    if not finite and not found.sets[0].members:
+    if not finite and not found.sets[0].members and not found.behind:
         gain = np.sum(whiten(fitting, before[used]) ** 2) - found.fit.rss
         sets, probability = linear_or_finite(sets, probability, float(gain))
         if sets[0][0] == (FINITE,):
             motions = [Hypothesis(FINITE, (), ())]
             fit = refit(fitting, here.take(used), motions, np.zeros(0))
             found, best = replace(found, fit=fit), (FINITE,)
-    said, claimed = verdict(sets, probability, lack.significant)
-    after = apply_effects(here, found.fit.effects)
-    explained = predict(after)
-    residual_after = measured - explained.deviation
+    left = found.behind.left(found.fit.residual)
+    unknowns = found.unknowns + round(found.behind.unknowns)
+    lack = lack_of_fit(fitting, slack * left, unknowns)
+    small = bool(found.behind)
+    said, claimed = verdict(sets, probability, lack.significant, small=small)
+    if learned:  # the library's own scores speak of it without what was learned
+        sets = ((best, 1.0),)
+        probability = {name: float(name in best) for name in probability}
+    if learned and said != "outside_library":
+        said, claimed = "learned", best
+    remarks = implausible(campaign, found.fit, found.behind)
+    if remarks and said in {"explained", "learned"}:
+        said, claimed = "outside_library", ()
+    impossible = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
+    if impossible:
+        listed = ", ".join(impossible[:10])
+        remarks += (f"a temperature that no sensor has, left out: {listed}",)
+    model = Model(here, responses(here), found.fit, found.behind, learned)
+    explained = predict(apply_effects(here, found.fit.effects))
+    residual_after = model.residual(campaign)
     open_ = declared_model.undetermined | explained.undetermined
-    left: tuple[Trend, ...] = ()
+    varies: tuple[Trend, ...] = ()
     if said == "outside_library":
-        left = tuple(trends(fitting, here.take(used), residual_after[used]))
+        varies = tuple(trends(fitting, here.take(used), residual_after[used]))
     further = None
     if said == "ambiguous":
         best_fit = found.fit
@@ -201,30 +305,33 @@ def _judge(
             there = replace(best_fit.conditions, exact=False)
             best_fit = replace(best_fit, conditions=there)
         further = next_measurement(fitting, here.take(used), best_fit, found.rivals)
-    held = ~parts.fitted & ~outliers
+    held = ~parts.fitted
     if not held.any():
         held = used
     far = np.zeros_like(held)
-    shown = residual_after if said in {"explained", "ambiguous"} else before
     judged = campaign.take(held)
-    far[held] = outlying(judged, whiten(judged, residual_after[held]))
+    most = max(0, len(campaign) // _BLUNDERS - int(outliers.sum()))
+    far[held] = outlying(judged, whiten(judged, residual_after[held]), most)
     outliers = outliers | far
-    held &= ~far
+    shown = before if said == "none_needed" else residual_after
+    rungs = ladder(
+        campaign,
+        unregistered,
+        model,
+        found.terms,
+        used,
+        held,
+        found.sets[0].rank,
+        residual_after,
+    )
+    rungs = [_in_sigmas(rung, slack) for rung in rungs]
+    campaign = replace(campaign, sigma=campaign.sigma / slack)
     return Diagnosis(
-        campaign, said, found.fit, claimed, probability, sets, best, lack,
-        declared, _errors(campaign, before, held),
-        _errors(campaign, shown, held), _errors(campaign, campaign.sigma, held),
-        parts, outliers, here, open_, before, residual_after, found.screen,
-        found.sets[0], left, further,
+        campaign, said, model, claimed, probability, sets, best, lack,
+        declared, errors_of(campaign, before, held), errors_of(campaign, shown, held),
+        errors_of(campaign, campaign.sigma, held),
+        (errors_of(campaign, before, held & ~outliers),
+         errors_of(campaign, shown, held & ~outliers)),
+        factor, tuple(rungs), parts, outliers, here, open_, before, residual_after,
+        found.screen, found.sets[0], varies, further, remarks,
     )  # fmt: skip
-
-
-def _errors(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
-    """Root mean squares over the measured cells of some rows."""
-    z = np.where(campaign.cells, residual, np.nan)[rows]
-
-    def rms(values: NDArray) -> float:
-        known = values[np.isfinite(values)]
-        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
-
-    return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))

@@ -44,6 +44,32 @@ def error_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
+def ladder_figure(found: Diagnosis) -> "Figure":
+    """What every step bought, on the rows kept aside.
+
+    Args:
+        found: the diagnosis.
+
+    Returns:
+        Bars in the order of the steps, in sigmas.
+    """
+    from matplotlib.figure import Figure
+
+    steps = found.ladder
+    figure = Figure(figsize=(7, 0.35 * len(steps) + 0.9), layout="constrained")
+    panel = figure.subplots()
+    values = [rung.error.normalised for rung in steps]
+    panel.barh(range(len(steps)), values, color=_AFTER)
+    panel.set_yticks(range(len(steps)), [rung.term for rung in steps])
+    panel.invert_yaxis()
+    panel.axvline(1.0, color="0.5", lw=0.8)
+    for k, value in enumerate(values):
+        panel.text(value, k, f" {value:.3g}", va="center")
+    panel.set(xlabel="rms on rows kept aside [sigma]")
+    panel.margins(x=0.15)
+    return figure
+
+
 def vector_figure(found: Diagnosis) -> "Figure":
     """Residual displacements where they were measured, seen from the top and the side.
 

@@ -122,16 +122,18 @@ def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
     """Subsets of the unknowns of an effect of the whole, the whole set first."""
-    if effect.name == "load_gain":
+    if effect.follows_load:
         # an offset in a direction never loaded belongs to another story
-        kept = {"factor", *(f"offset.{name}" for name in loads)}
-        unknowns = tuple(u for u in unknowns if u.name in kept)
+        kept = {f"offset.{name}" for name in loads}
+        unknowns = tuple(
+            u for u in unknowns if u.name in kept or "offset." not in u.name
+        )
     yield list(unknowns)
     parts = {u.name.partition(".")[0] for u in unknowns}
     if len(parts) > 1 and not any(u.scan for u in unknowns):
         for part in sorted(parts):
             yield [u for u in unknowns if u.name.partition(".")[0] == part]
-    if effect.name in {"base_compliance", "self_weight"}:
+    if effect.splits:
         for u in unknowns:
             yield [u]
 

@@ -81,10 +81,37 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     )  # fmt: skip
 
 
-def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
-    """Squares between repeats of the same configuration and load, and their number."""
+def believed_noise(campaign: Campaign, residual: NDArray) -> NDArray:
+    """By how much repeats scatter more than the stated sigma, where they surely do.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        residual: (N,) whitened.
+
+    Returns:
+        (6,) factors on sigma, one for rotations and one for positions; 1 where repeats
+        do not speak against what is stated.
+    """
+    columns = np.nonzero(campaign.cells)[1]
+    factors = np.ones(6)
+    for part in (slice(3), slice(3, 6)):
+        own = np.isin(columns, np.arange(6)[part])
+        squares, freedom = _repeats(campaign, residual, own)
+        if freedom and float(chi2.sf(squares, freedom)) < SIGNIFICANT:
+            factors[part] = np.sqrt(squares / freedom)
+    return factors
+
+
+def _repeats(
+    campaign: Campaign, residual: NDArray, own: NDArray | None = None
+) -> tuple[float, int]:
+    """Squares between repeats of the same situation, and their number; of ``own``."""
     rows, columns = np.nonzero(campaign.cells)
     group = _alike(campaign)[rows] * 6 + columns
+    if own is not None:
+        group, residual = group[own], residual[own]
+    if not len(group):
+        return 0.0, 0
     order = np.argsort(group, kind="stable")
     _, start, count = np.unique(group[order], return_index=True, return_counts=True)
     sums = np.add.reduceat(residual[order], start)
@@ -104,15 +131,16 @@ def _alike(campaign: Campaign) -> NDArray:
     return number_rows(*parts)
 
 
-def outlying(campaign: Campaign, residual: NDArray) -> NDArray:
+def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
     """Rows that stand far off all others.
 
     Args:
         campaign: of R rows, N measured cells.
         residual: (N,) whitened.
+        most: how many may be called so; one row in twenty if not said.
 
     Returns:
-        (R,) bool; at most one row in twenty.
+        (R,) bool.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
@@ -120,7 +148,8 @@ def outlying(campaign: Campaign, residual: NDArray) -> NDArray:
     rms = np.sqrt(squares / np.maximum(cells, 1))
     # a row of few cells is noisier: compared with what noise of its size may reach
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
-    if far.sum() > len(campaign) / 20:
-        worst = np.argsort(-rms)[: len(campaign) // 20]
+    most = len(campaign) // 20 if most is None else most
+    if far.sum() > most:
+        worst = np.argsort(-rms)[:most]
         far &= np.isin(np.arange(len(campaign)), worst)
     return far

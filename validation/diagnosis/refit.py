@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from assembly.effects import apply_effects
+from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.evidence import NOTHING, Background
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.scoring import FINITE
 from validation.diagnosis.signatures import whiten
@@ -37,7 +38,8 @@ class Fit:
         hypotheses: the set.
         values: fitted unknowns, one hypothesis after the other.
         covariance: of the unknowns.
-        residual: (N,) whitened, what is left.
+        residual: (N,) whitened, what is left; by the covariance of small terms too,
+            where there are any (:meth:`.evidence.Background.left`, ``raw``).
         conditions: the campaign's, with the effects fitted.
     """
 
@@ -112,7 +114,7 @@ def _public(
 
 def adds_play(here: Conditions, members: Sequence[Hypothesis]) -> bool:
     """Whether a set puts play into closed chains, where it is found row by row."""
-    added = any(h.effect == "joint_clearance" for h in members)
+    added = any(LIBRARY[h.effect].clearance for h in members)
     return added and bool(here.robot.closures) and here.rest is None
 
 
@@ -134,13 +136,31 @@ def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDAr
     return there.rest[:, -len(here.robot.frames) :]
 
 
-def in_full(campaign: Campaign, here: Conditions, fit: Fit) -> Fit:
+def with_play_held(here: Conditions, fit: Fit) -> Conditions:
+    """Conditions in which play that a fit adds to closed chains rests where it does.
+
+    Args:
+        here: without the fit's effects.
+        fit: any.
+
+    Returns:
+        The same where the fit adds no such play.
+    """
+    if not adds_play(here, fit.hypotheses):
+        return here
+    return replace(here, rest=resting(here, fit.hypotheses, fit.values))
+
+
+def in_full(
+    campaign: Campaign, here: Conditions, fit: Fit, behind: Background = NOTHING
+) -> Fit:
     """A fit whose residual has play where the least energy puts it now.
 
     Args:
         campaign: what was measured.
         here: its conditions without the effects.
         fit: made with play held.
+        behind: small terms that are there too.
 
     Returns:
         The same numbers with the full model's residual.
@@ -149,12 +169,12 @@ def in_full(campaign: Campaign, here: Conditions, fit: Fit) -> Fit:
     model = whiten(campaign, predict(there).deviation)
     left = whiten(campaign, campaign.measured) - model
     left = np.where(np.isfinite(left), left, _LOST)
-    return replace(fit, conditions=there, residual=left)
+    return replace(fit, conditions=there, residual=behind.whitened(left))
 
 
 def refit(
     campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
-    defect: NDArray | float = 0.0,
+    defect: NDArray | float = 0.0, behind: Background = NOTHING,
 ) -> Fit:  # fmt: skip
     """Fit a set of hypotheses in the full model.
 
@@ -164,16 +184,17 @@ def refit(
         members: hypotheses of different effects.
         start: where to begin, one unknown after the other.
         defect: (N,) whitened, what finite motions add about there, where it is known.
+        behind: small terms that are there too.
 
     Returns:
         The fit.
     """
     linear = [h for h in members if h.effect != FINITE]
     if not linear or len(linear) == len(members):
-        return _refit(campaign, here, members, start)
+        return _refit(campaign, here, members, start, behind=behind)
     # finite motions take a hundred times longer: their defect is fitted, not they
     for _ in range(_MOST_DEFECTS):
-        fit = _refit(campaign, here, linear, start, defect)
+        fit = _refit(campaign, here, linear, start, defect, behind)
         there = replace(fit.conditions, exact=True)
         read = [
             whiten(campaign, predict(at).deviation) for at in (fit.conditions, there)
@@ -183,13 +204,13 @@ def refit(
         if np.abs(defect - last).max() < _SAME_DEFECT:
             break
     left = whiten(campaign, campaign.measured) - read[1]
-    left = np.where(np.isfinite(left), left, _LOST)
+    left = behind.whitened(np.where(np.isfinite(left), left, _LOST))
     return replace(fit, hypotheses=tuple(members), residual=left, conditions=there)
 
 
 def _refit(
     campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
-    defect: NDArray | float = 0.0,
+    defect: NDArray | float = 0.0, behind: Background = NOTHING,
 ) -> Fit:  # fmt: skip
     """The fit of a model to which a constant ``defect`` (N,) is added."""
     slots = [slot for h in members for slot in h.slots]
@@ -207,7 +228,7 @@ def _refit(
 
     def left(scaled: NDArray) -> NDArray:
         model = whiten(campaign, predict(there(scaled * size)).deviation)
-        return np.where(np.isfinite(model), measured - model, _LOST)
+        return behind.whitened(np.where(np.isfinite(model), measured - model, _LOST))
 
     def slopes(scaled: NDArray) -> NDArray:
         middle = left(scaled)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.functions import in_session_alone
 from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_second_order
@@ -44,27 +45,45 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
         here: all conditions to be registered, of these rows or of more.
 
     Returns:
-        The same conditions, registered.
+        The same conditions, registered; each session by itself.
 
     Raises:
-        BadInput: too few full positions and rotations to find it from.
+        BadInput: too few full positions and rotations to find it from, or a session
+            without any row.
     """
     from validation.diagnosis.signatures import conditions_of
 
     own = with_second_order(conditions_of(campaign))
-    start = _coarse(campaign, own)
-    own = apply_effects(own, {"registration": start})
-    here = apply_effects(here, {"registration": start})
-    frame = device_frame(own)
-    fine = refit(campaign, own, [frame], frame.start)
-    return apply_effects(here, {"registration": fine.effects["registration"]})
+    if campaign.session is None or here.session is None:
+        for values in _device(campaign, own):
+            here = apply_effects(here, {"registration": values})
+        return here
+    for session in dict.fromkeys(here.session):
+        rows = campaign.session == session
+        if not rows.any():
+            raise BadInput(
+                f'{campaign.name}: session "{session}" has no row from which its '
+                "registration could be found; expected some"
+            )
+        for values in _device(campaign.take(rows), own.take(rows)):
+            turned = apply_effects(here, {"registration": values})
+            here = in_session_alone(here, turned, session)
+    return here
 
 
-def _coarse(campaign: Campaign, here: Conditions) -> dict[str, float]:
+def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
+    """Parameters of the measuring frame, coarse and what is then left."""
+    start = coarse_frame(campaign, own)
+    placed = apply_effects(own, {"registration": start})
+    frame = device_frame(placed)
+    fine = refit(campaign, placed, [frame], frame.start)
+    return [start, dict(fine.effects["registration"])]
+
+
+def coarse_frame(campaign: Campaign, here: Conditions) -> dict[str, float]:
     """A first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(here).deviation
-    platform = here.postures.platform
-    nominal = platform[:, :3, 3] + platform[:, :3, :3] @ here.point
+    nominal = here.measured_points
     full = np.isfinite(campaign.measured[:, 3:]).all(axis=1)
     full &= np.isfinite(model).all(axis=1)
     turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)

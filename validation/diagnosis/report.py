@@ -9,11 +9,13 @@ from validation.diagnosis.figures import (
     confounding_figure,
     covariate_figure,
     error_figure,
+    ladder_figure,
     probability_figure,
     vector_figure,
 )
 from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.results import calibration_text, effects, open_text, sentence
+from validation.diagnosis.results import LISTED, effects, learned, steps
+from validation.diagnosis.sentence import calibration_text, open_text, sentence
 from validation.diagnosis.verdict import Calibration
 from validation.html import html_figure, html_page, html_table
 
@@ -45,7 +47,7 @@ def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
         The whole page.
     """
     campaign = found.campaign
-    settled = found.verdict in {"explained", "none_needed"}
+    settled = found.verdict in {"explained", "learned", "none_needed"}
     parts = [
         f"<h1>Diagnosis of {html.escape(campaign.name)}</h1>",
         f"<p class='verdict {'good' if settled else 'bad'}'>"
@@ -54,6 +56,22 @@ def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
         f"{html.escape(found.split.how)}.</p>",
         "<h2>Before and after</h2>",
         html_figure(error_figure(found), "Rows that chose and fitted nothing."),
+        "<h2>What every step bought</h2>",
+        html_figure(ladder_figure(found), "Line at 1: noise as stated."),
+        html_table(
+            ["step", "unknowns", "rms kept aside", "unit", "sigma"],
+            [
+                [
+                    row["term"],
+                    f"{row['unknowns']:.0f}",
+                    f"{row['kept_aside_rms']:.3g}",
+                    row["unit"],
+                    f"{row['kept_aside_sigma']:.3g}",
+                ]
+                for row in steps(found)
+            ],
+        ),
+        *_learned(found),
         *_parameters(found),
         "<h2>Where the residual is</h2>",
         html_figure(vector_figure(found), "All rows but outliers."),
@@ -82,9 +100,22 @@ def report_page(found: Diagnosis, tally: Calibration | None = None) -> str:
     return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
 
 
+def _learned(found: Diagnosis) -> list[str]:
+    """Table of the functions learned."""
+    rows = [
+        [f"{one['where']} {', '.join(one['components'])}", ", ".join(one["variables"]),
+         one["form"], one["formula"]]
+        for one in learned(found)
+    ]  # fmt: skip
+    if not rows:
+        return []
+    head = ["where", "of", "form", "value [rad, m, per N m or N]"]
+    return ["<h2>Learned</h2>", html_table(head, rows)]
+
+
 def _parameters(found: Diagnosis) -> list[str]:
     """Table of the best set's numbers."""
-    if found.verdict not in {"explained", "ambiguous"}:
+    if found.verdict not in LISTED:
         return []
     rows = []
     for effect in effects(found):
@@ -97,7 +128,7 @@ def _parameters(found: Diagnosis) -> list[str]:
                 f"{low:.6g} .. {high:.6g}",
                 p["unit"],
             ])
-    title = "Parameters" if found.verdict == "explained" else "Parameters, if so"
+    title = "Parameters, if so" if found.verdict == "ambiguous" else "Parameters"
     head = ["parameter", "value", "std", "90 % interval", "unit"]
     return [f"<h2>{title}</h2>", html_table(head, rows)]
 

@@ -1,16 +1,23 @@
-"""A diagnosis for machines, and the honest sentence for people."""
+"""A diagnosis for machines, in the public format."""
 
 import math
 from dataclasses import asdict, replace
 from typing import Any
 
-from numpy.typing import NDArray
+import numpy as np
 
-from assembly.effects import LIBRARY
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.registration import BASE
 from assembly.model.robot import Robot
+from stiffness.screws import SCREW
 from validation.diagnosis.diagnose import Diagnosis, Errors
-from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.sentence import formula, sentence
+from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
+from validation.diagnosis.teaching import functions_of
 from validation.diagnosis.verdict import Calibration
+
+LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
+_HARDLY = 0.05  # of an unknown known: its frame is not listed
 
 
 def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
@@ -23,8 +30,8 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
     Returns:
         Plain values.
     """
-    listed = found.verdict in {"explained", "ambiguous"}
-    held = ~found.split.fitted & ~found.outliers
+    listed = found.verdict in LISTED
+    held = ~found.split.fitted
     return {
         "campaign": found.campaign.name,
         "robot": found.campaign.robot.name,
@@ -44,13 +51,23 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
                 "position": found.noise.position,
                 "rotation": found.noise.rotation,
             },
+            "without_outliers": {
+                "before": _errors(found.trimmed[0]),
+                "after": _errors(found.trimmed[1]),
+            },
         },
+        "noise_factor": dict(zip(KINDS, found.noise_factor[::3].tolist(), strict=True)),
+        "ladder": steps(found),
+        "geometry": small(found, GEOMETRY),
+        "springs": small(found, SPRINGS),
+        "learned": learned(found),
         "held_out": {"rows": int(held.sum()), "how": found.split.how},
         "lack_of_fit": {
             "rms": found.lack.rms,
             "probability": found.lack.probability,
             "between_repeats": found.lack.repeats,
         },
+        "remarks": list(found.remarks),
         "outliers": [
             i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
         ],
@@ -64,6 +81,69 @@ def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
         "next_measurement": _next(found),
         "calibration": None if tally is None else asdict(tally),
     }
+
+
+def steps(found: Diagnosis) -> list[dict[str, Any]]:
+    """The ladder in the public format, rms in m or, without positions, in rad."""
+    rows = []
+    for rung in found.ladder:
+        error = rung.error
+        placed = math.isfinite(error.position)
+        rows.append({
+            "term": rung.term,
+            "unknowns": rung.unknowns,
+            "kept_aside_rms": error.position if placed else error.rotation,
+            "unit": "m" if placed else "rad",
+            "kept_aside_rotation": error.rotation,
+            "kept_aside_sigma": error.normalised,
+        })
+    return rows
+
+
+_UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
+
+
+def small(found: Diagnosis, name: str) -> dict[str, Any] | None:
+    """Geometric errors, or springs, of all frames in the public format.
+
+    Args:
+        found: a diagnosis.
+        name: ``"geometry"`` or ``"springs"``.
+
+    Returns:
+        The sizes of the prior, how many combinations the readings say, and of every
+        unknown its value, standard deviation and the share that the readings say; None
+        if the machine is as declared.
+    """
+    behind = found.behind
+    values, stds = behind.values(found.fit.residual), behind.deviations()
+    everyone = zip(behind.terms, values, stds, behind.identified(), strict=True)
+    for term, value, std, share in everyone:
+        if term.name != name:
+            continue
+        frames = found.campaign.robot.frames
+        known = np.bincount(term.frame, share, minlength=len(frames))
+        scale = dict(zip(KINDS, behind.scales[name], strict=True))
+        return {
+            "scale": {kind: size for kind, size in scale.items() if size},
+            "unit": dict(zip(KINDS, _UNITS[name], strict=True)),
+            "unknowns": len(term),
+            "identifiable": float(share.sum()),
+            "frames": [
+                {"frame": f.name, "identifiable": float(known[i])}
+                for i, f in enumerate(frames) if known[i] > _HARDLY
+            ],
+            "parameters": [
+                {
+                    "frame": frames[i].name, "component": SCREW[axis].lower(),
+                    "value": float(v), "std": float(s), "identified": float(part),
+                    "unit": _UNITS[name][axis // 3],
+                }
+                for i, axis, v, s, part
+                in zip(term.frame, term.axis, value, std, share, strict=True)
+            ],
+        }  # fmt: skip
+    return None
 
 
 def effects(found: Diagnosis) -> list[dict[str, Any]]:
@@ -95,13 +175,73 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
 
 
 def corrected(found: Diagnosis) -> Robot:
-    """The declared robot with the effects found beside any it had."""
-    robot = found.campaign.robot
+    """The declared robot with what was found built in, beside any effects it had."""
+    behind = found.behind
+    unknowns = behind.values(found.fit.residual)
+    robot = with_small(found.campaign.robot, behind.terms, unknowns)
     merged = {name: dict(values) for name, values in robot.effects.items()}
-    for name, values in found.fit.effects.items():
+    for name, fitted in found.fit.effects.items():
         if name in found.claimed:
-            merged[name] = {**merged.get(name, {}), **values}
-    return replace(robot, effects=merged)
+            merged[name] = {**merged.get(name, {}), **fitted}
+    new = functions_of(found.campaign, found.model)
+    functions = (*robot.functions, *(f for some in new for f in some))
+    robot = replace(robot, effects=merged, functions=functions)
+    unknown = found.campaign.registration == "unknown"
+    return _registered(found, robot) if unknown else robot
+
+
+def _registered(found: Diagnosis, robot: Robot) -> Robot:
+    """The robot with the measuring frame as it was found, in each session its own."""
+    fitted = {"registration": found.fit.effects.get("registration", {})}
+    base = apply_effects(found.model.here, fitted).base
+    base = np.broadcast_to(base, (len(found.campaign), 6))
+    tool = {
+        k: v for k, v in robot.effects.get("registration", {}).items() if k not in BASE
+    }
+
+    def placed(row: int) -> dict[str, float]:
+        return dict(zip(BASE, base[row].tolist(), strict=True))
+
+    if found.campaign.session is None:
+        effects = {**robot.effects, "registration": {**tool, **placed(0)}}
+        return replace(robot, effects=effects)
+    effects = {k: v for k, v in robot.effects.items() if k != "registration"}
+    if tool:
+        effects["registration"] = tool
+    sessions = dict(robot.session_effects)
+    for session in found.campaign.sessions:
+        row = int(np.flatnonzero(found.campaign.session == session)[0])
+        own = {**sessions.get(session, {}), "registration": placed(row)}
+        sessions[session] = own
+    return replace(robot, effects=effects, session_effects=sessions)
+
+
+def learned(found: Diagnosis) -> list[dict[str, Any]]:
+    """What was learned, in the public format: a function of a robot file each."""
+    rungs = [r.error for r in found.ladder if r.term == "learned effects"]
+    first = next(r.error for r in found.ladder if r.term == "library effects")
+    shown = []
+    for k, functions in enumerate(functions_of(found.campaign, found.model)):
+        same = found.model.learned[k].equivalent
+        for function in functions:
+            shown.append({
+                "where": function.where,
+                "components": list(function.components),
+                "variables": list(function.variables),
+                "kind": function.kind,
+                "form": function.form,
+                "formula": formula(function),
+                "parameters": dict(function.parameters),
+                "std": dict(function.std),
+                "equivalent_places": [
+                    [{"where": p.where, "components": list(p.components),
+                      "variables": [p.variable]} for p in parts]
+                    for parts in same
+                ],
+                "before": _errors([first, *rungs][k]),
+                "after": _errors(rungs[k]),
+            })  # fmt: skip
+    return shown
 
 
 def _errors(errors: Errors) -> dict[str, float]:
@@ -122,113 +262,3 @@ def _next(found: Diagnosis) -> dict[str, Any] | None:
         "covariates": found.next.covariates,
         "power": found.next.power,
     }
-
-
-def sentence(found: Diagnosis) -> str:
-    """What may be said, and no more."""
-    where = _judged_on(found)
-    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
-    if found.verdict == "none_needed":
-        return (
-            "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({found.before.normalised:.2f} sigma on {where})."
-        )
-    if found.verdict == "explained":
-        names = " and ".join(found.claimed)
-        return (
-            f"The declared model lacks {names}; {kept}, {found.after.normalised:.2f} "
-            "after (1 is noise)."
-        )
-    if found.verdict == "ambiguous":
-        sets = " or ".join(
-            " + ".join(names) or "nothing" for names, _ in found.alternatives[:4]
-        )
-        return f"This design cannot tell which effect it is: {sets}; {kept}."
-    seen = ", ".join(t.against for t in found.trends[:3]) or "nothing that was recorded"
-    return (
-        "No effect of the library explains the residual: at best "
-        f"{found.lack.rms:.2f} sigma are left, which vary with {seen}."
-    )
-
-
-def _judged_on(found: Diagnosis) -> str:
-    """Which rows the errors before and after are of."""
-    aside = ~found.split.fitted
-    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
-
-
-def calibration_text(tally: Calibration) -> str:
-    """How often the method is right on this design, in words."""
-
-    def counts(said: dict[str, int]) -> str:
-        return ", ".join(f"{name} {n}" for name, n in sorted(said.items()))
-
-    named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
-    return (
-        f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
-        f"{counts(tally.without)}; with what was found {counts(tally.with_found)}"
-        f"{named}; false claims {100 * tally.false_claims:.1f} %"
-    )
-
-
-def text(found: Diagnosis, tally: Calibration | None = None) -> str:
-    """The diagnosis for a terminal."""
-    lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
-    for effect in effects(found) if found.verdict in {"explained", "ambiguous"} else []:
-        lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
-        for p in effect["parameters"]:
-            lines.append(
-                f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
-            )
-    lines += ["", "sets of effects, by probability:"]
-    for names, p in found.alternatives:
-        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
-    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
-    for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
-        row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
-        if name == "normalised":
-            row[2] = 1.0
-        shown = "".join(
-            f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
-        )
-        lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
-    if far:
-        lines += ["", f"left out as outliers: {', '.join(far)}"]
-    if found.open.any():
-        lines += ["", open_text(found.open)]
-    for trend in found.trends:
-        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
-    if found.next is not None:
-        where = ", ".join(f"{k}={v:.4g}" for k, v in found.next.configuration.items())
-        covariates = "".join(f", {k} {v:g}" for k, v in found.next.covariates.items())
-        lines += [
-            "",
-            f"measure next: {where}; load {load_text(found.next.load)}{covariates}",
-            f"  {found.next.why}",
-        ]
-    if tally is not None:
-        lines += ["", calibration_text(tally)]
-    return "\n".join(lines)
-
-
-def _number(value: float) -> str:
-    """Three digits, or a dash where nothing was measured."""
-    return f"{value:.3g}" if math.isfinite(value) else "-"
-
-
-def open_text(open_: NDArray) -> str:
-    """In which rows play leaves the pose free, and what is then predicted.
-
-    Args:
-        open_: (R,) bool, by row.
-
-    Returns:
-        One line.
-    """
-    return (
-        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
-        "(marked open): of the poses of least energy one is predicted there, in a "
-        "closed chain the nearest to nominal, in an open one that of play in the middle"
-    )

@@ -24,13 +24,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects import LIBRARY
 from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.signatures import Signature
 
 _WAYS = 2  # ways of each effect that are tried in pairs, beside its most general
 _BEST = 8  # sets of each size that are enlarged by anything
 _APART = 1e-3  # sine of the angle between a column and those before it
-FINITE = "geometric_stiffening"
+FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _FURTHER = math.log(10.0)  # of each effect beyond the first: a tenth as likely
 _DIGITS = 2  # of a score; refits of one model reached by two ways differ below
 _RANK = 1e-9  # relative eigenvalue below which columns are one

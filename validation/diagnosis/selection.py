@@ -17,11 +17,14 @@ from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import with_rest_positions
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.evidence import Background, Evidence, Prior, background
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
 from validation.diagnosis.registration import device_frame
+from validation.diagnosis.responses import responses
 from validation.diagnosis.scoring import FINITE, Scored, Screen
 from validation.diagnosis.signatures import Signature, Tangents, loaded_components
+from validation.diagnosis.small_terms import SmallTerm, small_terms
 
 Update = Callable[[str, int, int], None]
 
@@ -30,6 +33,8 @@ _VISIBLE = 4.0  # squared whitened change of the readings
 _FEW = 3  # of the best sets are refitted
 _KINDS = 4  # sets of different effects that are refitted
 _SLOW = 2  # of them, best first, with finite motions, which take long
+_BETTER = 1.0  # in score: sizes of small terms that are looked at again
+_PRIORS = 4  # such sizes tried, at most
 _NEAR = 6.0  # in score: sets this near the best are refitted too
 
 
@@ -44,6 +49,10 @@ class Selection:
         rivals: fits of other effects than the best set's, likeliest first.
         unknowns: how many the readings can tell apart in the best set.
         tangents: about the declared model.
+        behind: small terms and the sizes of their priors.
+        terms: small terms with all their unknowns.
+        columns: (N, k) whitened change of the readings per unknown of the best set, the
+            device's frame first.
     """
 
     screen: Screen
@@ -52,6 +61,9 @@ class Selection:
     rivals: tuple[Fit, ...]
     unknowns: int
     tangents: Tangents
+    behind: Background
+    terms: tuple[SmallTerm, ...]
+    columns: NDArray
 
 
 def select(
@@ -74,7 +86,7 @@ def select(
     if not finite:
         return found
     members = (*found.fit.hypotheses, Hypothesis(FINITE, (), ()))
-    exact = refit(campaign, here, members, found.fit.values)
+    exact = refit(campaign, here, members, found.fit.values, behind=found.behind)
     return replace(found, fit=exact)
 
 
@@ -106,14 +118,16 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
         update("signatures", k + 1, len(candidates))
     project = _Projector([tangents.at_start(h) for h in nuisance])
     finite = next((s.offset for s in signatures if s.hypothesis.effect == FINITE), 0.0)
+    screens = _Screens(
+        small_terms(campaign, here, responses(here)), project, tangents.residual
+    )
+    prior = screens.first(signatures)
     best: tuple[Hypothesis, ...] = ()
     rest: NDArray | None = None  # where play would rest in closed chains; slow to find
     known: dict[object, Fit] = {}
     for turn in range(_ROUNDS):
-        screen = Screen(
-            project(tangents.residual[:, None])[:, 0],
-            [_projected(s, project) for s in signatures],
-        )
+        behind = background(screens.terms, prior)
+        screen = screens.screen(signatures, prior)
         sets = screen.search()
         # near rivals and their parts too: a tangent may flatter a set that is larger
         fits: dict[tuple[int, ...], Fit] = {}
@@ -127,11 +141,11 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
             if adds_play(here, every):
                 rest = resting(here, every, start) if rest is None else rest
                 held = replace(here, rest=rest)
-                fits[one.members] = refit(campaign, held, every, start)
+                fits[one.members] = refit(campaign, held, every, start, behind=behind)
             elif _names(every) in known:
                 fits[one.members] = known[_names(every)]
             else:
-                fits[one.members] = refit(campaign, here, every, start, finite)
+                fits[one.members] = refit(campaign, here, every, start, finite, behind)
                 known[_names(every)] = fits[one.members]
             if not waiting:  # the best set needs each of its members
                 refitted = _with_fits(screen, sets, fits)
@@ -143,17 +157,90 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
         update(f"fits, round {turn + 1}", len(fits), len(fits))
         sets = refitted
         chosen = fits[sets[0].members]
-        if turn and _names(chosen.hypotheses) == _names(best):
+        again = screens.evidence.best(project(behind.raw(chosen.residual)))
+        now = sets[0].score + prior.cost
+        settled = again.evidence + _rule(sets[0]) < now + _BETTER
+        if turn and settled and _names(chosen.hypotheses) == _names(best):
             break
         best = chosen.hypotheses
+        if not settled:
+            prior = again
+            known = {}
         if adds_play(here, best):
             rest = resting(here, best, chosen.values)
         signatures = _about(tangents, signatures, chosen, len(nuisance))
     if adds_play(here, chosen.hypotheses):
-        chosen = in_full(campaign, here, chosen)
+        chosen = in_full(campaign, here, chosen, behind)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rivals = _rivals(screen, sets, fits)
-    return Selection(screen, sets, chosen, rivals, unknowns, tangents)
+    tangent = [tangents.at_start(h) for h in nuisance]
+    tangent += [signatures[i] for i in sets[0].members]
+    columns = np.hstack([np.zeros((len(tangents.residual), 0)),
+                         *(s.columns for s in tangent)])  # fmt: skip
+    return Selection(
+        screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms, columns
+    )
+
+
+class _Screens:
+    """Screens of the same hypotheses behind which small terms stand or do not."""
+
+    def __init__(
+        self, terms: Sequence[SmallTerm], project: "_Projector", residual: NDArray
+    ) -> None:
+        self.terms = tuple(terms)
+        self._project, self._residual = project, project(residual)
+        self._projected = [replace(t, columns=project(t.columns)) for t in terms]
+        self.evidence = Evidence(self._projected, len(residual))
+
+    def screen(self, signatures: Sequence[Signature], prior: Prior) -> Screen:
+        """The screen of signatures with small terms of a prior behind them."""
+        behind = background(self._projected, prior)
+
+        def seen(columns: NDArray) -> NDArray:
+            return behind.whitened(self._project(columns))
+
+        return Screen(
+            behind.whitened(self._residual),
+            [
+                Signature(s.hypothesis, seen(s.offset), seen(s.columns))
+                for s in signatures
+            ],
+        )
+
+    def first(self, signatures: Sequence[Signature]) -> Prior:
+        """The prior with which the best set scores best, all to first order.
+
+        Small terms may be all there is, or come beside the best set: both are tried,
+        each with the sizes asked for anew once its best set is known.
+
+        Args:
+            signatures: of all hypotheses.
+
+        Returns:
+            The prior, of nothing where nothing small is asked for.
+        """
+        nothing = self.evidence.none()
+        waiting = [self.evidence.best(self._residual)]
+        if not self.evidence.always:
+            waiting.append(nothing)
+        tried: list[tuple[float, Prior]] = []
+        while waiting:
+            prior = waiting.pop(0)
+            screen = self.screen(signatures, prior)
+            best = screen.search()[0]
+            tried.append((best.score + prior.cost, prior))
+            shown = background(self._projected, prior).raw(screen.shown(best))
+            again = self.evidence.best(self._residual - shown)
+            better = again.evidence + _rule(best) > max(s for s, _ in tried) + _BETTER
+            if better and len(tried) < _PRIORS:
+                waiting.append(again)
+        return max(tried, key=lambda one: one[0])[1]
+
+
+def _rule(one: Scored) -> float:
+    """What a set's score takes off for being one, beside its squared residual."""
+    return one.score + one.rss / 2
 
 
 def _rivals(
@@ -270,9 +357,8 @@ def _shows(signature: Signature) -> bool:
 
 def _moves_base(h: Hypothesis) -> bool:
     """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
-    return h.effect == "registration" and any(
-        name.startswith("base.") for slot in h.slots for name in slot.names
-    )
+    device = LIBRARY[h.effect].device
+    return any(name in device for slot in h.slots for name in slot.names)
 
 
 class _Projector:
@@ -290,8 +376,3 @@ class _Projector:
         if self._q is None:
             return columns
         return columns - self._q @ (self._q.T @ columns)
-
-
-def _projected(s: Signature, project: _Projector) -> Signature:
-    """A signature without what nuisances can show."""
-    return Signature(s.hypothesis, project(s.offset[:, None])[:, 0], project(s.columns))

@@ -10,17 +10,20 @@ o       ``offset``     (N,)       change of the model that no unknown scales
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import LIBRARY, apply_effects, apply_known
 from assembly.effects.effect import Values
+from assembly.effects.functions import covariates_of
 from assembly.kinematics.posture import Posture
-from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
+from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import with_clearances_taken_up
+from assembly.measurement.variables import with_history
+from forcefit.inputs.errors import BadInput
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
@@ -53,22 +56,33 @@ def conditions_of(campaign: Campaign) -> Conditions:
     Returns:
         R conditions.  Covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2], where given,
         are the weight's known direction in each row.
+
+    Raises:
+        BadInput: a function of the robot depends on a covariate that is not there.
     """
     known = campaign.covariates
+    for name, function in covariates_of(campaign.robot, campaign.sessions).items():
+        if name not in known and name != "approach":
+            raise BadInput(
+                f'{campaign.name}: effect "{function}" depends on {name}; expected a '
+                f"column cov.{name}"
+            )
     gravity = np.zeros((len(campaign), 3))
     for k, axis in enumerate("xyz"):
         gravity[:, k] = known.get(f"gravity.{axis}", 0.0)
     worst = float(np.max(campaign.mismatch, initial=0.0))
-    robot = replace(campaign.robot, effects={})
+    robot = campaign.robot.without_effects()
     declared = as_declared(
         Posture(robot, campaign.coordinates, campaign.transforms, worst),
         campaign.loads,
         mismatch=campaign.mismatch,
         point=campaign.reference_point,
         gravity=gravity,
-        covariates={name: known[name] for name in COVARIATES if name in known},
+        covariates=known,
+        session=campaign.session,
+        target=None if campaign.point is None else campaign.targets,
     )
-    return apply_effects(declared, campaign.robot.effects)
+    return apply_known(with_history(declared), campaign.robot)
 
 
 def loaded_components(campaign: Campaign) -> list[str]:
@@ -115,7 +129,8 @@ class Tangents:
             (N,) whitened; NaN where the model has no answer.
         """
         there = apply_effects(self.here, effects)
-        if "joint_clearance" in effects and there.rest is None and not there.exact:
+        settles = any(LIBRARY[name].clearance for name in effects)
+        if settles and there.rest is None and not there.exact:
             there, _ = with_clearances_taken_up(there)
         return whiten(self.campaign, predict(there).deviation)
 

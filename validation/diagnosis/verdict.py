@@ -77,14 +77,16 @@ def linear_or_finite(
 
 
 def verdict(
-    sets: Sets, probability: dict[str, float], more_than_noise: bool
-) -> tuple[str, tuple[str, ...]]:
+    sets: Sets, probability: dict[str, float], more_than_noise: bool,
+    *, small: bool = False,
+) -> tuple[str, tuple[str, ...]]:  # fmt: skip
     """The verdict, and which effects it claims.
 
     Args:
         sets: of effects, with their probabilities, likeliest first.
         probability: of every effect.
         more_than_noise: whether the best set leaves more than noise.
+        small: whether geometric errors or springs are found beside any set.
 
     Returns:
         ``"none_needed"``, ``"explained"``, ``"ambiguous"`` or ``"outside_library"``,
@@ -94,7 +96,7 @@ def verdict(
         return "outside_library", ()
     names, weight = sets[0]
     if not names and weight >= RIVAL:
-        return "none_needed", ()
+        return "explained" if small else "none_needed", ()
     sure = tuple(sorted(name for name, p in probability.items() if p >= CLAIM))
     rivals = [name for name, p in probability.items() if RIVAL <= p < CLAIM]
     if sure and not rivals and dict(sets).get(sure, 0.0) >= RIVAL:

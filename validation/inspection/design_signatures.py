@@ -16,7 +16,7 @@ from validation.diagnosis.signatures import Tangents, conditions_of, loaded_comp
 from validation.inspection.repeats import slow_changes
 
 # finite motions have no unknown, and their exact model takes seconds a row
-_NOT_COMPARED = ("geometric_stiffening",)
+_NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
         of = [h for h in every if h.effect == name]
         most = max(len(h.slots) for h in of)
         full = [h for h in of if len(h.slots) == most]
-        if name == "joint_clearance":
+        if LIBRARY[name].clearance:
             wide = max(len(h.where) for h in of)
             alike = [h for h in of if len(h.where) == wide]
             full = [min(alike, key=lambda h: len(h.slots))]

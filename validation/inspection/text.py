@@ -3,7 +3,7 @@
 import numpy as np
 
 from validation.campaign.campaign import READING, Campaign
-from validation.diagnosis.results import open_text
+from validation.diagnosis.sentence import open_text
 from validation.inspection.counts import (
     covariate_counts,
     load_counts,

@@ -92,6 +92,11 @@ def simulate_readings(
     ])
 
 
+def acts_on_machine(name: str) -> bool:
+    """Whether an effect changes the machine; otherwise only what a device reads."""
+    return name in _ALL_CHANGES
+
+
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
     """The robot with its reference point as the platform."""
     point = Frame("platform~point", robot.platform, translation=reference_point)

@@ -212,6 +212,9 @@ positive = st.floats(1e-6, 1e12)
 vectors = st.tuples(lengths, lengths, lengths)
 
 
+sixes = st.lists(lengths, min_size=6, max_size=6)
+
+
 names = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 
 
@@ -295,6 +298,8 @@ def robots(draw):
                 actuated=actuated,
                 position=0.0,
                 geometric_error=np.array([*draw(vectors), *draw(vectors)]),
+                limits=draw(st.none() | st.just((-1.5, 2.0))) if moves else None,
+                tolerance=draw(st.none() | sixes.map(np.abs)),
                 link=draw(links),
                 mass=draw(st.just(0.0) | positive),
                 centre_of_mass=np.array(draw(vectors)),

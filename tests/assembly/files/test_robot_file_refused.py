@@ -27,6 +27,18 @@ def test_the_sound_files_are_sound(write_file):
 
 
 REFUSED = {
+    "negative tolerance": (
+        "mass = 1.2", "mass = 1.2\ntolerance = [0, 0, 1e-3, -1e-3, 0, 0]",
+        'frame "coupler".tolerance: found -0.001 in it, expected 6 numbers >= 0 '),
+    "limits the wrong way round": (
+        "mass = 1.2", "mass = 1.2\njoint = \"revolute\"\nlimits = [1.0, -1.0]",
+        'frame "coupler".limits: found [1, -1], expected the smaller one first'),
+    "limits of a fixed joint": (
+        "mass = 1.2", "mass = 1.2\nlimits = [-1.0, 1.0]",
+        'frame "coupler".limits: found one on a fixed joint'),
+    "tolerance of another shape": (
+        "mass = 1.2", "mass = 1.2\ntolerance = [1e-3]",
+        'frame "coupler".tolerance: found [0.001] of length 1, expected 6 finite '),
     "unknown key at the root": (
         'description = "', 'descripton = "',
         'unknown key "descripton"; did you mean "description"?'),

@@ -313,3 +313,57 @@ def test_the_files_of_the_docs_are_read(tmp_path):
     assert campaign.measured[0, 1] == pytest.approx(math.radians(0.1))
     assert campaign.covariates["time"][0] == 120
     np.testing.assert_array_equal(campaign.sigma[0], [1e-5] * 3 + [5e-6] * 3)
+
+
+POINTS = "[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n"
+
+
+def test_a_row_is_read_point_by_point(tmp_path):
+    """A point of the tool moves with it: its nominal place is the pose's by hand."""
+    head = "id,q.one,q.two,session,meas.A.tx,meas.A.ty,meas.B.tx,meas.tz"
+    rows = ["m1,0.1,0.2,a,1e-5,2e-5,3e-5,4e-5", "m2,0.1,0.2,b,,,5e-5,"]
+    campaign = read_campaign(write_campaign(tmp_path, head, rows, extra=POINTS))
+    assert campaign.ids == ("m1", "m1:A", "m1:B", "m2:B")
+    assert campaign.sessions == ("a", "b")
+    assert campaign.session.tolist() == ["a", "a", "a", "b"]
+    expected = [[4e-5], [1e-5, 2e-5], [3e-5], [5e-5]]
+    for found, values in zip(campaign.measured, expected, strict=True):
+        assert found[np.isfinite(found)].tolist() == values
+    assert campaign.targets.tolist() == [
+        [0, 0, 0],
+        [0.1, 0, 0],
+        [0, 0.2, 0],
+        [0, 0.2, 0],
+    ]
+    # another point, another session: no repeat
+    assert campaign.repeat.tolist() == [0, 1, 2, 3]
+    assert campaign.configuration.tolist() == [0, 0, 0, 0]
+    assert campaign.take([3]).targets.tolist() == [[0, 0.2, 0]]
+
+
+def test_several_tables_are_sessions(tmp_path):
+    folder = write_campaign(tmp_path, toml={"measurements": '["a.csv", "b.csv"]'})
+    (folder / "a.csv").write_text(f"{HEAD}\n{ROWS[0]}\n")
+    (folder / "b.csv").write_text(f"{HEAD}\n{ROWS[1]}\n{ROWS[2]}\n")
+    campaign = read_campaign(folder)
+    assert campaign.session.tolist() == ["a", "b", "b"]
+    assert campaign.ids == ("a/m1", "b/m2", "b/m3")
+    (folder / "b.csv").write_text("id,q.one,q.two,meas.tx\nm1,0,0,x\n")
+    with pytest.raises(BadInput, match="b.csv: line 2"):
+        read_campaign(folder)
+
+
+@pytest.mark.parametrize(("head", "cells", "extra", "message"), [
+    ("id,q.one,q.two,meas.C.tx", "m1,0,0,1e-5", POINTS, 'unknown column "meas.C.tx"'),
+    ("id,q.one,q.two,meas.A.rx", "m1,0,0,1e-5", POINTS, 'unknown column "meas.A.rx"'),
+    ("id,q.one,q.two,session,meas.tx", "m1,0,0,,1e-5", "", "session: empty"),
+    ("id,q.one,q.two,meas.A.tx", "m1,0,0,", POINTS, "no measured cell"),
+    ("id,q.one,q.two,meas.A.tx", "m1,0,0,1e-5", "[points]\nA = [900, 0, 0]\n",
+     "points.A: found 900 m from the platform"),
+    ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
+     'points: found "tx"'),
+])  # fmt: skip
+def test_sessions_and_points_that_make_no_sense(head, cells, extra, message, tmp_path):
+    with pytest.raises(BadInput) as error:
+        read_campaign(write_campaign(tmp_path, head, [cells], extra=extra))
+    assert message in str(error.value)

@@ -1,0 +1,225 @@
+"""Forms that a function of one or two variables can have.
+
+A form is linear in most of its numbers: each of those multiplies one column, so that a
+fit finds them all at once.  The others, its *shapes* (a time constant, a period), bend
+the columns themselves.
+
+========== ============================== =====================================
+form       numbers of the columns         what they multiply
+========== ============================== =====================================
+powers     ``0``, ``1``, ``2`` ..;        x^i;
+           ``i.j`` of two variables       x^i y^j
+waves      ``k.sine``, ``k.cosine``;      of k turns of x, in 2 pi or ``period``;
+           ``j.k.sine``, ``j.k.cosine``   of j x + k y
+spline     ``1`` .. ``n``;                value at the k-th of n even knots from
+           ``j.k`` of two variables       ``first`` to ``last``; natural and cubic
+                                          between, constant beyond them
+lag        ``gain``, ``start``            x behind a lag of ``time_constant`` (of
+                                          ``time`` itself 1 - exp); what is left of
+                                          the state at time 0, exp
+creep      ``gain``, ``start``            likewise, of a load that comes at once
+step       ``size``                       0 below ``at``, 1 from there on
+slow_wave  ``sine``, ``cosine``           of x in turns of ``period``
+reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; of a load or a
+                                          wrench y its size
+========== ============================== =====================================
+
+Sources:
+    de Boor, A Practical Guide to Splines, chapter IV (natural cubic interpolation).
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Shapes = Mapping[str, float]
+Inputs = Sequence[NDArray]
+_MOST = 999  # powers, waves and knots
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form.
+
+    Attributes:
+        name: as in robot files.
+        summary: one line for people.
+        most: variables that it can have at most.
+        shapes: names of numbers in which it is not linear, by whether it needs them.
+        indices: least and largest whole numbers that a column's name begins with; None
+            where it has none.
+        words: with which a column's name ends, ``""`` for nothing.
+        basis: (R, p) columns, from their names, the inputs (R,) each, and the shapes.
+        remembers: whether its first variable's past counts.
+    """
+
+    name: str
+    summary: str
+    most: int
+    shapes: Mapping[str, bool]
+    indices: tuple[int, int] | None
+    words: tuple[str, ...]
+    basis: Callable[[Sequence[str], Inputs, Shapes], NDArray]
+    remembers: bool = False
+
+    def is_column(self, name: str, variables: int) -> bool:
+        """Whether a number's name is one of a column's, with so many variables."""
+        head, word = name, ""
+        if self.words != ("",):
+            head, _, word = name.rpartition(".")
+        if word not in self.words:
+            return False
+        if self.indices is None:
+            return not head
+        parts = head.split(".")
+        count = 1 if self.name == "reversal" else variables
+        least, most = self.indices
+        return len(parts) == count and all(
+            str(_whole(p)) == p and least <= _whole(p) <= most for p in parts
+        )
+
+
+def _whole(text: str) -> int:
+    """A whole number, or one that no index is."""
+    digits = text.removeprefix("-")
+    proper = digits.isascii() and digits.isdigit() and len(digits) < 9
+    return int(text) if proper else -(10**9)
+
+
+def column_indices(name: str) -> list[int]:
+    """The whole numbers with which a column's name begins."""
+    return [int(part) for part in name.split(".") if part.removeprefix("-").isdigit()]
+
+
+def _powers(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    columns = []
+    for name in names:
+        powers = zip(inputs, column_indices(name), strict=True)
+        columns.append(math.prod((x**k for x, k in powers), start=np.ones(())))
+    return _stacked(columns, inputs)
+
+
+def _waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    turn = 2 * math.pi / shapes.get("period", 2 * math.pi)
+    columns = []
+    for name in names:
+        counts = zip(inputs, column_indices(name), strict=True)
+        angle = turn * sum(k * x for x, k in counts)
+        wave = np.sin if name.rpartition(".")[2] == "sine" else np.cos
+        columns.append(wave(angle))
+    return _stacked(columns, inputs)
+
+
+def _slow_wave(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    return _waves([f"1.{name}" for name in names], inputs, shapes)
+
+
+def _spline(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    indices = np.array([column_indices(name) for name in names]).reshape(len(names), -1)
+    answer = np.ones((len(inputs[0]), len(names)))
+    for k, x in enumerate(inputs):
+        ends = [f"{end}.{k + 1}" if len(inputs) > 1 else end for end in _ENDS]
+        first, last = (shapes[end] for end in ends)
+        knots = np.linspace(first, last, int(indices[:, k].max()))
+        answer *= natural_spline(knots, x)[:, indices[:, k] - 1]
+    return answer
+
+
+_ENDS = ("first", "last")
+
+
+def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
+    """(R, n) natural cubic splines that are 1 at one of n knots and 0 at the others."""
+    from scipy.interpolate import CubicSpline
+
+    if len(knots) < 2:
+        return np.ones((len(x), len(knots)))
+    inside = np.clip(x, knots[0], knots[-1])
+    spline = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")
+    return np.nan_to_num(spline(np.nan_to_num(inside)))
+
+
+def roughness(count: int) -> NDArray:
+    """Integral of the squared curvature of a natural spline over n even knots.
+
+    Args:
+        count: n of knots.
+
+    Returns:
+        (n, n) [1/steps^3] R with integral = v R v of the values v at the knots, the
+        distance of two knots being 1.
+
+    Sources:
+        Green, Silverman, Nonparametric Regression, section 2.1.2 (R = Q B^-1 Q').
+    """
+    inner = max(count - 2, 0)
+    Q = np.zeros((count, inner))
+    for k in range(inner):
+        Q[k : k + 3, k] = 1.0, -2.0, 1.0
+    B = (4 * np.eye(inner) + np.eye(inner, k=1) + np.eye(inner, k=-1)) / 6
+    return Q @ np.linalg.solve(B, Q.T)
+
+
+def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """Inputs are the lagged variable, and what is left of the state at time 0."""
+    return np.column_stack([inputs[name == "start"] for name in names])
+
+
+def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    return _stacked(
+        [np.where(inputs[0] >= shapes["at"], 1.0, 0.0)] * len(names), inputs
+    )
+
+
+def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """Inputs are a direction and, of two variables, what its size depends on."""
+    size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
+    return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
+
+
+def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
+    """(R, p) columns, each as long as the inputs."""
+    rows = len(inputs[0])
+    if not columns:
+        return np.zeros((rows, 0))
+    return np.column_stack([np.broadcast_to(column, (rows,)) for column in columns])
+
+
+_WAVES = ("sine", "cosine")
+
+
+def _memory(name: str, summary: str) -> Form:
+    """A form that lags behind its variable."""
+    return Form(
+        name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
+        remembers=True,
+    )  # fmt: skip
+
+
+FORMS: dict[str, Form] = {
+    form.name: form
+    for form in (
+        Form("powers", "a polynomial", 2, {}, (0, 20), ("",), _powers),
+        Form("waves", "waves, so many a turn", 2, {"period": False},
+             (-_MOST, _MOST), _WAVES, _waves),
+        Form("spline", "a smooth curve through values at even knots", 2,
+             dict.fromkeys(_ENDS, True), (1, _MOST), ("",), _spline),
+        _memory("lag", "what follows slowly"),
+        _memory("creep", "what yields slowly"),
+        Form("step", "a jump", 1, {"at": True}, None, ("size",), _step),
+        Form("slow_wave", "one slow wave", 1, {"period": True}, None, _WAVES,
+             _slow_wave),
+        Form("reversal", "a jump where the direction turns", 2, {}, (0, 20), ("",),
+             _reversal, remembers=True),
+    )
+}  # fmt: skip
+
+
+def shape_names(form: Form, variables: int) -> dict[str, bool]:
+    """Names of the numbers in which a form is not linear, and whether it needs them."""
+    if form.name == "spline" and variables > 1:
+        return {f"{end}.{k}": True for k in (1, 2) for end in _ENDS}
+    return dict(form.shapes)

@@ -1,0 +1,249 @@
+"""Formulas that users write: a small grammar, read without running anything.
+
+Numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions below.  Units are
+checked: a sum adds like to like, a function is given a number (rad counts as one), and
+the units of the parameters are found by that.
+
+Sources:
+    Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of
+    unknowns as linear equations in exponents).
+"""
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, describe, nearest, quoted
+
+FUNCTIONS: dict[str, Callable[[NDArray], NDArray]] = {
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "exp": np.exp,
+    "log": np.log, "tanh": np.tanh, "sqrt": np.sqrt, "abs": np.abs, "sign": np.sign,
+}  # fmt: skip
+_OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply,
+    ast.Div: np.divide, ast.Pow: np.power,
+}  # fmt: skip
+_LONGEST = 500  # characters
+_DEEPEST = 50  # brackets, operations one in the other
+_SAME = 1e-9  # exponents of units that differ by less are equal
+Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad is none
+
+
+def parse_formula(text: str) -> ast.expr:
+    """The tree of a formula.
+
+    Args:
+        text: such as ``"a*sin(3*q) + b"``.
+
+    Returns:
+        The expression, of the grammar's nodes alone.
+
+    Raises:
+        BadInput: it is none; what is wrong is named.
+    """
+    if len(text) > _LONGEST:
+        raise BadInput(
+            f"found {len(text)} characters, expected a formula of at most {_LONGEST}"
+        )
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        found = describe(text)
+        raise BadInput(
+            f'found {found}, expected a formula such as "a*sin(q)"'
+        ) from None
+    _check(tree, 0)
+    return tree
+
+
+def _check(node: ast.AST, depth: int) -> None:
+    """Refuse whatever the grammar does not have."""
+    match node:
+        case _ if depth > _DEEPEST:
+            raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
+        case ast.Constant(value=int() | float() as x) if not isinstance(x, bool):
+            if not abs(x) < 1e100:
+                raise BadInput("found a number beyond 1e100 in the formula")
+        case ast.Name():
+            pass
+        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=inner):
+            _check(inner, depth + 1)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
+            _check(left, depth + 1)
+            _check(right, depth + 1)
+        case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]):
+            if name not in FUNCTIONS:
+                hint = nearest(name, FUNCTIONS)
+                raise BadInput(f"found {quoted(name)}, which is no function{hint}")
+            _check(inner, depth + 1)
+        case _:
+            found = quoted(ast.unparse(node))
+            allowed = f"+ - * / **, brackets and {', '.join(FUNCTIONS)} of one number"
+            raise BadInput(f"found {found} in the formula, expected {allowed}")
+
+
+def names_in(tree: ast.expr) -> list[str]:
+    """Names of variables and parameters, in order of use."""
+    called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
+    found = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    found.sort(key=lambda n: n.col_offset)
+    names = (n.id for n in found if id(n) not in called and n.id != "pi")
+    return list(dict.fromkeys(names))
+
+
+def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
+    """The value of a formula.
+
+    Args:
+        tree: of it.
+        known: numbers or arrays (R,) by name.
+
+    Returns:
+        (R,), or a number; inf or NaN where the formula has no value.
+    """
+    with np.errstate(all="ignore"):
+        return _value(tree, known)
+
+
+def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
+    match node:
+        case ast.Constant(value=value):
+            assert isinstance(value, int | float)
+            return np.asarray(float(value))
+        case ast.Name(id=name):
+            return np.asarray(math.pi if name == "pi" else known[name])
+        case ast.UnaryOp(op=op, operand=inner):
+            sign = -1.0 if isinstance(op, ast.USub) else 1.0
+            return sign * _value(inner, known)
+        case ast.BinOp(left=left, op=op, right=right):
+            return _OPERATIONS[type(op)](_value(left, known), _value(right, known))
+        case ast.Call(func=ast.Name(id=name), args=[inner]):
+            return FUNCTIONS[name](_value(inner, known))
+    raise AssertionError(ast.dump(node))
+
+
+def parameter_units(
+    tree: ast.expr, variables: Mapping[str, Unit], result: Unit
+) -> dict[str, Unit]:
+    """Units of a formula's parameters, so that those of the whole fit.
+
+    Args:
+        tree: of the formula.
+        variables: units of its variables by name.
+        result: unit that the formula must have; a mere number is taken as SI.
+
+    Returns:
+        Exponents by parameter; one that any unit fits counts as a number.
+
+    Raises:
+        BadInput: no units fit; where they clash is named.
+    """
+    units = _Units(variables)
+    whole = units.of(tree)
+    number = units.reduced(whole)
+    if any(abs(k) > _SAME for k in number.values()):
+        units.equal(whole, dict(result), ast.unparse(tree))
+    return units.found([n for n in names_in(tree) if n not in variables])
+
+
+@dataclass
+class _Units:
+    """Equations between units; a unit is exponents of m, N .. and of ``?name``."""
+
+    variables: Mapping[str, Unit]
+    known: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    def of(self, node: ast.AST) -> dict[str, float]:
+        """The unit of a part of a formula, what clashes within refused."""
+        match node:
+            case ast.Name(id=name) if name in self.variables:
+                return dict(self.variables[name])
+            case ast.Name(id=name) if name != "pi":
+                return {f"?{name}": 1.0}
+            case ast.UnaryOp(operand=inner):
+                return self.of(inner)
+            case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+                one = self.of(left)
+                self.equal(one, self.of(right), ast.unparse(node))
+                return one
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                self.equal(self.of(right), {}, ast.unparse(right))
+                base, power = self.of(left), _number(right)
+                if power is None:
+                    self.equal(base, {}, ast.unparse(left))
+                return {name: k * (power or 0.0) for name, k in base.items()}
+            case ast.BinOp(left=left, op=op, right=right):
+                sign = -1.0 if isinstance(op, ast.Div) else 1.0
+                return _added(self.of(left), self.of(right), sign)
+            case ast.Call(func=ast.Name(id=name), args=[inner]):
+                unit = self.of(inner)
+                if name == "abs":
+                    return unit
+                if name == "sqrt":
+                    return {key: k / 2 for key, k in unit.items()}
+                if name != "sign":
+                    self.equal(unit, {}, ast.unparse(inner))
+        return {}
+
+    def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
+        """A unit with what is known of parameters put in."""
+        answer: dict[str, float] = {}
+        for name, k in unit.items():
+            answer = _added(answer, self.known.get(name, {name: 1.0}), k)
+        return {name: k for name, k in answer.items() if abs(k) > _SAME}
+
+    def equal(
+        self, one: Mapping[str, float], other: Mapping[str, float], where: str
+    ) -> None:
+        """Two units are the same; what that says of a parameter is kept."""
+        left = self.reduced(_added(one, other, -1.0))
+        free = next((name for name in left if name.startswith("?")), None)
+        if free is not None:
+            share = left.pop(free)
+            self.known[free] = {name: -k / share for name, k in left.items()}
+            self.known = {name: self.reduced(unit) for name, unit in self.known.items()}
+        elif left:
+            pair = [unit_text(self.reduced(unit)) for unit in (one, other)]
+            raise BadInput(
+                f"units clash in {quoted(where)}: found {pair[0]}, expected {pair[1]}"
+            )
+
+    def found(self, names: list[str]) -> dict[str, Unit]:
+        """Units of parameters; what nothing says is a number."""
+        reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
+        return {
+            name: {k: v for k, v in unit.items() if not k.startswith("?")}
+            for name, unit in reduced.items()
+        }
+
+
+def _number(node: ast.AST) -> float | None:
+    """The value of a part without names, None if it has any."""
+    if any(isinstance(n, ast.Name) and n.id not in ("pi",) for n in ast.walk(node)):
+        return None
+    return float(_value(node, {}))
+
+
+def _added(
+    one: Mapping[str, float], other: Mapping[str, float], factor: float
+) -> dict[str, float]:
+    """Exponents of a product of two units, the second to a power."""
+    names = dict.fromkeys([*one, *other])
+    return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
+
+
+def unit_text(unit: Unit) -> str:
+    """A unit as it is written, such as ``rad/N^2`` without its rad; ``1`` for none."""
+
+    def powers(sign: float) -> list[str]:
+        parts = [(name, sign * k) for name, k in unit.items() if sign * k > _SAME]
+        return [n if abs(k - 1) < _SAME else f"{n}^{k:g}" for n, k in parts]
+
+    above, below = " ".join(powers(1.0)) or "1", powers(-1.0)
+    if not below:
+        return above
+    return f"{above}/{below[0] if len(below) == 1 else '(' + ' '.join(below) + ')'}"

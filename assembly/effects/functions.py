@@ -1,0 +1,305 @@
+"""Functions at work: general effects of a robot's file, or learned from a campaign.
+
+A function changes the stress-free screws at a frame, the base, what is read or the
+load.  One that depends on a wrench, as every compliance does, makes its place yield:
+it is solved together with the equilibrium (:mod:`assembly.measurement.yields`).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects.base_compliance import on_foundation
+from assembly.effects.forms import FORMS, shape_names
+from assembly.effects.formula import evaluate, parse_formula
+from assembly.effects.places import with_screws
+from assembly.measurement.conditions import Conditions, Yield
+from assembly.measurement.variables import LOADS, past, variable
+from assembly.model.function import Function
+from assembly.model.robot import BASE, Robot
+from stiffness.screws import SCREW
+
+AXES = tuple(axis.lower() for axis in SCREW)
+FORMULA = "formula"
+CLOCKS = ("time", "cov.time")
+_parsed = lru_cache(maxsize=256)(parse_formula)
+
+
+def is_loaded(function: Function) -> bool:
+    """Whether it depends on what goes through the robot."""
+    wrench = any(name.startswith("wrench.") for name in function.variables)
+    return wrench or function.kind == "compliance"
+
+
+def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
+    """Covariates that a robot's functions depend on, each with the title of one.
+
+    Args:
+        robot: with its functions.
+        sessions: in which it is looked at.
+
+    Returns:
+        Names without ``cov.``; ``time`` where a form counts it, ``approach`` where a
+        direction has no row before it to follow from.
+    """
+    found: dict[str, str] = {}
+    for function in robot.functions:
+        if function.session not in (None, *sessions):
+            continue
+        names = [n.removeprefix("cov.") for n in function.variables if _is_covariate(n)]
+        form = FORMS.get(function.form)
+        if form is not None and form.remembers:
+            names.append("approach" if form.name == "reversal" else "time")
+        found |= dict.fromkeys(names, function.title)
+    return found
+
+
+def _is_covariate(name: str) -> bool:
+    return name in {"time", "approach"} or name.startswith("cov.")
+
+
+def components_of(where: str) -> tuple[str, ...]:
+    """Components that a function may have at a place."""
+    return LOADS if where == "load" else AXES
+
+
+def parameters_of(function: Function, component: str) -> dict[str, float]:
+    """A function's numbers for one of its components, the prefix taken off."""
+    own: dict[str, float] = {}
+    for name, value in function.parameters.items():
+        whose, _, rest = name.partition(".")
+        if whose not in function.components:
+            own.setdefault(name, value)
+        elif whose == component:
+            own[rest] = value
+    return own
+
+
+def columns_of(function: Function, component: str) -> list[str]:
+    """Names of the numbers in which a function is linear, prefix taken off."""
+    if function.form == FORMULA:
+        return []
+    shapes = shape_names(FORMS[function.form], len(function.variables))
+    return [name for name in parameters_of(function, component) if name not in shapes]
+
+
+def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
+    """What one unit of each of a function's linear numbers adds to it.
+
+    Args:
+        conditions: R rows.
+        function: of a form, no formula, whose variables are no wrenches; of its
+            parameters the shapes alone are used.
+        names: p of columns, such as ``"1.sine"``.
+
+    Returns:
+        (R, p) in the units of the variables; NaN where a variable is not known.
+    """
+    shapes = parameters_of(function, function.components[0])
+    inputs = inputs_of(conditions, function)
+    return FORMS[function.form].basis(names, list(inputs.T), shapes)
+
+
+def inputs_of(conditions: Conditions, function: Function) -> NDArray:
+    """What a function is computed from, its variables' past taken into account.
+
+    Args:
+        conditions: R rows.
+        function: any.
+
+    Returns:
+        (R, k): its variables, NaN for wrenches; of a form that remembers, what it made
+        of the first.
+    """
+    first, *further = function.variables
+    inputs = [_now(conditions, name) for name in further]
+    form = FORMS.get(function.form)
+    if form is None or not form.remembers:
+        return np.column_stack([_now(conditions, first), *inputs])
+    history, row = past(conditions, [first])
+    if form.name == "reversal":
+        # friction grows with the load, whichever way it pushes
+        sizes = [
+            np.abs(x) if name.startswith("load.") else x
+            for name, x in zip(further, inputs, strict=True)
+        ]
+        return np.column_stack([history.direction(first)[row], *sizes])
+    shapes = parameters_of(function, function.components[0])
+    late = shapes["time_constant"]
+    if first in CLOCKS:  # what settles by itself: a step at time 0
+        return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
+    lagged = history.lagged(first, late, held=form.name == "creep")
+    return np.column_stack([lagged[row], history.fading(late)[row]])
+
+
+def _now(conditions: Conditions, name: str) -> NDArray:
+    """(R,) a variable; of the rows' recorded values where they are kept."""
+    if name.startswith("wrench."):
+        return np.full(len(conditions), np.nan)
+    if conditions.history is not None and conditions.row is not None:
+        return conditions.history.values[name][conditions.row]
+    return variable(conditions, name)
+
+
+def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
+    """A function's value.
+
+    Args:
+        function: any.
+        component: which of its.
+        inputs: (R,) each, as :func:`inputs_of` gives them.
+
+    Returns:
+        (R,) [rad, m, N m, N], or per wrench for a compliance.
+    """
+    numbers = parameters_of(function, component)
+    if function.form == FORMULA:
+        aliases = variable_names(function.variables)
+        known = {name: np.asarray(number) for name, number in numbers.items()}
+        known |= {name: inputs[k] for name, k in aliases.items()}
+        answer = evaluate(_parsed(function.formula), known)
+        return np.broadcast_to(answer, inputs[0].shape)
+    names = columns_of(function, component)
+    columns = FORMS[function.form].basis(names, inputs, numbers)
+    return columns @ np.array([numbers[name] for name in names])
+
+
+def variable_names(variables: Sequence[str]) -> dict[str, int]:
+    """Names by which a formula may call its variables.
+
+    Args:
+        variables: public names.
+
+    Returns:
+        Which variable each stands for: the last part, the first part where only one
+        variable has it, and the whole with ``_`` for dots.
+    """
+    found: dict[str, list[int]] = {}
+    for k, name in enumerate(variables):
+        parts = name.split(".")
+        for spelt in dict.fromkeys([parts[-1], parts[0], "_".join(parts)]):
+            found.setdefault(spelt, []).append(k)
+    return {name: which[0] for name, which in found.items() if len(which) == 1}
+
+
+def apply_functions(
+    conditions: Conditions,
+    functions: Iterable[Function],
+    recorded: Conditions | None = None,
+) -> Conditions:
+    """Conditions with functions added, each in its session.
+
+    Args:
+        conditions: R rows.
+        functions: any number.
+        recorded: the same before other effects changed them, as functions see them.
+
+    Returns:
+        Conditions with all of them.
+    """
+    recorded = conditions if recorded is None else recorded
+    for function in functions:
+        acts = in_session(conditions, function.session)
+        if acts.any():
+            inputs = inputs_of(recorded, function)
+            conditions = _with_function(conditions, function, inputs, acts)
+    return conditions
+
+
+def in_session(conditions: Conditions, session: str | None) -> NDArray:
+    """(R,) bool: the rows of a session; all where it is None."""
+    if session is None:
+        return np.ones(len(conditions), dtype=bool)
+    if conditions.session is None:
+        return np.zeros(len(conditions), dtype=bool)
+    return conditions.session == session
+
+
+def _with_function(
+    conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
+) -> Conditions:
+    """One more function, in the rows where it acts."""
+    where = function.where
+    named = [name.split(".")[1] for name in function.variables if "wrench" in name]
+    if BASE in (where, *named):
+        conditions = on_foundation(conditions)
+        where = conditions.robot.frames[0].name if where == BASE else where
+    if is_loaded(function):
+        return _yielding(conditions, function, where, inputs, acts)
+    change = np.zeros((len(conditions), 6))
+    for component in function.components:
+        row = components_of(where).index(component)
+        values = value_of(function, component, list(inputs.T))
+        change[:, row] += np.where(acts, values, 0.0)
+    if where == "reading":
+        return replace(conditions, reading=conditions.reading + change)
+    if where == "load":
+        return replace(conditions, load=conditions.load + change)
+    return with_screws(conditions, where, change)
+
+
+def _yielding(
+    conditions: Conditions,
+    function: Function,
+    where: str,
+    inputs: NDArray,
+    acts: NDArray,
+) -> Conditions:
+    """A place that gives under what goes through it."""
+    slots: dict[int, int] = {}  # of the inputs, by the number of its wrench
+    through: list[tuple[str, int]] = []
+    for k, name in enumerate(function.variables):
+        if name.startswith("wrench."):
+            frame, _, component = name.removeprefix("wrench.").rpartition(".")
+            frame = conditions.robot.frames[0].name if frame == BASE else frame
+            slots[k] = len(through)
+            through.append((frame, LOADS.index(component)))
+    sized = function.form == "reversal"
+    new = []
+    for component in function.components:
+        row = AXES.index(component)
+
+        def law(x: NDArray, w: NDArray, component: str = component) -> NDArray:
+            known = [
+                (np.abs(w[:, slots[k]]) if sized else w[:, slots[k]])
+                if k in slots else x[:, k]
+                for k in range(x.shape[1] - 1)
+            ]  # fmt: skip
+            values = value_of(function, component, known)
+            if function.kind == "compliance":
+                values = values * w[:, -1]
+            return np.where(x[:, -1] > 0, values, 0.0)
+
+        own = [(where, row)] if function.kind == "compliance" else []
+        x = np.column_stack([inputs, acts])
+        spring = bool(own) and not through
+        new.append(Yield(where, row, (*through, *own), x, law, spring))
+    return replace(conditions, yields=(*conditions.yields, *new))
+
+
+def in_session_alone(
+    conditions: Conditions, changed: Conditions, session: str
+) -> Conditions:
+    """Conditions changed in the rows of one session alone.
+
+    Args:
+        conditions: R rows.
+        changed: the same with effects that change them row by row.
+        session: where these act.
+
+    Returns:
+        The mixture.
+    """
+    acts = in_session(conditions, session)[:, None]
+
+    def mixed(name: str) -> NDArray:
+        return np.where(acts, getattr(changed, name), getattr(conditions, name))
+
+    errors = np.where(acts[:, :, None], changed.errors, conditions.errors)
+    return replace(
+        conditions, errors=errors, load=mixed("load"), gravity=mixed("gravity"),
+        reading=mixed("reading"), base=mixed("base"), tool=mixed("tool"),
+    )  # fmt: skip

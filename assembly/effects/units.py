@@ -1,0 +1,102 @@
+"""Units of functions: of their variables, of what they give, of their parameters."""
+
+from assembly.effects.forms import FORMS, column_indices, shape_names
+from assembly.effects.formula import Unit, parameter_units, parse_formula, unit_text
+from assembly.effects.functions import CLOCKS, FORMULA, parameters_of, variable_names
+from assembly.model.function import Function
+from assembly.model.robot import Robot
+
+_COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
+_ANGLE: Unit = {}  # rad counts as a number
+
+
+def variable_unit(robot: Robot, name: str) -> Unit:
+    """Exponents of m, N, s, K of a variable; of a covariate without one, its name.
+
+    Args:
+        robot: whose variable it is.
+        name: public.
+
+    Returns:
+        The unit; none for angles and signs.
+    """
+    kind, _, rest = name.partition(".")
+    if kind == "q":
+        return {"m": 1} if robot.frame(rest).joint == "prismatic" else _ANGLE
+    if kind in {"load", "wrench"}:
+        moment = rest.rpartition(".")[2].startswith("m")
+        return {"N": 1, "m": 1} if moment else {"N": 1}
+    if kind == "position":
+        return {"m": 1}
+    covariate = rest if kind == "cov" else name
+    if covariate == "approach":
+        return _ANGLE
+    return _COVARIATES.get(covariate, {f"[{covariate}]": 1})
+
+
+def result_unit(function: Function, component: str) -> Unit:
+    """The unit of what a function gives in one component."""
+    turns = component.startswith(("r", "m"))
+    if function.where == "load":
+        return {"N": 1, "m": 1} if turns else {"N": 1}
+    screw: dict[str, float] = {} if turns else {"m": 1}
+    if function.kind == "screw":
+        return screw
+    wrench: Unit = {"N": 1, "m": 1} if turns else {"N": 1}
+    names = dict.fromkeys([*screw, *wrench])
+    return {name: screw.get(name, 0) - wrench.get(name, 0) for name in names}
+
+
+def units_of(robot: Robot, function: Function) -> dict[str, str]:
+    """Units of a function's parameters, as they are written.
+
+    Args:
+        robot: on which it acts.
+        function: any.
+
+    Returns:
+        By parameter, such as ``"rad/K"``.
+    """
+    found: dict[str, str] = {}
+    for component in function.components:
+        for name in parameters_of(function, component):
+            full = f"{component}.{name}"
+            full = full if full in function.parameters else name
+            found[full] = _parameter_unit(robot, function, component, name)
+    return {name: found[name] for name in function.parameters}
+
+
+def _parameter_unit(
+    robot: Robot, function: Function, component: str, name: str
+) -> str:  # fmt: skip
+    """The unit of one parameter of one component."""
+    given = [variable_unit(robot, variable) for variable in function.variables]
+    whole = result_unit(function, component)
+    angle = component.startswith("r") and function.where != "load"
+    if function.form == FORMULA:
+        aliases = variable_names(function.variables)
+        known = {alias: given[k] for alias, k in aliases.items()}
+        units = parameter_units(parse_formula(function.formula), known, whole)
+        return unit_text(units.get(name, {}))
+    form = FORMS[function.form]
+    if name in shape_names(form, len(given)):
+        if name == "time_constant":
+            return "s"
+        return whole_unit(given[int(name[-1]) - 1 if name[-1].isdigit() else 0])
+    powers = [0] * len(given)
+    if form.name in {"powers", "reversal"}:
+        powers = column_indices(name)
+        given = given[-1:] if form.name == "reversal" else given
+    elif form.remembers:
+        powers = [int(name == "gain" and function.variables[0] not in CLOCKS)]
+    unit = dict(whole)
+    for each, power in zip(given, powers, strict=True):
+        for key, k in each.items():
+            unit[key] = unit.get(key, 0) - power * k
+    text = unit_text(unit)
+    return f"rad{text.removeprefix('1')}" if angle and text.startswith("1") else text
+
+
+def whole_unit(unit: Unit) -> str:
+    """A variable's unit as it is written; ``rad`` where it has none."""
+    return unit_text(unit) if unit else "rad"

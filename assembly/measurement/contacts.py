@@ -1,0 +1,104 @@
+"""Contacts: springs in series with joints, load = coefficient |deflection|^exponent."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exact.exact import ExactAssembly
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import Assembly
+from assembly.measurement.conditions import Conditions, ContactLaw
+from assembly.model.links import in_series, own_screw
+
+_ITERATIONS = 100  # at most
+_CONVERGED = 1e-11  # relative change of a contact's deflection
+
+
+def softened(
+    posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
+) -> Posture:
+    """The posture with linear springs of the laws' secant compliance in series."""
+    if not compliances.any():
+        return posture
+    frames = list(posture.robot.frames)
+    for law, compliance in zip(laws, compliances, strict=True):
+        i = posture.robot.index(law.frame)
+        f = frames[i]
+        K = in_series(f.joint_stiffness, f.own_axis, float(compliance))
+        frames[i] = replace(f, joint_stiffness=K)
+    return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+
+
+def secants(
+    assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
+) -> NDArray:
+    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
+    robot = assembly.posture.robot
+    compliances = []
+    for law in laws:
+        i = robot.index(law.frame)
+        load = abs(wrenches_through(assembly)[i] @ own_screw(robot.frames[i]))
+        compliances.append(_deflection(law, load) / load if load > 1e-300 else 0.0)
+    return np.array(compliances)
+
+
+def _deflection(law: ContactLaw, load: float) -> float:
+    """[rad or m] under a load >= 0."""
+    return float((load / law.coefficient) ** (1 / law.exponent))
+
+
+def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
+    """(n, 6) [N m, N] through every joint, in the frames' axes."""
+    return (
+        assembly.joint_wrenches if isinstance(assembly, Assembly) else assembly.wrenches
+    )
+
+
+def contact_columns(conditions: Conditions) -> NDArray:
+    """(6n, s) unit screws of the joints with a contact law."""
+    columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
+    for k, law in enumerate(conditions.laws):
+        i = conditions.robot.index(law.frame)
+        columns[6 * i : 6 * i + 6, k] = own_screw(conditions.robot.frames[i])
+    return columns
+
+
+def contact_deflections(
+    laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
+
+    They minimise a strictly convex function (A is negative semidefinite): Newton's
+    method, each step halved until the gradient decreases.
+
+    Returns:
+        (R, s) deflections, and (R,) whether they converged.
+    """
+    c = np.array([law.coefficient for law in laws])
+    n = np.array([law.exponent for law in laws])
+    scale = np.abs(w).max(axis=1, keepdims=True) + 1e-300
+
+    def gradient(d: NDArray) -> NDArray:
+        own = c * np.abs(d) ** n * np.sign(d)
+        return (own - w - np.einsum("rij,rj->ri", A, d)) / scale
+
+    d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
+    residual = gradient(d)
+    tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
+    for _ in range(_ITERATIONS):
+        norm = np.linalg.norm(residual, axis=1)
+        if np.all(norm <= _CONVERGED):
+            break
+        slope = c * n * np.abs(d) ** (n - 1) + tiny
+        H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
+        step = -np.linalg.solve(H, (residual * scale)[..., None])[..., 0]
+        length = np.where(norm <= _CONVERGED, 0.0, 1.0)
+        for _ in range(30):
+            trial = gradient(d + length[:, None] * step)
+            worse = (np.linalg.norm(trial, axis=1) > norm) & (length > 0)
+            if not worse.any():
+                break
+            length = np.where(worse, length / 2, length)
+        d, residual = d + length[:, None] * step, trial
+    return d, np.linalg.norm(residual, axis=1) <= 1e-8

@@ -1,0 +1,117 @@
+"""What happened to a machine before a row was measured: rows in the order measured.
+
+Some effects remember: what warms slowly lags behind the temperature, clearance is taken
+up on the side from which a joint came.  They depend on the rows before, those that a fit
+sets aside among them.  The value of a row is taken to have been there since the row
+before, or since time 0.
+
+Sources:
+    Ljung, System Identification, section 2 (sampling of a first-order lag).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+STILL = 1e-9  # [rad, m] a command that changes by less has not moved
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """H rows, session after session, each in the order measured.
+
+    Attributes:
+        values: (H,) each, by the public name of a variable; NaN where not known.
+        first: (H,) bool, where a session begins.
+    """
+
+    values: Mapping[str, NDArray]
+    first: NDArray
+
+    def direction(self, name: str) -> NDArray:
+        """From which side a variable came: -1, 1, or 0 where nothing tells.
+
+        Args:
+            name: of the variable; ``"approach"`` is that column itself.
+
+        Returns:
+            (H,) signs.  A variable that stands still keeps its last direction; before
+            its first motion the column ``approach`` tells, if there is one.
+        """
+        given = np.nan_to_num(self.values["approach"])
+        if name == "approach":
+            return given
+        step = np.diff(self.values[name], prepend=np.nan)
+        moved = ~self.first & (np.abs(step) > STILL)
+        rows = np.arange(len(step))
+        last = np.maximum.accumulate(np.where(moved, rows, -1))
+        begin = np.maximum.accumulate(np.where(self.first, rows, -1))
+        known = last >= begin
+        return np.where(known, np.sign(step[last]), given)
+
+    def lagged(self, name: str, time_constant: float, *, held: bool = False) -> NDArray:
+        """A variable behind a first-order lag that starts from zero at time 0.
+
+        Args:
+            name: of the variable.
+            time_constant: [s] > 0.
+            held: whether a value begins at once when the row before is measured, as a
+                load's; otherwise it changes evenly between rows, as a temperature.
+
+        Returns:
+            (H,) in the unit of the variable.
+        """
+        u, state = self.values[name], 0.0
+        past = self._elapsed / time_constant
+        decay = np.exp(-past)
+        # share of the change that comes late: (1 - e^-r) / r, 1 where no time passed
+        share = np.where(
+            past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
+        )
+        even = ~self.first & (not held)
+        answer = np.empty(len(u))
+        for i, value in enumerate(u.tolist()):
+            if self.first[i]:
+                state = 0.0
+            before = float(u[i - 1]) if even[i] else value
+            # exact for u linear from ``before`` to ``value``
+            late = (value - before) * share[i]
+            state = value - late + (state - before) * decay[i]
+            answer[i] = state
+        return answer
+
+    def fading(self, time_constant: float) -> NDArray:
+        """(H,) exp(-time / time constant): what is left of a state at time 0."""
+        return np.exp(-self.values["time"] / time_constant)
+
+    @cached_property
+    def _elapsed(self) -> NDArray:
+        """(H,) [s] since the row before, or since time 0."""
+        time = self.values["time"]
+        return np.where(self.first, time, np.diff(time, prepend=0.0))
+
+
+def in_order(
+    values: Mapping[str, NDArray], session: NDArray | None
+) -> tuple[History, NDArray]:
+    """Rows of a table in the order measured.
+
+    Args:
+        values: (H,) each, by the public name of a variable, ``time`` among them; rows
+            without a time are taken in the order given.
+        session: (H,) names; None where there is but one.
+
+    Returns:
+        The history, and (H,) which of its rows each given row is.
+    """
+    time = np.nan_to_num(values["time"])
+    names = np.zeros(len(time)) if session is None else session
+    _, begins, number = np.unique(names, return_index=True, return_inverse=True)
+    order = np.lexsort((time, begins[number]))  # stable
+    first = np.diff(number[order], prepend=-1) != 0
+    row = np.empty_like(order)
+    row[order] = np.arange(len(order))
+    return History({k: v[order] for k, v in values.items()}, first), row

@@ -1,0 +1,49 @@
+"""A general effect: a small screw, or a compliance, as a function of what is known.
+
+What its numbers mean is said in :mod:`assembly.effects.forms`; how it acts, in
+:mod:`assembly.effects.functions`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+KINDS = ("screw", "compliance")
+PLACES = ("base", "reading", "load")  # beside the frames of the robot
+
+
+@dataclass(frozen=True)
+class Function:
+    """One ``[[effect]]`` named ``function`` of a robot file.
+
+    Attributes:
+        where: a frame, ``"base"``, ``"reading"`` or ``"load"``.
+        components: ``rx`` .. ``tz`` of the screw there, in its axes; ``mx`` .. ``fz``
+            where ``where`` is ``"load"``.
+        variables: one or two, such as ``q.drive``, ``load.fz``, ``cov.temperature``.
+        form: a name of :data:`assembly.effects.forms.FORMS`, or ``"formula"``.
+        parameters: numbers by name, in the units that follow from the variables and
+            the kind; with several components a name may begin with one of them.
+        kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N]: times the
+            wrench component at the same place.
+        label: for people.
+        formula: with ``form = "formula"``.
+        session: the only one in which it acts; None in all.
+        std: standard deviations of some parameters, in their units.
+    """
+
+    where: str
+    components: tuple[str, ...]
+    variables: tuple[str, ...]
+    form: str
+    parameters: Mapping[str, float]
+    kind: str = "screw"
+    label: str = ""
+    formula: str = ""
+    session: str | None = None
+    std: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """The label, or where it acts and what it depends on."""
+        acts = f"{self.where} {', '.join(self.components)}"
+        return self.label or f"{acts} of {', '.join(self.variables)}"

@@ -1,0 +1,78 @@
+"""A UR5 and a Barrett WAM under a laser tracker: a table of poses to a campaign folder.
+
+    python -m examples.serial_robots.convert FILE.csv -o FOLDER
+    forcefit validation diagnose FOLDER --save corrected.toml
+
+Data: P. Jacobi, A Hybrid Error Compensation Method for Enhancing the Pose Accuracy of
+Serial Industrial Robots, Master's thesis, Tsinghua University, 2025 (MIT licence).
+"""
+
+import argparse
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from assembly.kinematics.posture import place_many_joints
+from assembly.model.robot import Robot
+from assembly.robots import load_robot
+from examples.campaign_folder import write_campaign
+from forcefit.inputs.table import BadInput
+
+HERE = Path(__file__).parent
+SIGMA = {"ur5": 3e-5, "wam": 1e-3}  # [m] from the makers' repeatability, 0.1 and 2 mm
+_AGREES = 1e-4  # [m] by which targets may differ from the poses of the angles
+_AXES = "xyz"
+
+
+def convert(file: Path, out: Path) -> Path:
+    """Write a campaign of one file of the data.
+
+    Args:
+        file: with columns ``x_t`` .., ``x_dif`` .. [mm] and ``joint_1`` .. [degrees].
+        out: folder of the campaign.
+
+    Returns:
+        The folder.
+
+    Raises:
+        BadInput: another table, or targets that are not where the angles lead.
+    """
+    with file.open(newline="", encoding="utf-8-sig") as lines:
+        rows = list(csv.DictReader(lines))
+    joints = [name for name in (rows[0] if rows else ()) if name.startswith("joint_")]
+    if len(joints) not in {6, 7}:
+        expected = "expected joint_1 .. joint_6 (UR5) or .. joint_7 (WAM)"
+        raise BadInput(f"{file}: found {len(joints)} columns of joints, {expected}")
+    name = "ur5" if len(joints) == 6 else "wam"
+    robot = load_robot(HERE / f"{name}.toml")
+    q = np.radians([[float(row[joint]) for joint in joints] for row in rows])
+    target = np.array([[float(row[f"{k}_t"]) for k in _AXES] for row in rows]) / 1e3
+    left = np.array([[float(row[f"{k}_dif"]) for k in _AXES] for row in rows]) / 1e3
+    _check_targets(file, robot, q, target)
+    columns = {"id": np.array([f"m{row['step_order']}" for row in rows])}
+    columns |= {f"q.joint{k + 1}": angle for k, angle in enumerate(q.T)}
+    # the file says target minus reached; a campaign, reached minus target
+    columns |= {f"meas.t{k}": -left[:, i] for i, k in enumerate(_AXES)}
+    return write_campaign(out, robot, columns, (1e-4, SIGMA[name]))
+
+
+def _check_targets(
+    file: Path, robot: Robot, q: np.ndarray, target: np.ndarray
+) -> None:  # fmt: skip
+    """Refuse targets that another robot would have."""
+    coordinates = np.zeros((len(q), len(robot.frames)))
+    coordinates[:, : q.shape[1]] = q
+    postures, _ = place_many_joints(robot, coordinates)
+    nominal = np.array([p.platform[:3, 3] for p in postures if p is not None])
+    off = float(np.abs(nominal - target).max())
+    if off > _AGREES:
+        raise BadInput(f"{file}: targets are {off:.3g} m off the robot's own poses")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    given = parser.parse_args()
+    print(convert(given.file, given.out))

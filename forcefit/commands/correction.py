@@ -1,0 +1,241 @@
+"""The commands ``forcefit validation predict``, ``carry``, ``compensate``, ``explain``.
+
+Each parses, calls one function, prints or saves.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from forcefit.commands.inspect import CampaignArgument
+from forcefit.commands.options import JsonOption, RobotArgument
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from forcefit.inputs.writing import (
+    PICTURE,
+    ROBOT,
+    TABLE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
+
+if TYPE_CHECKING:
+    from assembly.model.function import Function
+
+CommandsArgument = Annotated[
+    Path,
+    typer.Argument(metavar="CAMPAIGN|CSV", help="Commands; readings may be missing."),
+]
+
+
+def predict(
+    robot: RobotArgument,
+    commands: CommandsArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Table of readings (CSV).")
+    ],
+    json: JsonOption = None,
+) -> None:
+    """Foretell the readings of a campaign, or of a table of commands.
+
+    With the geometric errors, effects and functions of the robot's file.  Where rows
+    are measured, the error of the foretelling is printed.  Exit status 1 if a row has
+    no answer; its cells are empty.
+    """
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_commands
+    from validation.correction.prediction import foretell, reading_table
+
+    check_writable(output, TABLE)
+    found = foretell(read_commands(commands, load_robot(robot)))
+    table = found.table()
+    write_text(reading_table(found), output)
+    write_json(table, json)
+    if json != "-":
+        print(f"{output}: {len(found.commands)} readings")
+        position, rotation, sigma = found.error
+        if position == position:
+            print(f"rms of measured minus foretold: {1e6 * position:.4g} um")
+        if rotation == rotation:
+            print(f"  rotation: {1e6 * rotation:.4g} urad")
+        if sigma == sigma:
+            print(f"  in sigma: {sigma:.4g}")
+        for row in table["without_answer"]:
+            print(f"{row['id']}: {row['reason']}")
+    if table["without_answer"]:
+        raise typer.Exit(1)
+
+
+def compensate(
+    robot: RobotArgument,
+    targets: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TARGETS", help="Commands to be corrected: a table or a campaign."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Corrected commands (CSV).")
+    ],
+    offsets: Annotated[
+        Path | None,
+        typer.Option(help="Also what is to be added to each drive, row by row (CSV)."),
+    ] = None,
+    diagnosed: Annotated[
+        Path | None,
+        typer.Option(help="Answer of diagnose --json: the error to be expected."),
+    ] = None,
+    as_read: Annotated[
+        bool,
+        typer.Option(
+            "--as-read", help="Correct also what only the measuring device shows."
+        ),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Find the commands that bring the robot where it would stand without errors.
+
+    ROBOT is the corrected robot.  TARGETS command the poses wanted, as if nothing were
+    wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
+    row has no answer; its command is unchanged.
+    """
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_commands
+    from validation.correction import compensation_table as tables
+    from validation.correction.compensation import compensate as correct
+
+    check_writable(output, TABLE)
+    if offsets is not None:
+        check_writable(offsets, TABLE)
+    left = None if diagnosed is None else _left(diagnosed)
+    found = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
+    table = tables.summary(found, left)
+    write_text(tables.command_table(found), output)
+    if offsets is not None:
+        write_text(tables.offset_table(found), offsets)
+    write_json(table, json)
+    if json != "-":
+        print(tables.summary_text(found, table))
+    if any(found.reason):
+        raise typer.Exit(1)
+
+
+def _left(path: Path) -> dict[str, float]:
+    """What a diagnosis left on rows kept aside, from its answer."""
+    from json import loads
+
+    from forcefit.inputs.table import read_text
+
+    try:
+        after = loads(read_text(path))["error"]["after"]
+        return {key: float(after[key] or 0.0) for key in ("position", "rotation")}
+    except (ValueError, KeyError, TypeError):
+        expected = "expected the answer of forcefit validation diagnose --json"
+        raise BadInput(f"{path}: found no error after; {expected}") from None
+
+
+def carry(
+    robot: RobotArgument,
+    campaign: CampaignArgument,
+    setup: Annotated[
+        str,
+        typer.Option(
+            help="Set-up rows: the first N of each session, or 1-20,31, or labels."
+        ),
+    ],
+    fit: Annotated[
+        str, typer.Option(help="What is the session's: registration,tool,zeros.")
+    ] = "registration",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="The robot in these sessions (TOML)."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Carry a saved robot over to a new session, by a few set-up rows.
+
+    Where the device stands (and what --fit names) is fitted to the set-up rows of each
+    session; the error is that of its other rows, beside the declared robot's.  Exit
+    status 1, and no robot written, where the set-up rows do not suffice or the saved
+    robot is worse than the declared one.
+    """
+    from assembly.files.robot_file import write_robot
+    from assembly.robots import load_robot
+    from validation.campaign.campaign_file import read_campaign, read_commands
+    from validation.correction import carrying, carrying_table
+
+    if output is not None:
+        check_writable(output, ROBOT)
+    fitted = [name.strip() for name in fit.split(",")]
+    for name in fitted:
+        if name not in carrying.OF_A_SESSION:
+            hint = nearest(name, carrying.OF_A_SESSION)
+            raise BadInput(f"--fit: found {quoted(name)}{hint}")
+    declared = read_campaign(campaign)
+    data = read_commands(campaign, load_robot(robot))
+    data = data.take(data.cells.any(axis=1))
+    found = carrying.carry(data, declared, carrying.setup_rows(data, setup), fitted)
+    good = all(one.suffices and one.better for one in found)
+    if output is not None and good:
+        write_robot(carrying.carried_robot(data.robot, found), output)
+    write_json(carrying_table.table(found), json)
+    if json != "-":
+        print(carrying_table.text(found))
+        if output is not None and not good:
+            print(f"{output}: not written")
+    if not good:
+        raise typer.Exit(1)
+
+
+def explain(
+    robot: RobotArgument,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(help="Range of a variable: q.drive=-1:1,cov.tilt=0:0.1."),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the curves, as PNG, SVG or PDF.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Show the functions of a robot's file as curves, with their bands.
+
+    A function that remembers is shown as its answer to a step of one unit.
+    """
+    from assembly.robots import load_robot
+    from validation.correction import curves
+
+    if figure is not None:
+        check_writable(figure, PICTURE)
+    machine = load_robot(robot)
+    if not machine.functions:
+        raise BadInput(f"{robot}: has no function to explain")
+    found = curves.curves_of(machine, _ranges(machine.functions, over or []))
+    if figure is not None:
+        save_figure(curves.figure_of(found), figure)
+    write_json({"functions": curves.table(machine, found)}, json)
+    if json != "-":
+        print(curves.text(found))
+
+
+def _ranges(
+    functions: tuple["Function", ...], texts: list[str]
+) -> dict[str, tuple[float, float]]:
+    """Ranges by variable from ``--over``."""
+    valid = {name for function in functions for name in (*function.variables, "time")}
+    found = {}
+    for part in ",".join(texts).split(",") if texts else ():
+        name, _, ends = (piece.strip() for piece in part.partition("="))
+        if name not in valid:
+            raise BadInput(f"--over: found {quoted(name)}{nearest(name, valid)}")
+        try:
+            least, most = (float(end) for end in ends.split(":"))
+        except ValueError:
+            least = most = 0.0
+        if not -1e15 < least < most < 1e15:
+            expected = "expected LEAST:LARGEST"
+            raise BadInput(f"--over {name}: found {quoted(ends)}, {expected}")
+        found[name] = (least, most)
+    return found

@@ -1,0 +1,65 @@
+"""Columns of forms against other programs and against what they are made of."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
+
+from assembly.effects.forms import FORMS, natural_spline, roughness, shape_names
+
+X = np.linspace(-1.2, 1.7, 31)
+Y = np.cos(3 * X)
+
+
+def columns(form, names, inputs=(X,), **shapes):
+    return FORMS[form].basis(names, list(inputs), shapes)
+
+
+def test_powers_and_waves_of_two_variables():
+    assert columns("powers", ["0", "3"]) == pytest.approx(np.array([X**0, X**3]).T)
+    found = columns("powers", ["1.2"], (X, Y))[:, 0]
+    assert found == pytest.approx(X * Y**2)
+    found = columns("waves", ["2.-1.sine", "2.-1.cosine"], (X, Y))
+    assert found == pytest.approx(np.array([np.sin(2 * X - Y), np.cos(2 * X - Y)]).T)
+    found = columns("waves", ["3.cosine"], period=0.4)[:, 0]
+    assert found == pytest.approx(np.cos(3 * 2 * np.pi * X / 0.4))
+
+
+def test_a_spline_goes_through_its_values_as_scipys_does():
+    values = np.array([1.0, -2.0, 0.5, 3.0, 2.5])
+    knots = np.linspace(-1.0, 1.5, 5)
+    names = [str(k) for k in range(1, 6)]
+    found = columns("spline", names, first=-1.0, last=1.5) @ values
+    expected = CubicSpline(knots, values, bc_type="natural")(np.clip(X, -1.0, 1.5))
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_spline_of_two_variables_is_the_product():
+    names = [f"{j}.{k}" for j in (1, 2, 3) for k in (1, 2)]
+    ends = {"first.1": -1.0, "last.1": 1.0, "first.2": -1.0, "last.2": 1.0}
+    found = FORMS["spline"].basis(names, [X, Y], ends)
+    one = natural_spline(np.linspace(-1, 1, 3), X)
+    other = natural_spline(np.linspace(-1, 1, 2), Y)
+    assert found == pytest.approx(
+        np.einsum("rj,rk->rjk", one, other).reshape(len(X), -1)
+    )
+    assert set(shape_names(FORMS["spline"], 2)) == set(ends)
+
+
+def test_roughness_is_the_integral_of_squared_curvature():
+    values = np.array([1.0, -2.0, 0.5, 3.0, 2.5, 0.0])
+    spline = CubicSpline(np.arange(6), values, bc_type="natural")
+    pieces = [quad(lambda x: spline(x, 2) ** 2, k, k + 1)[0] for k in range(5)]
+    assert values @ roughness(6) @ values == pytest.approx(sum(pieces), rel=1e-9)
+
+
+@pytest.mark.parametrize(("form", "name", "count", "known"), [
+    ("powers", "2", 1, True), ("powers", "2.1", 1, False), ("powers", "-1", 1, False),
+    ("powers", "1.2", 2, True), ("powers", "02", 1, False),
+    ("waves", "1.sine", 1, True),
+    ("waves", "sine", 1, False), ("waves", "1", 1, False), ("spline", "0", 1, False),
+    ("lag", "gain", 1, True), ("lag", "1.gain", 1, False), ("reversal", "1", 2, True),
+    ("reversal", "1.1", 2, False), ("step", "size", 1, True), ("powers", "", 1, False),
+])  # fmt: skip
+def test_names_of_columns(form, name, count, known):
+    assert FORMS[form].is_column(name, count) is known

@@ -1,0 +1,71 @@
+"""Formulas: their values against Python's own, their units by hand, nothing is run."""
+
+import math
+
+import numpy as np
+import pytest
+
+from assembly.effects.formula import (
+    evaluate,
+    names_in,
+    parameter_units,
+    parse_formula,
+    unit_text,
+)
+from forcefit.inputs.errors import BadInput
+
+M, N, S = {"m": 1}, {"N": 1}, {"s": 1}
+
+
+@pytest.mark.parametrize("text", [
+    "a*sin(3*q) + b", "-q**2/(1 + abs(q))", "exp(-q/b)*cos(pi*q) - sqrt(a)", "2",
+    "tanh(a*q)*sign(q) + log(b)", "a**q", "atan(q) - tan(q/4)", "+a",
+])  # fmt: skip
+def test_a_formula_has_the_value_that_python_gives_it(text):
+    known = {"q": 0.7, "a": 1.3, "b": 2.5}
+    names = {n: getattr(math, n) for n in ("sin", "cos", "tan", "exp", "log", "tanh",
+             "sqrt", "pi", "atan")}  # fmt: skip
+    expected = eval(text, {"__builtins__": {}, "abs": abs, **names,
+                    "sign": lambda x: math.copysign(1, x)}, known)  # fmt: skip
+    arrays = {k: np.asarray(v) for k, v in known.items()}
+    assert float(evaluate(parse_formula(text), arrays)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("text", [
+    "", "q +", "__import__('os').system('true')", "q.real", "q[0]", "lambda: 1",
+    "q if q else 1", "[q]", "'q'", "q > 1", "sin(q, q)", "sin(x=q)", "sin", "True",
+    "q := 1", "f(q)", "1e999*q", "(" * 90 + "q" + ")" * 90, "-" * 90 + "q", "q" * 600,
+    "q; q", "1j", "a and b", "q % 2", "q // 2",
+])  # fmt: skip
+def test_what_is_no_formula_is_refused(text):
+    if text == "sin":  # a name like any other, which nobody declares
+        assert names_in(parse_formula(text)) == ["sin"]
+    elif text.startswith("(("):  # brackets alone are no depth
+        assert names_in(parse_formula(text)) == ["q"]
+    else:
+        with pytest.raises(BadInput):
+            parse_formula(text)
+
+
+@pytest.mark.parametrize(("text", "variables", "result", "units"), [
+    ("a*sin(3*q) + b", {"q": {}}, {}, {"a": "1", "b": "1"}),
+    ("a*exp(-t/c)", {"t": S}, M, {"a": "m", "c": "s"}),
+    ("a*f**2 + b*f", {"f": N}, M, {"a": "m/N^2", "b": "m/N"}),
+    ("sqrt(a)*t", {"t": S}, M, {"a": "m^2/s^2"}),
+    ("a/(1 + (f/b)**2)", {"f": N}, {}, {"a": "1", "b": "N"}),
+    ("1e-4*sin(q)", {"q": {}}, M, {}),
+    ("a*b*t", {"t": S}, {}, {"a": "1/s", "b": "1"}),
+])  # fmt: skip
+def test_units_of_parameters_follow(text, variables, result, units):
+    found = parameter_units(parse_formula(text), variables, result)
+    assert {name: unit_text(unit) for name, unit in found.items()} == units
+
+
+@pytest.mark.parametrize(("text", "variables", "result"), [
+    ("sin(t)", {"t": S}, {}), ("q + t", {"q": {}, "t": S}, {}), ("t", {"t": S}, M),
+    ("a*t + a", {"t": S}, {}), ("2**t", {"t": S}, {}), ("t**q", {"t": S, "q": {}}, M),
+    ("exp(2*t)", {"t": S}, {}),
+])  # fmt: skip
+def test_units_that_clash_are_refused(text, variables, result):
+    with pytest.raises(BadInput, match="units clash"):
+        parameter_units(parse_formula(text), variables, result)

@@ -1,0 +1,247 @@
+"""Functions against closed forms on an arm, and against springs that stand there."""
+
+from dataclasses import replace
+from math import cos, exp, sin
+
+import numpy as np
+import pytest
+
+from assembly.effects import apply_effects, apply_known
+from assembly.effects.functions import apply_functions, basis
+from assembly.effects.units import units_of
+from assembly.kinematics.posture import place_many_joints, place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import assemble_row, predict
+from assembly.measurement.variables import with_history
+from assembly.model.function import Function
+from assembly.model.links import in_series
+from assembly.robots import load_robot
+from tests.assembly.effects.test_effects import L, arm, here
+
+RIGID = arm(rigid=True)
+
+
+def seen(conditions, *functions):
+    """What functions add to the reading."""
+    both = predict(apply_functions(conditions, functions))
+    assert list(both.reason) == [""] * len(conditions)
+    return both.deviation - predict(conditions).deviation
+
+
+def at_drive(parameters, form="powers", variables=("q.drive",), **more):
+    return Function("drive", ("rz",), variables, form, parameters, **more)
+
+
+def turned(angle, q):
+    """Reading of an arm whose drive stands off by a small angle."""
+    return [0, 0, angle, -angle * L * sin(q), angle * L * cos(q), 0]
+
+
+@pytest.mark.parametrize("q", [-0.8, 0.0, 0.7])
+def test_waves_of_a_joint_turn_the_arm(q):
+    waves = at_drive({"1.sine": 2e-5, "3.cosine": -1e-5}, "waves")
+    angle = 2e-5 * sin(q) - 1e-5 * cos(3 * q)
+    found = seen(here(RIGID, q=q), waves)[0]
+    assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
+
+
+def test_a_wave_once_a_turn_is_an_eccentric_encoder():
+    """a sin(q + p) = a cos p sin q + a sin p cos q: the library's effect."""
+    there = here(RIGID, q=0.6)
+    values = {"drive.amplitude": 1e-4, "drive.phase": 0.5}
+    library = predict(apply_effects(there, {"encoder_eccentricity": values})).deviation
+    waves = {"1.sine": 1e-4 * cos(0.5), "1.cosine": 1e-4 * sin(0.5)}
+    found = predict(apply_functions(there, [at_drive(waves, "waves")])).deviation
+    assert found == pytest.approx(library, rel=1e-12, abs=1e-18)
+
+
+def test_a_formula_is_what_it_says():
+    formula = at_drive(
+        {"a": 1e-5, "b": 2e-6, "n": 2.0}, "formula", formula="a*sin(3*q)**n - b/2"
+    )
+    angle = 1e-5 * sin(3 * 0.3) ** 2 - 1e-6
+    assert seen(here(RIGID, q=0.3), formula)[0][2] == pytest.approx(angle, rel=1e-9)
+
+
+def test_a_screw_of_the_base_carries_the_robot():
+    """A turned base swings the tip about the base's origin; a shifted one shifts it."""
+    turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
+    shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
+    shift = replace(shift, variables=("cov.temperature",))
+    there = here(arm(), q=0.0, temperature=5.0, covariates={"tilt": 1e-5})
+    expected = [0, 1e-5, 0, 5e-6, 0, -1e-5 * L]
+    assert seen(there, turn, shift)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_functions_of_the_load_and_the_reading():
+    load = Function("load", ("fy",), ("load.fy",), "powers", {"1": 0.1})
+    read = Function("reading", ("tz",), ("position.x",), "powers", {"2": 1e-5})
+    there = here(arm(), (0, 0, 0, 0, 20, 0), q=0.4)
+    gain = {"load_gain": {"factor": 1.1}}
+    expected = (
+        predict(apply_effects(there, gain)).deviation - predict(there).deviation
+    )[0]
+    expected[5] += 1e-5 * (L * cos(0.4)) ** 2
+    assert seen(there, load, read)[0] == pytest.approx(expected, rel=1e-9, abs=1e-18)
+
+
+def test_a_compliance_is_a_spring_at_its_place():
+    """M / k of an elastic drive, softer where the angle is larger."""
+    soft = at_drive({"0": 1e-5, "2": 3e-5}, kind="compliance")
+    F, q = 30.0, 0.7
+    there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
+    turn = (1e-5 + 3e-5 * q**2) * F * L * cos(q)
+    assert seen(there, soft)[0] == pytest.approx(turned(turn, q), rel=1e-3, abs=1e-8)
+    K = in_series(None, 2, 1e-5 + 3e-5 * q**2)
+    frames = (replace(RIGID.frames[0], joint_stiffness=K), RIGID.frames[1])
+    sprung = here(replace(RIGID, frames=frames), (0, 0, 0, 0, F, 0), q=q)
+    found = predict(apply_functions(there, [soft])).deviation
+    assert found == pytest.approx(predict(sprung).deviation, rel=1e-12, abs=1e-18)
+    one = assemble_row(apply_functions(there, [soft]), 0)
+    assert one.energy == pytest.approx(assemble_row(sprung, 0).energy, rel=1e-9)
+
+
+def test_a_wrench_bends_its_joint_by_its_square():
+    square = at_drive({"2": 1e-7}, variables=("wrench.drive.mz",))
+    F, q = 30.0, 0.5
+    there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
+    turn = 1e-7 * (F * L * cos(q)) ** 2
+    assert seen(there, square)[0] == pytest.approx(turned(turn, q), rel=1e-4, abs=1e-9)
+
+
+def three_rrr(load):
+    robot = load_robot("3rrr")
+    return as_declared(place_robot(robot), np.array(load, dtype=float))
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_a_compliance_in_a_closed_chain_is_a_spring_there(exact):
+    """Newton's method on the laws against springs that the solver knows."""
+    there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
+    robot = there.robot
+    names = [f.name for f in robot.frames if f.actuated]
+    soft = [
+        Function(n, ("rz",), ("time",), "powers", {"0": c}, kind="compliance")
+        for n, c in zip(names, (2e-5, 5e-5, 1e-5), strict=True)
+    ]
+    there = replace(there, time=np.zeros(1))
+    found = predict(apply_functions(there, soft)).deviation
+    stiff = {n: 1 / c for n, c in zip(names, (2e-5, 5e-5, 1e-5), strict=True)}
+    spring = predict(apply_effects(there, {"drive_compliance": stiff})).deviation
+    assert found == pytest.approx(spring, rel=1e-8, abs=1e-12)
+    assert np.abs(spring - predict(there).deviation).max() > 1e-5
+
+
+def test_a_closed_chain_is_at_rest_under_a_law_that_bends():
+    """e = g(w) at the wrench that the answer itself has: checked on the answer."""
+    there = three_rrr([0, 0, 5, 40, -30, 0])
+    name = next(f.name for f in there.robot.frames if f.actuated)
+    law = Function(
+        name, ("rz",), (f"wrench.{name}.mz",), "powers", {"1": 2e-5, "3": 4e-7}
+    )
+    one = assemble_row(apply_functions(there, [law]), 0)
+    row = one.posture.robot.index(name)
+    w = one.joint_wrenches[row][2]
+    bent = one.posture.robot.errors[row][2] - there.robot.errors[row][2]
+    assert bent == pytest.approx(2e-5 * w + 4e-7 * w**3, rel=1e-8)
+    assert 4e-7 * abs(w) ** 3 > 1e-7
+    many = predict(apply_functions(there, [law])).deviation[0]
+    assert one.platform_screw == pytest.approx(many, rel=1e-6, abs=1e-12)
+
+
+def campaign_of(times, **columns):
+    """Rows of an arm measured one after the other."""
+    q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
+    coordinates = np.column_stack([q, np.zeros(len(q))])
+    postures, _ = place_many_joints(RIGID, coordinates)
+    rows = replace(
+        postures[0],
+        coordinates=np.array([p.coordinates for p in postures]),
+        transforms=np.array([p.transforms for p in postures]),
+    )
+    return with_history(as_declared(rows, time=times, **columns))
+
+
+def test_a_lag_settles_exponentially():
+    """A step of 10 K at time 0: gain 10 (1 - exp(-t / tau))."""
+    t = np.array([0.0, 50.0, 200.0, 700.0])
+    rows = campaign_of(t, temperature=10.0)
+    lag = at_drive({"gain": 1e-6, "time_constant": 300.0}, "lag", ("cov.temperature",))
+    assert seen(rows, lag)[:, 2] == pytest.approx(
+        1e-5 * (1 - np.exp(-t / 300)), rel=1e-9
+    )
+
+
+def test_a_lag_behind_a_ramp_runs_one_time_constant_late():
+    """z = s (t - tau (1 - exp(-t / tau))), exact however far apart the rows are."""
+    t = np.array([0.0, 10.0, 400.0, 1000.0])
+    rows = campaign_of(t, temperature=0.02 * t)
+    lag = at_drive({"gain": 1.0, "time_constant": 300.0}, "lag", ("cov.temperature",))
+    expected = 0.02 * (t - 300 * (1 - np.exp(-t / 300)))
+    assert basis(rows, lag, ["gain"])[:, 0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_rows_set_aside_are_remembered():
+    t = np.linspace(0, 900, 10)
+    rows = campaign_of(t, temperature=5 * np.sin(t / 200), q=np.sin(t / 100))
+    lag = at_drive({"time_constant": 100.0}, "lag", ("cov.temperature",))
+    back = at_drive({}, "reversal", ("q.drive",))
+    for function, name in ((lag, "gain"), (back, "0")):
+        whole = basis(rows, function, [name])
+        some = basis(rows.take([7, 2, 4]), function, [name])
+        assert some == pytest.approx(whole[[7, 2, 4]], rel=1e-12)
+
+
+def test_a_reversal_follows_the_row_before():
+    q = [0.0, 0.5, 0.5, 0.2, 0.9]
+    rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
+    back = at_drive({"0": 1e-5, "1": 1e-5}, "reversal", ("q.drive", "q.drive"))
+    side = np.array([-1, 1, 1, -1, 1])  # the first as the column says
+    expected = side * (1e-5 + 1e-5 * np.array(q))
+    assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
+
+
+def test_rows_are_taken_in_the_order_of_time_session_by_session():
+    q, t = [0.3, 0.0, 0.9, 0.1], [5.0, 0.0, 9.0, 0.0]
+    rows = campaign_of(np.array(t), q=q, session=np.array(["a", "a", "a", "b"]))
+    back = at_drive({}, "reversal", ("q.drive",))
+    assert basis(rows, back, ["0"])[:, 0].tolist() == [1.0, 0.0, 1.0, 0.0]
+
+
+def test_a_session_has_its_own_effects():
+    rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
+    own = at_drive({"0": 1e-5}, session="a")
+    assert seen(rows, own)[:, 2] == pytest.approx([1e-5, 0, 1e-5], abs=1e-15)
+    zeros = {"encoder_offset": {"drive": 2e-5}, "registration": {"base.tz": 1e-4}}
+    robot = replace(RIGID, session_effects={"b": zeros})
+    found = predict(apply_known(rows, robot)).deviation - predict(rows).deviation
+    assert found[:, 2] == pytest.approx([0, 2e-5, 0], abs=1e-15)
+    assert found[:, 5] == pytest.approx([0, 1e-4, 0], abs=1e-15)
+
+
+def test_what_settles_by_itself_and_what_jumps():
+    t = np.array([0.0, 100.0, 300.0])
+    rows = campaign_of(t)
+    creep = at_drive({"gain": 1e-5, "time_constant": 150.0}, "creep", ("time",))
+    jump = at_drive({"size": 2e-5, "at": 100.0}, "step", ("time",))
+    slow = at_drive({"sine": 3e-5, "period": 400.0}, "slow_wave", ("time",))
+    assert seen(rows, creep)[:, 2] == pytest.approx(
+        [0, 1e-5 * (1 - exp(-100 / 150)), 1e-5 * (1 - exp(-2))], rel=1e-9
+    )
+    assert seen(rows, jump)[:, 2] == pytest.approx([0, 2e-5, 2e-5], abs=1e-15)
+    assert seen(rows, slow)[:, 2] == pytest.approx([0, 3e-5, -3e-5], abs=1e-15)
+
+
+def test_units_follow_from_variables():
+    waves = at_drive({"1.sine": 1.0}, "waves")
+    assert units_of(RIGID, waves) == {"1.sine": "rad"}
+    bend = at_drive({"2": 1.0}, variables=("wrench.drive.mz",))
+    assert units_of(RIGID, bend) == {"2": "rad/(N^2 m^2)"}
+    soft = at_drive({"0": 1.0, "1": 1.0}, kind="compliance")
+    assert units_of(RIGID, soft) == {"0": "rad/(N m)", "1": "rad/(N m)"}
+    warm = Function("tip", ("tx",), ("cov.temperature",), "powers", {"2": 1.0})
+    assert units_of(RIGID, warm) == {"2": "m/K^2"}
+    formula = at_drive(
+        {"a": 1.0, "k": 1.0}, "formula", ("time",), formula="a*exp(-k*time)"
+    )
+    assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}  # rad is a number

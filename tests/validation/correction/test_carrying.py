@@ -1,0 +1,140 @@
+"""A saved robot in a new session: found again, or said not to be known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.robots import load_robot
+from stiffness.screws import rotation_matrix, rotation_vector
+from tests.campaigns_for_tests import write_campaign
+from validation.campaign.campaign_file import read_commands
+from validation.correction.prediction import foretell
+
+SIGMA = 2e-5
+DEVICE = np.array([0.3, -0.2, 0.5, 1.2, -0.4, 0.7])
+
+
+@pytest.fixture(name="machine")
+def a_machine(tmp_path):
+    """An arm with errors that its saved file knows and its declared one does not."""
+    declared = load_robot("arm6")
+    rng = np.random.default_rng(5)
+    errors = rng.normal(size=(len(declared.frames), 6)) * 3e-4
+    write_robot(declared, tmp_path / "declared.toml")
+    write_robot(declared.with_errors(errors), tmp_path / "saved.toml")
+    return tmp_path
+
+
+def measured(folder, rows, reach, sessions=None, zero=0.0):
+    """The machine measured by a device that stands somewhere else, noise added.
+
+    The device's place is put in by rigid motion of the points, not by the effect.
+    """
+    rng = np.random.default_rng(rows)
+    saved = load_robot(folder / "saved.toml")
+    names = [f.name for f in saved.frames if f.actuated]
+    q = np.array([f.position for f in saved.frames if f.actuated])
+    q = q + reach * rng.uniform(-1, 1, (rows, len(q)))
+    head = ",".join(["id", *(f"q.{n}" for n in names)])
+    lines = [",".join([f"m{i + 1}", *map(repr, r.tolist())]) for i, r in enumerate(q)]
+    (folder / "plain.csv").write_text("\n".join([head, *lines]) + "\n")
+    offset = {"encoder_offset": {names[0]: zero}}
+    commands = read_commands(folder / "plain.csv", replace(saved, effects=offset))
+    found = foretell(commands).prediction.deviation
+    nominal = commands.transforms[:, saved.index(saved.platform), :3, 3]
+    R = rotation_matrix(DEVICE[:3])
+    read = (nominal + found[:, 3:]) @ R.T + DEVICE[3:] - nominal
+    read += SIGMA * rng.normal(size=read.shape)
+    cells = [[*map(repr, r.tolist())] for r in read]
+    days = sessions or [""] * rows
+    head += (",session" if sessions else "") + ",meas.tx,meas.ty,meas.tz"
+    body = [
+        ",".join([line, *([day] if sessions else []), *row])
+        for line, day, row in zip(lines, days, cells, strict=True)
+    ]
+    return write_campaign(
+        folder / "day", head, body, robot=(folder / "declared.toml").read_text(),
+        toml={"registration": '"unknown"'}, noise=f"[noise]\nposition = {SIGMA}\n",
+    )  # fmt: skip
+
+
+def carried(run, machine, folder, *words):
+    saved, out = str(machine / "saved.toml"), machine / "carried.toml"
+    file = machine / "answer.json"
+    code, text, error = run("validation", "carry", saved, str(folder), "-o", str(out),
+                            "--json", str(file), *words)  # fmt: skip
+    assert error == ""
+    return code, text, json.loads(file.read_text())["sessions"], out
+
+
+def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
+    folder = measured(machine, 60, 0.8)
+    code, _, (day,), out = carried(run, machine, folder, "--setup", "12")
+    assert code == 0
+    assert day["suffices"]
+    assert (day["setup_rows"], day["other_rows"]) == (12, 48)
+    # noise, and the frame's own uncertainty from 36 readings
+    assert 0.9 < day["error"]["normalised"] < 1.3
+    assert day["declared"]["normalised"] > 5
+    found = {p["name"]: (p["value"], p["std"]) for p in day["parameters"]}
+    turn = rotation_vector(rotation_matrix(DEVICE[:3]))
+    for k, axis in enumerate("xyz"):
+        value, std = found[f"base.r{axis}"]
+        assert abs(value - turn[k]) < 5 * std
+    # what was written foretells the day by itself
+    again = foretell(read_commands(folder, load_robot(out)))
+    assert again.error[0] < 1.3 * SIGMA
+
+
+def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
+    """Forty rows within a milliradian tell a place, and no turn of the device."""
+    folder = measured(machine, 40, 1e-3)
+    wide = measured(machine, 60, 0.8)
+    text = (wide / "measurements.csv").read_text().splitlines()
+    folder = measured(machine, 40, 1e-3)
+    near = (folder / "measurements.csv").read_text().splitlines()
+    more = [line.replace("m", "w", 1) for line in text[1:]]
+    (folder / "measurements.csv").write_text("\n".join([*near, *more]) + "\n")
+    code, said, (day,), out = carried(run, machine, folder, "--setup", "40")
+    assert code == 1
+    assert not out.exists()
+    assert not day["suffices"]
+    assert "do not suffice" in said
+    assert day["uncertainty"] > 10 * day["left_in_setup"]
+
+
+def test_zeros_set_anew_are_found_when_asked_for(machine, run):
+    folder = measured(machine, 80, 0.8, zero=5e-4)
+    _, _, (without,), _ = carried(run, machine, folder, "--setup", "30")
+    _, _, (day,), _ = carried(run, machine, folder, "--setup", "30", "--fit",
+                              "registration,zeros")  # fmt: skip
+    assert day["error"]["normalised"] < 1.4
+    # the first joint's zero is a turn of the base: the registration's, too
+    assert without["error"]["normalised"] < 1.4
+
+
+def test_sessions_are_carried_one_by_one(machine, run):
+    folder = measured(machine, 60, 0.8, ["a", "b"] * 30)
+    code, _, days, out = carried(run, machine, folder, "--setup", "10")
+    assert code == 0
+    assert [(d["session"], d["setup_rows"]) for d in days] == [("a", 10), ("b", 10)]
+    assert set(load_robot(out).session_effects) == {"a", "b"}
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (["--setup", "x1"], 'found "x1", which is no row'),
+    (["--setup", "1-99"], 'found "1-99", expected rows 1 to 6'),
+    (["--setup", "0"], "found no set-up rows"),
+    (["--setup", "6"], "nothing but set-up"),
+    (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
+])  # fmt: skip
+def test_set_up_rows_that_are_none_are_refused(words, message, machine, run):
+    folder = measured(machine, 6, 0.8)
+    code, _, error = run("validation", "carry", str(machine / "saved.toml"),
+                         str(folder), *words)  # fmt: skip
+    assert code == 2
+    assert message in error
+    assert "\n" not in error.strip()

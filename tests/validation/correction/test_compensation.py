@@ -1,0 +1,153 @@
+"""Commands corrected: the machine stands where it should, by hand and simulated."""
+
+import csv
+import json
+from dataclasses import replace
+from math import acos, atan2, cos, sin
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.robots import load_robot
+from tests.campaigns_for_tests import ARM
+from validation.campaign.campaign_file import read_commands
+from validation.correction.compensation import compensate
+from validation.synthetic.again import distances
+from validation.synthetic.machine import Hidden
+
+LONGER = ARM.replace("translation = [0.8, 0, 0]", """translation = [0.8, 0, 0]
+geometric_error = [0, 0, 0, 0.01, 0, 0]""")  # fmt: skip
+ZERO = """
+[[effect]]
+name = "encoder_offset"
+parameters = { one = 2e-3 }
+"""
+
+
+def written(tmp_path, robot, rows, head="id,q.one,q.two"):
+    path, table = tmp_path / "robot.toml", tmp_path / "targets.csv"
+    path.write_text(robot)
+    table.write_text("\n".join([head, *rows]) + "\n")
+    return str(path), str(table)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def two_links(x, y, length):
+    """Angles of a planar arm of 1 m and a second link: the law of cosines."""
+    second = acos((x**2 + y**2 - 1 - length**2) / (2 * length))
+    first = atan2(y, x) - atan2(length * sin(second), 1 + length * cos(second))
+    return first, second
+
+
+def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
+    robot, table = written(tmp_path, LONGER + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
+    out, offsets = tmp_path / "out.csv", tmp_path / "offsets.csv"
+    left = tmp_path / "diagnosis.json"
+    after = {"position": 4e-5, "rotation": None}
+    left.write_text(json.dumps({"error": {"after": after}}))
+    options = ["--offsets", str(offsets), "--json", str(tmp_path / "j.json"),
+               "--diagnosed", str(left)]  # fmt: skip
+    words = ["compensate", robot, table, "-o", str(out), *options]
+    code, text, error = run("validation", *words)
+    assert (code, error) == (0, "")
+    assert "to be expected" in text
+    for row, (q1, q2) in zip(rows_of(out), [(0.3, 0.9), (-0.2, 1.2)], strict=True):
+        x = cos(q1) + 0.8 * cos(q1 + q2)
+        y = sin(q1) + 0.8 * sin(q1 + q2)
+        first, second = two_links(x, y, 0.81)
+        assert float(row["q.one"]) == pytest.approx(first - 2e-3, abs=1e-8)
+        assert float(row["q.two"]) == pytest.approx(second, abs=1e-8)
+    assert float(rows_of(offsets)[0]["after.position"]) < 1e-9
+    # what was written can be commanded again
+    again = read_commands(out, load_robot(robot))
+    assert again.ids == ("a", "b")
+    found = json.loads((tmp_path / "j.json").read_text())["error"]
+    assert found["expected"]["position"] == pytest.approx(3**0.5 * 4e-5)
+    assert found["before"]["position"] > 8e-3 > 1e-8 > found["after"]["position"]
+
+
+def test_a_joint_stays_within_its_limits(tmp_path, run):
+    """The second joint may not stretch: the tip comes as near as the first allows."""
+    text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
+    robot, table = written(tmp_path, text, ["a,0.3,0.9"])
+    found = compensate(read_commands(table, load_robot(robot)))
+    assert found.commands[0, 1] == 0.9
+    assert found.limited[0]
+    # least distance to the point wanted over the first angle alone
+    x, y = cos(0.3) + 0.8 * cos(1.2), sin(0.3) + 0.8 * sin(1.2)
+    reach = np.hypot(1 + 0.81 * cos(0.9), 0.81 * sin(0.9))
+    assert np.linalg.norm(found.after[0, 3:]) == pytest.approx(
+        abs(reach - np.hypot(x, y)), rel=1e-3
+    )
+
+
+def test_what_only_the_device_shows_is_left_unless_asked_for(tmp_path):
+    shift = '[[effect]]\nname = "registration"\nparameters = { "base.tx" = 1e-3 }\n'
+    robot, table = written(tmp_path, ARM + shift, ["a,0.3,0.9"])
+    targets = read_commands(table, load_robot(robot))
+    assert np.abs(compensate(targets).offsets).max() < 1e-12
+    found = compensate(targets, as_read=True)
+    assert found.before[0, 3] == pytest.approx(-1e-3)
+    assert np.abs(found.after[0, 3:]).max() < 1e-9
+
+
+def test_the_spread_is_that_of_tolerances_and_parameters(tmp_path):
+    """A zero known to 1e-4 rad swings the tip by its distance from the drive."""
+    text = ARM.replace(
+        'name = "one"', 'name = "one"\ntolerance = [0, 0, 1e-4, 0, 0, 0]'
+    )
+    wave = """[[effect]]
+name = "function"
+where = "one"
+components = ["rz"]
+variables = ["q.one"]
+form = "waves"
+parameters = { "1.sine" = 1e-4 }
+std = { "1.sine" = 2e-4 }
+"""
+    robot, table = written(tmp_path, text + wave, ["a,0.3,0.9"])
+    found = compensate(read_commands(table, load_robot(robot)))
+    reach = np.hypot(1 + 0.8 * cos(0.9), 0.8 * sin(0.9))
+    expected = reach * np.hypot(1e-4, 2e-4 * sin(0.3))
+    assert np.linalg.norm(found.spread[0, 3:]) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
+def test_a_simulated_machine_is_brought_where_it_should_be(name, tmp_path):
+    """Measured in another program, not by the model that corrected it.
+
+    What is left is what finite motions add to the linear model: the square of the
+    errors over the size of the robot, some nanometres here.
+    """
+    robot = load_robot(name)
+    frames = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=frames)
+    drives = [f for f in robot.frames if f.actuated]
+    size = {"revolute": 2e-4, "prismatic": 1e-4}
+    hidden = {f.name: size[f.joint] * (-1) ** i for i, f in enumerate(drives)}
+    rng = np.random.default_rng(3)
+    reach = {"revolute": 0.1, "prismatic": 0.01}
+    head = ",".join(["id", *(f"q.{f.name}" for f in drives)])
+    lines = [
+        ",".join([f"m{i}", *(repr(f.position + reach[f.joint] * rng.uniform(-1, 1))
+                             for f in drives)])
+        for i in range(4)
+    ]  # fmt: skip
+    (tmp_path / "targets.csv").write_text("\n".join([head, *lines]) + "\n")
+    corrected = replace(robot, effects={"encoder_offset": hidden})
+    write_robot(corrected, tmp_path / "corrected.toml")
+    targets = read_commands(
+        tmp_path / "targets.csv", load_robot(tmp_path / "corrected.toml")
+    )
+    found = compensate(targets)
+    effects = [Hidden("encoder_offset", hidden)]
+    wanted = targets.coordinates
+    before = distances(robot, effects, targets, wanted, program="springs")
+    after = distances(robot, effects, targets, found.coordinates, program="springs")
+    assert before.max() > 1e-4
+    assert after.max() < 1e-6

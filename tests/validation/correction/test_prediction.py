@@ -1,0 +1,120 @@
+"""Readings foretold: those of the model, under the campaign's names."""
+
+import csv
+from math import cos, sin
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.robots import load_robot
+from tests.campaigns_for_tests import ARM, write_campaign
+from validation.campaign.campaign_file import read_commands
+from validation.correction.prediction import foretell
+
+WAVE = """
+[[effect]]
+name = "function"
+where = "one"
+components = ["rz"]
+variables = ["q.one"]
+form = "waves"
+parameters = { "1.sine" = 1e-3 }
+"""
+
+
+def robot_file(tmp_path, text=ARM + WAVE):
+    path = tmp_path / "corrected.toml"
+    path.write_text(text)
+    return str(path)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_table_of_commands_is_foretold(tmp_path, run):
+    """A turn of the first joint by a sin q swings the tool about the base."""
+    table = tmp_path / "new.csv"
+    table.write_text("id,q.one,q.two\na,0.3,0.0\nb,-0.4,0.5\n")
+    out = tmp_path / "readings.csv"
+    code, _, error = run("validation", "predict", robot_file(tmp_path), str(table),
+                         "-o", str(out))  # fmt: skip
+    assert (code, error) == (0, "")
+    rows = rows_of(out)
+    assert [row["id"] for row in rows] == ["a", "b"]
+    assert list(rows[0]) == [
+        "id",
+        *(f"meas.{c}" for c in ("rx", "ry", "rz", "tx", "ty", "tz")),
+    ]
+    for row, q1, q2 in zip(rows, (0.3, -0.4), (0.0, 0.5), strict=True):
+        turn = 1e-3 * sin(q1)
+        x, y = cos(q1) + 0.8 * cos(q1 + q2), sin(q1) + 0.8 * sin(q1 + q2)
+        found = [float(row[f"meas.{name}"]) for name in ("rz", "tx", "ty")]
+        # to first order, and the turn of the platform exactly
+        assert found == pytest.approx([turn, -turn * y, turn * x], abs=2e-7)
+
+
+def test_a_campaign_is_foretold_under_its_names(tmp_path, run):
+    head = "id,q.one,q.two,meas.A.tx,meas.B.ty"
+    folder = write_campaign(
+        tmp_path / "c", head, ["m1,0.1,0.2,1e-4,2e-4", "m2,0.4,0.2,0,"],
+        extra="[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n",
+    )  # fmt: skip
+    out = tmp_path / "readings.csv"
+    code, text, _ = run("validation", "predict", robot_file(tmp_path), str(folder),
+                        "-o", str(out))  # fmt: skip
+    assert code == 0
+    assert "rms of measured minus foretold" in text
+    rows = rows_of(out)
+    assert list(rows[0]) == ["id", "meas.A.tx", "meas.B.ty"]
+    # the point A stands 0.1 m further along the tool
+    turn, angle = 1e-3 * sin(0.1), 0.3
+    y = sin(0.1) + 0.8 * sin(angle) + 0.1 * sin(angle)
+    assert float(rows[0]["meas.A.tx"]) == pytest.approx(-turn * y, abs=2e-8)
+    x = cos(0.1) + 0.8 * cos(angle) - 0.2 * sin(angle)
+    assert float(rows[0]["meas.B.ty"]) == pytest.approx(turn * x, abs=2e-8)
+    assert rows[1]["meas.B.ty"] == ""
+
+
+def test_what_a_function_needs_must_be_a_column(tmp_path, run):
+    humid = ARM + WAVE.replace('"q.one"', '"cov.humidity"').replace(
+        "1.sine", "1"
+    ).replace("waves", "powers")
+    table = tmp_path / "new.csv"
+    table.write_text("id,q.one,q.two\na,0.3,0.0\n")
+    out = tmp_path / "readings.csv"
+    code, _, error = run("validation", "predict", robot_file(tmp_path, humid),
+                         str(table), "-o", str(out))  # fmt: skip
+    assert code == 2
+    assert "expected a column cov.humidity" in error
+    assert not out.exists()
+
+
+def test_sessions_are_registered_one_by_one(tmp_path):
+    """Two days with the tracker elsewhere: each is found, nothing is left."""
+    robot = load_robot("arm6")
+    write_robot(robot, tmp_path / "robot.toml")
+    rng = np.random.default_rng(1)
+    q = rng.uniform(-1, 1, (16, 6))
+    names = [f.name for f in robot.frames if f.actuated]
+    head = ",".join(["id", *(f"q.{n}" for n in names)])
+    lines = [",".join([f"m{i}", *map(repr, row.tolist())]) for i, row in enumerate(q)]
+    plain = tmp_path / "plain.csv"
+    plain.write_text("\n".join([head, *lines]) + "\n")
+    commands = read_commands(plain, robot)
+    nominal = commands.transforms[:, robot.index(robot.platform), :3, 3]
+    shift = np.array([[0.3, -0.2, 0.1], [-1.0, 0.5, 0.0]])[np.arange(16) % 2]
+    measured = [
+        ",".join([line, "ab"[i % 2], *map(repr, row.tolist())])
+        for i, (line, row) in enumerate(zip(lines, shift, strict=True))
+    ]
+    folder = write_campaign(
+        tmp_path / "days", f"{head},session,meas.tx,meas.ty,meas.tz", measured,
+        robot=(tmp_path / "robot.toml").read_text(),
+        toml={"registration": '"unknown"'},
+    )  # fmt: skip
+    found = foretell(read_commands(folder, robot))
+    assert len(nominal) == 16
+    assert found.error[0] < 1e-9

@@ -1,0 +1,99 @@
+"""Small unknowns with a Gaussian prior, against the normal distribution itself."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from validation.diagnosis.evidence import NOTHING, Evidence, background
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
+
+CELLS = 300
+
+
+def term(rng, name, count, lower=-np.inf, given=np.nan):
+    """A term of as many rotations as translations, columns of very unlike size."""
+    axis = np.arange(count) % 6
+    size = np.where(axis < 3, 1e4, 3e5)
+    return SmallTerm(
+        name, np.arange(count) // 6, axis, rng.normal(size=(CELLS, count)) * size,
+        np.full(count, given), lower, bool(np.isfinite(given)),
+    )  # fmt: skip
+
+
+def covariance(behind):
+    """(N, N) of what is read, from the definition."""
+    J = np.hstack([t.columns for t in behind.terms]) * behind.size
+    return np.eye(CELLS) + J @ J.T
+
+
+@pytest.fixture
+def drawn(rng):
+    """Two terms and readings of unknowns drawn from known sizes."""
+    terms = [term(rng, GEOMETRY, 60), term(rng, SPRINGS, 24)]
+    size = np.where(terms[0].axis < 3, 2e-3, 5e-5)
+    z = terms[0].columns @ (size * rng.normal(size=60)) + rng.normal(size=CELLS)
+    prior = Evidence(terms, CELLS).best(z)
+    return terms, z, prior, background(terms, prior)
+
+
+def test_evidence_is_the_density_of_the_readings(drawn):
+    """Up to (n/2) ln 2 pi and what choosing sizes costs; rounding alone between."""
+    _, z, prior, behind = drawn
+    C = covariance(behind)
+    density = multivariate_normal(np.zeros(CELLS), C).logpdf(z)
+    density += CELLS / 2 * np.log(2 * np.pi)
+    half = np.linalg.slogdet(C)[1] / 2
+    chosen = -prior.cost - half  # half ln n for each of two sizes, ln 10 for a term
+    assert chosen == pytest.approx(np.log(CELLS) + np.log(10.0), rel=1e-9)
+    assert prior.evidence == pytest.approx(density - chosen, rel=1e-9)
+
+
+def test_sizes_of_two_kinds_are_found_and_what_is_not_there_is_left_out(drawn):
+    """30 unknowns of a kind: their rms is known to 13 %, and lies within 3 of that."""
+    _, _, prior, behind = drawn
+    rotation, translation = prior.scales[GEOMETRY]
+    assert rotation == pytest.approx(2e-3, rel=0.4)
+    assert translation == pytest.approx(5e-5, rel=0.4)
+    assert [t.name for t in behind.terms] == [GEOMETRY]
+
+
+def test_whitening_and_posterior_are_those_of_the_normal_distribution(drawn, rng):
+    """W C W = 1, g = S J' C^-1 r, and its covariance; rounding of condition 1e6."""
+    terms, z, _, behind = drawn
+    C, J = covariance(behind), terms[0].columns
+    W = behind.whitened(np.eye(CELLS))
+    assert np.allclose(W @ C @ W, np.eye(CELLS), atol=1e-7)
+    assert np.allclose(behind.raw(W @ z), z, atol=1e-9)
+    S2 = np.diag(behind.size**2)
+    (values,), (stds,) = behind.values(W @ z), behind.deviations()
+    gain = S2 @ J.T @ np.linalg.inv(C)
+    assert np.allclose(values / behind.size, gain @ z / behind.size, atol=1e-7)
+    posterior = np.diag(S2 - gain @ J @ S2)
+    assert np.allclose(stds**2 / behind.size**2, posterior / behind.size**2, atol=1e-7)
+    assert np.allclose(behind.left(W @ z), z - J @ values, atol=1e-7)
+
+
+def test_springs_stiffer_than_declared_are_left_out(rng):
+    springs = term(rng, SPRINGS, 12, lower=0.0)
+    truth = np.where(np.arange(12) % 2, 1.0, -1.0) * np.where(
+        springs.axis < 3, 1e-3, 4e-5
+    )
+    z = springs.columns @ truth + rng.normal(size=CELLS)
+    behind = background([springs], Evidence([springs], CELLS).best(z))
+    (values,) = behind.values(behind.whitened(z))
+    assert np.all(values > 0)
+    assert len(values) < 12
+
+
+def test_noise_has_no_small_terms(rng):
+    """One size in 100 draws would be much for a penalty of 8 nats and more."""
+    evidence = Evidence([term(rng, GEOMETRY, 60), term(rng, SPRINGS, 24, 0.0)], CELLS)
+    for _ in range(20):
+        assert not background(evidence.terms, evidence.best(rng.normal(size=CELLS)))
+
+
+def test_a_tolerance_given_is_used_whatever_the_readings_say(rng):
+    given = term(rng, GEOMETRY, 12, given=1e-4)
+    behind = background([given], Evidence([given], CELLS).best(rng.normal(size=CELLS)))
+    assert np.array_equal(behind.size, np.full(12, 1e-4))
+    assert NOTHING.unknowns == 0.0

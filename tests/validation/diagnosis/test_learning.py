@@ -1,0 +1,142 @@
+"""Geometry and functions that no effect of the library is, found and saved."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.measurement.predict import predict, with_second_order
+from assembly.model.robot import Frame, Robot
+from tests.planar_arm_for_tests import SIGMA, measured
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import corrected, table
+from validation.diagnosis.sentence import sentence
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.text import text
+from validation.synthetic.design import CampaignDesign
+from validation.synthetic.generator import generate_campaign, write_campaign
+
+TURNING = {"joint": "revolute", "actuated": True}
+SPATIAL = Robot("arm", "tool", (
+    Frame("j1", **TURNING),
+    Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], **TURNING),
+    Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], **TURNING),
+    Frame("tool", "j3", [0.3, 0.05, 0.1]),
+))  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def inaccurate(tmp_path_factory):
+    """An arm whose frames are all off, measured by the program of springs."""
+    folder = tmp_path_factory.mktemp("arm") / "campaign"
+    errors = np.random.default_rng(3).normal(size=(4, 6)) * np.repeat([4e-4, 2e-4], 3)
+    design = CampaignDesign(configurations=20, rows=40, load=20.0, reach=1.2)
+    made = generate_campaign(
+        SPATIAL.with_errors(errors), {}, design, seed=2, program="springs"
+    )
+    write_campaign(replace(made, robot=SPATIAL), folder)
+    return diagnose(read_campaign(folder))
+
+
+def test_geometry_alone_is_told_from_every_effect(inaccurate):
+    """Nothing of the library is claimed for frames that are all a little off.
+
+    After: 10 rows of 6 readings, three standard deviations of their noise's rms.
+    """
+    found = inaccurate
+    assert (found.verdict, found.claimed) == ("explained", ())
+    assert found.before.normalised > 20
+    assert found.after.normalised < 1 + 3 / np.sqrt(2 * 60)
+    assert "geometric errors" in sentence(found)
+    told = table(found)["geometry"]
+    assert told["scale"]["rotation"] == pytest.approx(4e-4, rel=0.6)
+    assert told["scale"]["translation"] == pytest.approx(2e-4, rel=0.6)
+    assert 12 < told["identifiable"] <= told["unknowns"]
+    assert {one["frame"] for one in told["frames"]} == {"j1", "j2", "j3", "tool"}
+    assert table(found)["effects"] == []
+
+
+def test_the_ladder_says_what_every_step_bought(inaccurate):
+    steps = {row["term"]: row for row in table(inaccurate)["ladder"]}
+    assert list(steps) == ["declared", "geometry", "springs", "library effects"]
+    declared = steps["declared"]["kept_aside_sigma"]
+    assert declared == pytest.approx(inaccurate.before.normalised, rel=1e-6)
+    assert (
+        steps["geometry"]["kept_aside_rms"] < steps["declared"]["kept_aside_rms"] / 20
+    )
+    assert steps["geometry"]["unknowns"] > 12
+    assert steps["library effects"]["unknowns"] == 0
+    assert "geometry" in text(inaccurate)
+
+
+def assert_saved_predicts(found, tmp_path):
+    """A campaign of the robot saved reads what was left: within a tenth of sigma."""
+    write_robot(corrected(found), tmp_path / "robot.toml")
+    robot = read_robot(tmp_path / "robot.toml")
+    campaign = replace(found.campaign, robot=robot)
+    told = predict(with_second_order(conditions_of(campaign))).deviation
+    difference = campaign.measured - told - found.residual_after
+    assert np.nanmax(np.abs(difference / campaign.sigma)) < 0.1
+
+
+def test_a_robot_saved_with_geometric_errors_reads_the_same(inaccurate, tmp_path):
+    assert_saved_predicts(inaccurate, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """The planar arm, with changes to what was read; each once."""
+
+    @cache
+    def find(name):
+        folder = tmp_path_factory.mktemp(name) / name
+        if name == "stand":
+            return diagnose(measured(folder, seed=1, stand=6.0))
+        campaign = measured(folder, seed=1, noise=3.0 if name == "scatter" else 1.0)
+        readings = campaign.measured.copy()
+        if name == "sag":
+            readings[:, 5] -= 1e-6 * np.linalg.norm(campaign.loads[:, 3:], axis=1)
+            return diagnose(replace(campaign, measured=readings))
+        return diagnose(replace(campaign, repeat=np.arange(len(campaign))))
+
+    return find
+
+
+def test_what_the_library_lacks_is_learned(diagnosed, tmp_path):
+    """The stand yields with the square of the load: 6 sigma at 30 N."""
+    found = diagnosed("stand")
+    assert found.verdict == "learned"
+    (one,) = table(found)["learned"]
+    assert (one["where"], one["variables"]) == ("reading", ["load.force"])
+    assert (one["form"], len(one["components"])) == ("powers", 6)
+    for component, sign, sigma in zip(
+        ("rx", "ry", "rz", "tx", "ty", "tz"), (1, -1, 1, -1, 1, 1), SIGMA, strict=True
+    ):
+        truth = sign * 6.0 * sigma / 30.0**2
+        value = one["parameters"][f"{component}.2"]
+        assert abs(value - truth) < 3 * one["std"][f"{component}.2"] < abs(truth) / 3
+    assert one["after"]["normalised"] == found.after.normalised < 1.2
+    assert one["before"]["normalised"] > 1.5
+    assert "reading" in sentence(found)
+    assert_saved_predicts(found, tmp_path)
+
+
+def test_places_that_do_the_same_are_listed(diagnosed):
+    """In a planar arm any body that moves out of the plane reads the same."""
+    found = diagnosed("sag")
+    assert found.verdict == "learned"
+    (one,) = table(found)["learned"]
+    assert one["variables"] == ["load.force"]
+    places = {part["where"] for parts in one["equivalent_places"] for part in parts}
+    assert len((places | {one["where"]}) & {"one", "two", "tool", "reading"}) >= 3
+
+
+def test_scatter_teaches_nothing(diagnosed):
+    """Three times the noise stated, and no repeats that would say so."""
+    found = diagnosed("scatter")
+    assert found.verdict == "outside_library"
+    assert table(found)["learned"] == []
+    assert found.after.normalised < 1.02 * found.before.normalised

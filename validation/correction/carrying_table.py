@@ -1,0 +1,74 @@
+"""Sessions to which a robot was carried, for machines and people."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from validation.correction.carrying import Carried
+
+
+def table(found: Sequence[Carried]) -> dict[str, Any]:
+    """For machines: every session, its values and its errors on the other rows."""
+    return {
+        "sessions": [
+            {
+                "session": one.session,
+                "setup_rows": one.rows[0],
+                "other_rows": one.rows[1],
+                "suffices": one.suffices,
+                "open": list(one.open_),
+                "uncertainty": one.uncertainty,
+                "left_in_setup": one.left,
+                "error": _error(one.error),
+                "declared": _error(one.declared),
+                "parameters": [
+                    {"effect": effect, "name": name, "value": value, "std": std}
+                    for (effect, name), value, std in zip(
+                        one.names, one.values.tolist(), one.std.tolist(), strict=True
+                    )
+                ],
+            }
+            for one in found
+        ],
+        "unit": {"position": "m", "rotation": "rad", "uncertainty": "m"},
+    }
+
+
+def _error(error: NDArray) -> dict[str, float]:
+    position, rotation, normalised = error.tolist()
+    return {"position": position, "rotation": rotation, "normalised": normalised}
+
+
+def text(found: Sequence[Carried]) -> str:
+    """For people."""
+    lines = []
+    for one in found:
+        name = one.session or "campaign"
+        lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} others")
+        lines.append(f"  others, as carried over: {_said(one.error)}")
+        lines.append(f"  others, declared robot: {_said(one.declared)}")
+        lines.append(
+            f"  open by the set-up rows: {1e6 * one.uncertainty:.4g} um; "
+            f"they are off by {1e6 * one.left:.4g} um themselves"
+        )
+        if not one.suffices:
+            lines.append(
+                f"  the set-up rows do not suffice: they leave {', '.join(one.open_)} "
+                "open; expected rows elsewhere, and in other orientations"
+            )
+        elif not one.better:
+            lines.append("  worse than the declared robot: it does not carry over")
+    return "\n".join(lines)
+
+
+def _said(error: NDArray) -> str:
+    """What of an error is known."""
+    parts = [
+        f"{size * factor:.4g} {unit}"
+        for size, factor, unit in zip(
+            error.tolist(), (1e6, 1e6, 1.0), ("um", "urad", "sigma"), strict=True
+        )
+        if size == size
+    ]
+    return ", ".join(parts)

@@ -1,0 +1,295 @@
+r"""Commands that bring a corrected robot where the declared one would go.
+
+A controller that is told q moves the drives so that the nominal robot would stand at
+the pose wanted; the machine stands off by the deviation d(q) of the corrected model.
+Gauss-Newton's method looks for commands at which both cancel, all rows at once:
+
+    nominal pose(q) with deviation d(q)  =  pose wanted
+
+======  =============  ==========  ===================================================
+symbol  code           shape       meaning
+======  =============  ==========  ===================================================
+q       ``drives``     (R, d)      commands of the driven joints
+e       ``error``      (R, 6)      from where the machine stands to the pose wanted
+J       ``jacobian``   (R, 6, d)   how the platform follows the drives
+======  =============  ==========  ===================================================
+
+Where there are fewer drives than six, positions come first.
+
+Sources:
+    Nocedal, Wright, Numerical Optimization, section 10.3 (Gauss-Newton).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import place_many_joints
+from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict
+from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.model.links import own_screw
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from stiffness.screws import rotation_matrix, rotation_vector
+from validation.campaign.campaign import Campaign
+from validation.correction.prediction import finite_conditions
+from validation.correction.spread import deviation_spread
+
+_STEPS = 25
+_HALVINGS = 8
+_STILL = 1e-10  # [rad or m] a step that is none
+_LOW = 1e-4  # of a rotation's weight where not all six can be met
+
+
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """Commands that were corrected, R rows.
+
+    Attributes:
+        targets: the commands at which the nominal robot would stand as wanted.
+        drives: names of the d driven joints.
+        commands: (R, d) [rad or m] for the machine; where there is no answer, as given.
+        transforms: (R, n, 4, 4) nominal frames at the commands.
+        coordinates: (R, n) [rad or m] of every joint there.
+        before: (R, 6) [rad, m] how far the machine is from the pose wanted, at the
+            reference point, base axes, if commanded as given.
+        after: (R, 6) the same with the commands corrected.
+        spread: (R, 6) [rad, m] standard deviation of that: what the robot's file says
+            of its own uncertainty.
+        limited: (R,) bool, a joint's limit stands in the way.
+        reason: (R,) why there is no answer, else empty.
+    """
+
+    targets: Campaign
+    drives: tuple[str, ...]
+    commands: NDArray
+    transforms: NDArray
+    coordinates: NDArray
+    before: NDArray
+    after: NDArray
+    spread: NDArray
+    limited: NDArray
+    reason: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def offsets(self) -> NDArray:
+        """(R, d) [rad or m] to be added to the commands of the drives."""
+        return self.commands - self.targets.coordinates[:, _driven(self.targets.robot)]
+
+
+def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
+    """Commands at which the corrected robot stands where the nominal one should.
+
+    Args:
+        targets: commands of the robot, which is the corrected one.
+        as_read: whether the device is believed: what it reads is to be nothing.
+            Otherwise effects of the device alone are left as they are.
+
+    Returns:
+        The commands; those of rows without an answer are unchanged.
+
+    Raises:
+        BadInput: an effect of the robot depends on what the targets lack.
+    """
+    targets = _each_once(targets)
+    robot, driven = targets.robot, _driven(targets.robot)
+    weights = _weights(robot, len(driven))
+    goal = targets.transforms[:, robot.index(robot.platform)]
+    machine = _Machine(targets, goal, as_read)
+    q = targets.coordinates[:, driven].copy()
+    there, reason = machine.at(q, targets)
+    before = there.error
+    going = np.array([not r for r in reason])
+    limits = _limits(robot, driven)
+    for _ in range(_STEPS):
+        step = _step(there, weights, q, limits)
+        moving = going & (np.abs(step).max(axis=1, initial=0.0) > _STILL)
+        if not moving.any():
+            break
+        share = moving.astype(float)
+        for _ in range(_HALVINGS):
+            tried = np.clip(q + share[:, None] * step, *limits)
+            next_, missed = machine.at(tried, targets)
+            worse = moving & (share > 0)
+            worse &= (missed != "") | ~(next_.size(weights) < there.size(weights))
+            if not worse.any():
+                break
+            share = np.where(worse, share / 2, share)
+        going &= moving & ~worse  # what is left is rounding, or as near as limits allow
+        q = np.where(going[:, None], tried, q)
+        there = next_ if going[moving].all() else machine.at(q, targets)[0]
+    last = there.campaign
+    spread = deviation_spread(
+        robot, lambda other: machine.conditions(replace(last, robot=other))
+    )
+    at_limit = np.asarray((q <= limits[0]) | (q >= limits[1]))
+    return Compensation(
+        targets, tuple(robot.frames[i].name for i in driven), q,
+        there.conditions.transforms, last.coordinates, before, there.error, spread,
+        np.asarray(at_limit.any(axis=1)), reason,
+    )  # fmt: skip
+
+
+def _each_once(targets: Campaign) -> Campaign:
+    """The commands without a row for each point read."""
+    if targets.point is None:
+        return targets
+    labels = [
+        label.removesuffix(f":{point}") if point else label
+        for label, point in zip(targets.ids, targets.point, strict=True)
+    ]
+    first = [labels.index(label) for label in dict.fromkeys(labels)]
+    chosen = replace(targets.take(first), points={}, point=None)
+    return replace(chosen, ids=tuple(dict.fromkeys(labels)))
+
+
+def _driven(robot: Robot) -> NDArray:
+    """(d,) rows of the frames with a drive."""
+    return np.flatnonzero([frame.actuated for frame in robot.frames])
+
+
+def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
+    """(d,) least and (d,) largest commands."""
+    given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
+    least, most = np.array(given).reshape(-1, 2).T
+    return least, most
+
+
+def _weights(robot: Robot, drives: int) -> NDArray:
+    """(6,) [m/rad and 1] by which an error's parts count."""
+    turn = size_of(robot) * (1.0 if drives >= 6 else _LOW)
+    return np.repeat([turn, 1.0], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class _Standing:
+    """Where the machine stands at commands.
+
+    Attributes:
+        campaign: the commands.
+        conditions: what acts there.
+        error: (R, 6) [rad, m] to the pose wanted; NaN where there is no answer.
+        jacobian: (R, 6, d) at the reference point.
+    """
+
+    campaign: Campaign
+    conditions: Conditions
+    error: NDArray
+    jacobian: NDArray
+
+    def size(self, weights: NDArray) -> NDArray:
+        """(R,) [m] weighted length of the error."""
+        return np.linalg.norm(self.error * weights, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Machine:
+    """The corrected robot, to be commanded.
+
+    Attributes:
+        targets: the commands as given.
+        goal: (R, 4, 4) platform poses wanted.
+        as_read: whether the device's own effects count.
+    """
+
+    targets: Campaign
+    goal: NDArray
+    as_read: bool
+
+    def conditions(self, campaign: Campaign) -> Conditions:
+        """What acts at commands, read at the reference point."""
+        here = replace(finite_conditions(campaign), target=None)
+        if self.as_read:
+            return here
+        still = np.zeros(6)
+        return replace(here, base=still, tool=still[:3], reading=0.0)
+
+    def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
+        """Where it stands, and (R,) why it cannot.
+
+        Args:
+            q: (R, d) commands.
+            last: commands that can be reached, for rows that cannot.
+
+        Returns:
+            Both.
+        """
+        campaign, reason = _commanded(last, q)
+        here = self.conditions(campaign)
+        answer = predict(here)
+        reason = np.where(reason == "", answer.reason, reason)
+        error = _between(here, answer.deviation, self.goal)
+        return _Standing(campaign, here, error, _jacobian(here, q.shape[1])), reason
+
+
+def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
+    """The commands as a campaign, those out of reach as they were."""
+    robot = last.robot
+    driven = _driven(robot)
+    wanted = np.full((len(q), len(robot.frames)), np.nan)
+    wanted[:, driven] = q
+    distinct, which = np.unique(wanted, axis=0, return_inverse=True)
+    postures, reasons = place_many_joints(robot, distinct)
+    coordinates, transforms = last.coordinates.copy(), last.transforms.copy()
+    mismatch, reason = last.mismatch.copy(), np.full(len(q), "", dtype=object)
+    for row, k in enumerate(which.reshape(-1).tolist()):
+        posture = postures[k]
+        if posture is None:
+            reason[row] = reasons[k]
+            continue
+        coordinates[row], transforms[row] = posture.coordinates, posture.transforms
+        mismatch[row] = posture.mismatch
+    return replace(
+        last, coordinates=coordinates, transforms=transforms, mismatch=mismatch
+    ), reason
+
+
+def _between(here: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
+    """(R, 6) from where the reference point stands to where it should, base axes."""
+    nominal = here.postures.platform
+    arm = nominal[:, :3, :3] @ here.point
+    R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
+    p = nominal[:, :3, 3] + arm + deviation[:, 3:]
+    turn = rotation_vector(goal[:, :3, :3] @ np.swapaxes(R, 1, 2))
+    shift = goal[:, :3, 3] + goal[:, :3, :3] @ here.point - p
+    return np.concatenate([turn, shift], axis=1)
+
+
+def _jacobian(here: Conditions, drives: int) -> NDArray:
+    """(R, 6, d) how the reference point follows the drives, base axes."""
+    robot = without_joint_clearances(here.robot)
+    columns = np.zeros((6 * len(robot.frames), drives))
+    for k, i in enumerate(_driven(robot)):
+        columns[6 * i : 6 * i + 6, k] = own_screw(robot.frames[i])
+    distinct, which = in_groups(replace(here.postures, robot=robot))
+    J = flexibility(distinct).platform_of(columns)[which]
+    J[:, 3:] += np.cross(J[:, :3], here.measured_arms[:, :, None], axisa=1, axisb=1,
+                         axisc=1)  # fmt: skip
+    return J
+
+
+def _step(
+    there: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
+) -> NDArray:
+    """(R, d) least squares' step; drives that would leave their limits stay there."""
+    A = there.jacobian * weights[:, None]
+    b = np.nan_to_num(there.error) * weights
+    held = np.zeros(q.shape, dtype=bool)
+    step = np.zeros_like(q)
+    for _ in range(q.shape[1] + 1):
+        free = np.where(held[:, None, :], 0.0, A)
+        rest = b - np.einsum("rij,rj->ri", A, np.where(held, step, 0.0))
+        found = np.einsum("rdi,ri->rd", np.linalg.pinv(free), rest)
+        step = np.where(held, step, found)
+        beyond = ~held & ((q + step < limits[0]) | (q + step > limits[1]))
+        if not beyond.any():
+            break
+        step = np.where(beyond, np.clip(q + step, *limits) - q, step)
+        held |= beyond
+    return step

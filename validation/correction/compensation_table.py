@@ -1,0 +1,152 @@
+"""What was compensated, for controllers, machines and people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import POSE, pose_components
+from validation.campaign.campaign import LOAD
+from validation.correction.compensation import Compensation
+from validation.correction.prediction import csv_text
+
+
+def command_table(found: Compensation) -> str:
+    """The corrected commands as a table with the columns of the targets.
+
+    Args:
+        found: of any targets.
+
+    Returns:
+        CSV: ``id``, ``q.*`` or ``pose.*``, loads and covariates as given; it can be
+        commanded, measured and compensated again.
+    """
+    targets = found.targets
+    platform = found.transforms[:, targets.robot.index(targets.robot.platform)]
+    columns: dict[str, Any] = {}
+    if targets.commanded == "pose":
+        poses = pose_components(platform)
+        columns |= {f"pose.{name}": poses[:, k] for k, name in enumerate(POSE)}
+    else:
+        columns |= {
+            f"q.{n}": x for n, x in zip(found.drives, found.commands.T, strict=True)
+        }
+    loads = zip(LOAD, targets.loads.T, strict=True)
+    columns |= {f"load.{name}": w for name, w in loads if w.any()}
+    columns |= {f"cov.{name}": x for name, x in targets.covariates.items()}
+    if targets.session is not None:
+        columns["session"] = targets.session
+    return _text(found, columns)
+
+
+def offset_table(found: Compensation) -> str:
+    """What a controller adds to its commands, and the error before and after.
+
+    Args:
+        found: of any targets.
+
+    Returns:
+        CSV: ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in position
+        [m] and rotation [rad], ``spread`` [m] of the position after.
+    """
+    columns: dict[str, Any] = {
+        f"offset.{n}": x for n, x in zip(found.drives, found.offsets.T, strict=True)
+    }
+    for when, error in (("before", found.before), ("after", found.after)):
+        columns[f"{when}.position"] = np.linalg.norm(error[:, 3:], axis=1)
+        columns[f"{when}.rotation"] = np.linalg.norm(error[:, :3], axis=1)
+    columns["spread.position"] = np.linalg.norm(found.spread[:, 3:], axis=1)
+    return _text(found, columns)
+
+
+def _text(found: Compensation, columns: dict[str, Any]) -> str:
+    """Columns under their names."""
+    rows = {
+        label: {
+            name: values[i] if name == "session" else float(values[i])
+            for name, values in columns.items()
+        }
+        for i, label in enumerate(found.targets.ids)
+    }
+    return csv_text(rows, list(columns))
+
+
+def summary(
+    found: Compensation, diagnosed: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """The same for machines: errors to be expected, and what stands in the way.
+
+    Args:
+        found: of any targets.
+        diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading that the
+            robot's diagnosis left on rows kept aside, if known.
+
+    Returns:
+        Plain values; ``expected`` is what the diagnosis left, as vectors of three, or
+        else by the spread that the file states, None where neither says anything.
+    """
+    ids = found.targets.ids
+    spread = _sizes(found.spread)
+    expected: dict[str, float | None] = {"position": None, "rotation": None}
+    if diagnosed is not None:
+        expected = {
+            key: float(np.hypot(size or 0.0, np.sqrt(3.0) * diagnosed[key]))
+            for key, size in _sizes(found.after).items()
+        }
+    elif found.spread.any():
+        expected = _sizes(np.hypot(found.after, found.spread))
+    return {
+        "rows": len(ids),
+        "drives": list(found.drives),
+        "offsets": found.offsets,
+        "error": {
+            "unit": {"position": "m", "rotation": "rad"},
+            "before": _sizes(found.before),
+            "after": _sizes(found.after),
+            "spread": spread,
+            "expected": expected,
+        },
+        "limited": [ids[i] for i in np.flatnonzero(found.limited)],
+        "without_answer": [
+            {"id": ids[i], "reason": found.reason[i]}
+            for i in np.flatnonzero(found.reason != "")
+        ],
+    }
+
+
+def _sizes(error: NDArray) -> dict[str, float | None]:
+    """Rms length of positions and rotations; None of nothing."""
+
+    def rms(part: NDArray) -> float | None:
+        known = part[np.isfinite(part).all(axis=1)]
+        return float(np.sqrt(np.mean(np.sum(known**2, axis=1)))) if len(known) else None
+
+    return {"position": rms(error[:, 3:]), "rotation": rms(error[:, :3])}
+
+
+def summary_text(found: Compensation, table: Mapping[str, Any]) -> str:
+    """The same for people, ``table`` being :func:`summary`'s."""
+    lines = [f"{table['rows']} commands, drives {', '.join(found.drives)}"]
+    says = {
+        "before": "as commanded", "after": "corrected", "spread": "spread of the model",
+        "expected": "to be expected",
+    }  # fmt: skip
+    for key, words in says.items():
+        size = table["error"][key]
+        if key == "spread" and not found.spread.any():
+            continue
+        if size["position"] is not None:
+            lines.append(
+                f"{words}: {1e6 * size['position']:.4g} um, "
+                f"{1e6 * size['rotation']:.4g} urad"
+            )
+    if table["error"]["expected"]["position"] is None:
+        lines.append(
+            "to be expected: what the robot's diagnosis left (--diagnosed says it); "
+            "the file states no uncertainty"
+        )
+    if table["limited"]:
+        lines.append(f"at a joint's limit: {', '.join(table['limited'][:10])}")
+    lines += [f"{row['id']}: {row['reason']}" for row in table["without_answer"][:10]]
+    return "\n".join(lines)

@@ -1,0 +1,235 @@
+"""Functions of a robot's file as curves, each with the band that its numbers leave.
+
+A function that remembers is drawn as its answer to a step of one unit, with time; one
+that turns with the direction, as it is when coming from below.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects.forms import FORMS
+from assembly.effects.formula import unit_text
+from assembly.effects.functions import CLOCKS, parameters_of, value_of
+from assembly.effects.units import result_unit, units_of, variable_unit, whole_unit
+from assembly.model.function import Function
+from assembly.model.robot import Robot
+from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.errors import plot_label
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 181
+_SHOWN = 13  # of them in a text
+_LATE = 4.0  # time constants, periods that are drawn
+_RANGES = {"temperature": 10.0, "approach": 1.0}  # to either side
+_LOAD = 100.0  # [N, N m]
+_TRAVEL = 0.5  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One component of a function.
+
+    Attributes:
+        function: whose.
+        component: which.
+        variable: along which it is drawn; the other, if there is one, is ``beside``.
+        beside: (name, value) of the other variable, None where there is none.
+        x: (k,) in its unit.
+        values: (k,) [rad, m, N m, N], or per wrench for a compliance.
+        std: (k,) standard deviation, zero where the file gives none.
+        units: of x and of the values.
+    """
+
+    function: Function
+    component: str
+    variable: str
+    beside: tuple[str, float] | None
+    x: NDArray
+    values: NDArray
+    std: NDArray
+    units: tuple[str, str]
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def curves_of(
+    robot: Robot, over: Mapping[str, tuple[float, float]] | None = None
+) -> list[Curve]:
+    """All functions of a robot as curves.
+
+    Args:
+        robot: with its functions.
+        over: least and largest value by variable; a full turn, the knots of a spline
+            or what is usual otherwise.
+
+    Returns:
+        A curve for each component; of two variables one for each of three values of
+        the second.
+    """
+    found = []
+    for function in robot.functions:
+        along, others = _variables(function)
+        least, most = (over or {}).get(along) or _range(robot, function, along)
+        x = np.linspace(least, most, _POINTS)
+        beside: list[tuple[str, float] | None] = [None]
+        if others:
+            ends = (over or {}).get(others) or _range(robot, function, others)
+            beside = [(others, v) for v in np.linspace(*ends, 3).tolist()]
+        for component in function.components:
+            for fixed in beside:
+                found.append(_curve(robot, function, component, along, fixed, x))
+    return found
+
+
+def _variables(function: Function) -> tuple[str, str]:
+    """Along which variable a function is drawn, and the other if there is one."""
+    first, *rest = function.variables
+    if function.form in {"lag", "creep"}:
+        return "time", ""
+    if function.form == "reversal":
+        return (rest or [first])[0], ""
+    return first, (rest or [""])[0]
+
+
+def _curve(
+    robot: Robot, function: Function, component: str, along: str,
+    fixed: tuple[str, float] | None, x: NDArray,
+) -> Curve:  # fmt: skip
+    """One curve, and what each number's own standard deviation does to it."""
+    values = _values(function, component, x, fixed)
+    variance = np.zeros_like(values)
+    for name, sigma in function.std.items():
+        more = {**function.parameters, name: function.parameters[name] + sigma}
+        changed = _values(replace(function, parameters=more), component, x, fixed)
+        variance += np.nan_to_num(changed - values) ** 2
+    turns = component.startswith("r") and function.where != "load"
+    given = unit_text(result_unit(function, component))
+    value_unit = f"rad{given.removeprefix('1')}" if turns else given
+    x_unit = "s" if along == "time" else whole_unit(variable_unit(robot, along))
+    return Curve(
+        function, component, along, fixed, x, values, np.sqrt(variance),
+        (x_unit, value_unit),
+    )  # fmt: skip
+
+
+def _values(
+    function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
+) -> NDArray:
+    """The function's values along x."""
+    own = parameters_of(function, component)
+    inputs = [x]
+    if function.form in {"lag", "creep"}:
+        left = np.exp(-x / own["time_constant"])
+        inputs = [1.0 - left, left]
+    elif function.form == "reversal":
+        sized = function.variables[-1].startswith(("load.", "wrench."))
+        inputs = [np.ones_like(x), np.abs(x) if sized else x][: len(function.variables)]
+    elif fixed is not None:
+        inputs = [x, np.full_like(x, fixed[1])]
+    return value_of(function, component, inputs)
+
+
+def _range(robot: Robot, function: Function, variable: str) -> tuple[float, float]:
+    """Where a variable usually lies."""
+    own = parameters_of(function, function.components[0])
+    k = function.variables.index(variable) if variable in function.variables else 0
+    if function.form == "spline":
+        at = f".{k + 1}" if len(function.variables) > 1 else ""
+        return own[f"first{at}"], own[f"last{at}"]
+    if "at" in own:
+        return own["at"] - abs(own["at"]) - 1.0, own["at"] + abs(own["at"]) + 1.0
+    if variable in CLOCKS:
+        longest = max(own.get("time_constant", 0.0), own.get("period", 0.0))
+        return 0.0, _LATE * (longest or 1000.0)
+    kind, _, rest = variable.partition(".")
+    if kind == "q":
+        frame = robot.frame(rest)
+        half = _TRAVEL if frame.joint == "prismatic" else pi
+        return frame.limits or (-half, half)
+    size = _LOAD if kind in {"load", "wrench"} else _RANGES.get(rest or kind, 1.0)
+    return -size, size
+
+
+def table(robot: Robot, found: list[Curve]) -> list[dict[str, Any]]:
+    """The same for machines."""
+    return [
+        {
+            "label": c.function.title,
+            "where": c.function.where,
+            "component": c.component,
+            "kind": c.function.kind,
+            "form": c.function.form,
+            "formula": c.function.formula or None,
+            "session": c.function.session,
+            "parameters": [
+                {"name": name, "value": value, "std": c.function.std.get(name),
+                 "unit": unit}
+                for (name, value), unit in zip(
+                    c.function.parameters.items(),
+                    units_of(robot, c.function).values(),
+                    strict=True,
+                )
+            ],
+            "variable": c.variable,
+            "beside": None if c.beside is None else dict([c.beside]),
+            "units": {"variable": c.units[0], "value": c.units[1]},
+            "x": c.x, "value": c.values, "std": c.std,
+        }
+        for c in found
+    ]  # fmt: skip
+
+
+def text(found: list[Curve]) -> str:
+    """The same for people: a dozen points of each curve."""
+    lines: list[str] = []
+    for c in found:
+        beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""
+        form = FORMS[c.function.form].summary if c.function.form in FORMS else "formula"
+        lines += [
+            "",
+            f"{c.function.title}: {c.function.kind} {c.component} at "
+            f"{c.function.where}, {form}{beside}",
+            f"{c.variable} [{c.units[0]}]    {c.component} [{c.units[1]}]    1 sigma",
+        ]
+        for i in np.linspace(0, _POINTS - 1, _SHOWN).astype(int).tolist():
+            band = f"{c.std[i]:.2g}" if c.function.std else "-"
+            lines.append(f"{c.x[i]:12.5g} {c.values[i]:14.5g}    {band}")
+    return "\n".join(lines[1:])
+
+
+def figure_of(found: list[Curve]) -> "Figure":
+    """Every curve in a panel of its own, with twice its standard deviation.
+
+    Args:
+        found: of :func:`curves_of`, at least one.
+
+    Returns:
+        The figure.
+    """
+    from matplotlib.figure import Figure
+
+    columns = min(len(found), 3)
+    rows = -(-len(found) // columns)
+    figure = Figure(figsize=(4.2 * columns, 3.2 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, c in zip(panels, found, strict=False):
+        panel.fill_between(
+            c.x, c.values - 2 * c.std, c.values + 2 * c.std, color="C0", alpha=0.25,
+            lw=0,
+        )  # fmt: skip
+        panel.plot(c.x, c.values, color="C0")
+        beside = f", {c.beside[0]} = {c.beside[1]:.3g}" if c.beside else ""
+        panel.set_title(plot_label(f"{c.function.title}{beside}"), fontsize=9)
+        panel.set_xlabel(plot_label(f"{c.variable} [{c.units[0]}]"))
+        panel.set_ylabel(plot_label(f"{c.component} [{c.units[1]}]"))
+        panel.grid(visible=True, alpha=0.3)
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    return figure

@@ -1,0 +1,332 @@
+"""What a machine may do beside the library, as candidates to be learned.
+
+A small screw, or a compliance, at a place, as a function of something that was varied.
+
+======  =============  ===========  ==================================================
+symbol  code           shape        meaning
+======  =============  ===========  ==================================================
+a       ``answer``     (R, 6)       change of the reading per unit of a component
+P       ``basis``      (R, p)       columns of a form in a variable
+T       ``mixed``      (p, q)       numbers of the form per unknown of the search
+======  =============  ===========  ==================================================
+
+A component of a candidate adds a times P T to the readings.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects.forms import roughness
+from assembly.effects.functions import AXES, basis
+from assembly.effects.places import beams, drives
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.variables import variable
+from assembly.model.function import Function
+from assembly.model.robot import BeamLink, Robot, beam_axis
+from validation.diagnosis.responses import Responses
+
+TURN, SHIFT = AXES[:3], AXES[3:]
+KNOTS = 7
+_STIFF = 0.1  # of a spline's size that its straight part may have, per step
+_RANK = 1e-8
+MANY = 150  # rows from which many waves a turn are looked for
+
+
+@dataclass(frozen=True)
+class Part:
+    """Where a candidate acts, and what it depends on there.
+
+    Attributes:
+        where: a frame, ``"base"`` or ``"reading"``.
+        components: of the screw there.
+        variable: its public name.
+    """
+
+    where: str
+    components: tuple[str, ...]
+    variable: str
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A form with the names of its columns.
+
+    Attributes:
+        form: a name of :data:`assembly.effects.forms.FORMS`.
+        names: of its columns.
+        given: numbers in which it is not linear.
+    """
+
+    form: str
+    names: tuple[str, ...]
+    given: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A function that may act, at one place or at several of one kind.
+
+    Attributes:
+        parts: where, and of what.
+        kind: ``"screw"`` or ``"compliance"``.
+        shape: the form, the same for all parts.
+    """
+
+    parts: tuple[Part, ...]
+    kind: str
+    shape: Shape
+
+    def functions(self) -> list[Function]:
+        """The functions of a robot file, their numbers still to be found."""
+        numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
+        return [
+            Function(
+                p.where,
+                p.components,
+                (p.variable,),
+                self.shape.form,
+                numbers,
+                self.kind,
+            )
+            for p in self.parts
+        ]
+
+
+class Answers:
+    """How readings answer to components at any place, and the variables of the rows."""
+
+    def __init__(self, here: Conditions, robot: Robot, answers: Responses) -> None:
+        """Keep what candidates are made of.
+
+        Args:
+            here: R situations as declared.
+            robot: the campaign's.
+            answers: of the readings there.
+        """
+        self.here, self.robot, self._answers = here, robot, answers
+        self.basis = lru_cache(maxsize=None)(self._basis)
+
+    def answer(self, where: str, component: str, kind: str) -> NDArray:
+        """(R, 6) change of the reading per unit of a component at a place."""
+        axis = AXES.index(component)
+        if where == "reading":
+            return np.broadcast_to(np.eye(6)[axis], (len(self.here), 6))
+        if where == "base":
+            screw = np.zeros((len(self.here), 6))
+            screw[:, axis] = 1.0
+            origin = self.here.postures.platform[:, :3, 3]
+            screw[:, 3:] += np.cross(screw[:, :3], origin)
+            return np.einsum("rij,rj->ri", self._answers.reading, screw)
+        row = self.here.robot.index(where)
+        answer = self._answers.screws[:, :, row, axis]
+        if kind == "compliance":
+            return answer * self._answers.wrenches[:, row, axis, None]
+        return answer
+
+    def _basis(self, name: str, shape: Shape) -> tuple[NDArray, NDArray]:
+        """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
+        numbers = dict.fromkeys(shape.names, 0.0) | dict(shape.given)
+        function = Function("reading", ("tx",), (name,), shape.form, numbers)
+        raw = np.nan_to_num(basis(self.here, function, shape.names))
+        size = np.sqrt(np.mean(raw**2, axis=0))
+        mixed = np.diag(1 / np.where(size > 0, size, 1.0))
+        if shape.form == "powers" and len(shape.names) > 1:
+            # so that a power does not stand for the one below it
+            Q, R = np.linalg.qr(raw * np.diag(mixed))
+            good = np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw))
+            mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
+            mixed *= np.sqrt(len(raw))
+        elif shape.form == "spline":
+            # the prior of its values: rough ones are unlikely
+            stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
+            mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
+            mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
+        elif shape.form in {"waves", "slow_wave"}:
+            mixed = np.eye(len(shape.names))
+        return raw @ mixed, mixed
+
+    def changes(self, one: Candidate) -> tuple[NDArray, NDArray]:
+        """What a candidate adds to the readings.
+
+        Args:
+            one: of m unknowns.
+
+        Returns:
+            (R, 6, m) [rad, m] per unknown, and (m,) the component each acts in.
+        """
+        blocks, axes = [], []
+        for part in one.parts:
+            columns, _ = self.basis(part.variable, one.shape)
+            for component in part.components:
+                answer = self.answer(part.where, component, one.kind)
+                blocks.append(answer[:, :, None] * columns[:, None, :])
+                axes += [AXES.index(component)] * columns.shape[1]
+        return np.concatenate(blocks, axis=2), np.array(axes)
+
+    def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
+        """The functions of a robot file with their numbers.
+
+        Args:
+            one: a candidate of m unknowns.
+            x: (m,) their values.
+            std: (m,) their standard deviations, taken as independent.
+
+        Returns:
+            One function for each of its parts.
+        """
+        found, at = [], 0
+        for part, function in zip(one.parts, one.functions(), strict=True):
+            _, mixed = self.basis(part.variable, one.shape)
+            numbers, spread = dict(one.shape.given), {}
+            for component in part.components:
+                own = slice(at, at + mixed.shape[1])
+                at = own.stop
+                values = mixed @ x[own]
+                stds = np.sqrt(mixed**2 @ std[own] ** 2)
+                alone = len(part.components) == 1
+                for name, v, s in zip(one.shape.names, values, stds, strict=True):
+                    key = name if alone else f"{component}.{name}"
+                    numbers[key], spread[key] = float(v), float(s)
+            found.append(replace(function, parameters=numbers, std=spread))
+        return found
+
+
+def variables_of(here: Conditions) -> list[str]:
+    """Public names of what was varied, and is known in every row.
+
+    Args:
+        here: R situations.
+
+    Returns:
+        Coordinates of drives, loads and their size, positions, covariates.
+    """
+    names = [f"q.{name}" for name in drives(here.robot)]
+    names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
+    names += ["load.force", *(f"position.{axis}" for axis in "xyz")]
+    names += ["cov.temperature", "time", "approach"]
+    names += [f"cov.{name}" for name in here.covariates]
+    varied = []
+    for name in names:
+        values = variable(here, name)
+        if np.isfinite(values).all() and np.ptp(values) > 0:
+            varied.append(name)
+    return varied
+
+
+def places_of(
+    robot: Robot, variables: Sequence[str]
+) -> Iterator[tuple[str, tuple[Part, ...]]]:
+    """Kinds and parts of all candidates, variable by variable.
+
+    Args:
+        robot: any.
+        variables: names of what was varied.
+
+    Yields:
+        Kind, and where with what: components one by one and by three, drives together
+        each with its own coordinate, beams together along their axes.
+    """
+    single: list[tuple[str, tuple[str, ...]]]
+    single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
+    single += [("reading", (axis,)) for axis in AXES] + [("reading", AXES)]
+    for name in (*(f.name for f in robot.frames), "base"):
+        single += [(name, TURN), (name, SHIFT)]
+    own = tuple((f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated)
+    along = tuple((name, _along(robot, name)) for name in beams(robot))
+    for name in variables:
+        for where, components in single:
+            yield "screw", (Part(where, components, name),)
+            if where not in {"reading", "base"} and len(components) == 1:
+                yield "compliance", (Part(where, components, name),)
+        if not name.startswith("q.") and len(along) > 1:
+            yield "screw", tuple(Part(w, c, name) for w, c in along)
+    if len(own) > 1:
+        together = tuple(Part(w, c, f"q.{w}") for w, c in own)
+        yield "screw", together
+        yield "compliance", together
+
+
+def _along(robot: Robot, name: str) -> tuple[str, ...]:
+    """Components of a beam's lengthening."""
+    frame = robot.frame(name)
+    assert isinstance(frame.link, BeamLink)
+    axis = np.abs(beam_axis(frame)[1])
+    return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
+
+
+def _waves(*orders: int) -> Shape:
+    return Shape("waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine")))
+
+
+def _powers(*powers: int) -> Shape:
+    return Shape("powers", tuple(str(k) for k in powers))
+
+
+REVERSAL = Shape("reversal", ("0",))
+
+
+def first_shapes(robot: Robot, name: str) -> list[Shape]:
+    """Forms general enough to show whether a variable counts at all."""
+    if name == "approach":
+        return [_powers(1)]
+    if is_angle(robot, name):
+        return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
+    if name.startswith("q."):
+        return [_powers(0, 1, 2, 3), REVERSAL]
+    return [_powers(0, 1, 2, 3)]
+
+
+def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
+    """Every form that is tried where a variable counts, those with a name first."""
+    x = variable(here, name)
+    low, high = float(x.min()), float(x.max())
+    if name == "approach":
+        return [_powers(1)]
+    shapes = [_powers(1), _powers(2), _powers(3), _powers(0, 1), _powers(0, 1, 2),
+              _powers(0, 1, 2, 3)]  # fmt: skip
+    if name.startswith("q."):
+        shapes.append(REVERSAL)
+    if is_angle(here.robot, name):
+        shapes += [_waves(k) for k in range(1, 9)]
+        shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]
+        if len(here) >= MANY:
+            shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
+        if kind == "compliance":
+            shapes += [
+                Shape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))
+                for k in range(1, 5)
+            ]
+    if name in {"time", "cov.time"}:
+        shapes += [
+            Shape("slow_wave", ("sine", "cosine"), (("period", (high - low) / k),))
+            for k in (0.5, 1, 1.5, 2, 3, 4, 6)
+        ]
+    if not name.startswith(("load", "position")):
+        levels = np.quantile(x, np.linspace(0.1, 0.9, 9))
+        shapes += [
+            Shape("step", ("size",), (("at", float(v)),)) for v in np.unique(levels)
+        ]
+    if (
+        name.startswith("cov.")
+        and np.isfinite(here.time).all()
+        and np.ptp(here.time) > 0
+    ):
+        span = float(np.ptp(here.time))
+        shapes += [
+            Shape("lag", ("gain", "start"), (("time_constant", part * span),))
+            for part in (0.02, 0.05, 0.1, 0.2, 0.5)
+        ]
+    if len(np.unique(x)) > KNOTS:
+        ends = (("first", low), ("last", high))
+        shapes.append(Shape("spline", tuple(str(k + 1) for k in range(KNOTS)), ends))
+    return shapes
+
+
+def is_angle(robot: Robot, name: str) -> bool:
+    """Whether a variable is the coordinate of a joint that turns."""
+    kind, _, rest = name.partition(".")
+    return kind == "q" and robot.frame(rest).joint == "revolute"

@@ -1,0 +1,113 @@
+"""How the readings answer a small screw at any frame, and what every joint carries.
+
+Both come from the linear model at the declared state, for all rows together.  A small
+geometric error adds its screw times the answer; a spring adds its compliance times the
+wrench it carries times the answer.
+
+======  =============  ============  =================================================
+symbol  code           shape         meaning
+======  =============  ============  =================================================
+D       ``reading``    (R, 6, 6)     change of the reading per unit platform screw
+J       ``screws``     (R, 6, n, 6)  change of the reading per unit screw at a frame
+w       ``wrenches``   (R, n, 6)     [N m, N] through every joint, in its axes
+======  =============  ============  =================================================
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import virtual_joints
+from assembly.linear.load import loads_with_weight
+from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import read
+from assembly.measurement.settled_clearance import (
+    with_clearances_at_rest,
+    with_clearances_taken_up,
+    without_joint_clearances,
+)
+
+_STEP = 1e-5  # [rad, m] for the derivative of what a device reads
+_ROUNDING = 1e-9  # of the largest moment or force
+_AT_ONCE = 50  # postures, so that memory stays small
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """What R readings of a robot with n frames answer to, see the head.
+
+    Attributes:
+        reading: (R, 6, 6) per unit platform screw [rad, m].
+        screws: (R, 6, n, 6) per unit screw at a frame, in its axes.
+        wrenches: (R, n, 6) [N m, N] through every joint as declared, in its axes.
+    """
+
+    reading: NDArray
+    screws: NDArray
+    wrenches: NDArray
+
+
+def responses(here: Conditions) -> Responses:
+    """Answers to small screws at all frames, play where it rests.
+
+    Args:
+        here: R situations of a robot.
+
+    Returns:
+        The answers; rows that do not close have zeros.
+    """
+    tight = _without_clearance(here)
+    distinct, which = in_groups(tight.postures)
+    R, n = len(tight), len(tight.robot.frames)
+    platform = np.zeros((len(distinct.transforms), 6, 6 * n))
+    wrenches = np.zeros((R, 6 * n))
+    forces = loads_with_weight(tight.postures, tight.load_at_origin(), tight.gravity)
+    errors = tight.errors.reshape(R, -1)
+    for begin in range(0, len(platform), _AT_ONCE):
+        some = slice(begin, begin + _AT_ONCE)
+        flexible = flexibility(_some(distinct, some))
+        platform[some] = flexible.platform_of(np.eye(6 * n))
+        rows = np.flatnonzero((which >= begin) & (which < begin + _AT_ONCE))
+        part = replace(forces, body=forces.body[rows], joint=forces.joint[rows])
+        solved = flexible.solve(which[rows] - begin, errors[rows], part)
+        wrenches[rows] = solved.joint_wrenches
+    D = _reading(tight)
+    screws = np.einsum("rij,rjk->rik", D, platform[which])
+    good = np.isfinite(screws).all(axis=(1, 2)) & np.isfinite(wrenches).all(axis=1)
+    screws[~good], wrenches[~good] = 0.0, 0.0
+    # moments in struts between ball joints are rounding
+    wrenches[np.abs(wrenches) < _ROUNDING * np.abs(wrenches).max(initial=0.0)] = 0.0
+    return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
+
+
+def _without_clearance(here: Conditions) -> Conditions:
+    """The same situations with play where it rests."""
+    if not virtual_joints(here.robot).cones.shape[1]:
+        return here
+    if here.rest is not None:
+        return with_clearances_at_rest(here)
+    if not here.robot.closures:
+        return with_clearances_taken_up(here)[0]
+    return replace(here, robot=without_joint_clearances(here.robot))
+
+
+def _some(postures: Posture, rows: slice) -> Posture:
+    """A few of many postures."""
+    return replace(
+        postures,
+        coordinates=postures.coordinates[rows],
+        transforms=postures.transforms[rows],
+    )
+
+
+def _reading(here: Conditions) -> NDArray:
+    """(R, 6, 6) change of what is read per unit platform screw."""
+    D = np.zeros((len(here), 6, 6))
+    for k in range(6):
+        screw = np.zeros((len(here), 6))
+        screw[:, k] = _STEP
+        D[:, :, k] = (read(here, screw) - read(here, -screw)) / (2 * _STEP)
+    return D

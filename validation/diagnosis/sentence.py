@@ -1,0 +1,123 @@
+"""What a diagnosis says, in sentences."""
+
+import math
+
+from numpy.typing import NDArray
+
+from assembly.effects.functions import columns_of, parameters_of
+from assembly.model.function import Function
+from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.teaching import functions_of
+from validation.diagnosis.verdict import Calibration
+
+WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
+
+
+def sentence(found: Diagnosis) -> str:
+    """What may be said, and no more."""
+    where = _judged_on(found)
+    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
+    if found.verdict == "none_needed":
+        return (
+            "The declared model is enough: the residual is noise as far as this design "
+            f"can tell ({found.before.normalised:.2f} sigma on {where})."
+        )
+    if found.verdict == "explained":
+        small_ones = [WORDS[term.name] for term in found.behind.terms]
+        names = " and ".join([*found.claimed, *small_ones])
+        return (
+            f"The declared model lacks {names}; {kept}, {found.after.normalised:.2f} "
+            "after (1 is noise)."
+        )
+    if found.verdict == "learned":
+        names = " and ".join([*found.claimed, *titles(found)][:6])
+        return (
+            f"The library lacks what was learned: {names}; {kept}, "
+            f"{found.after.normalised:.2f} after (1 is noise)."
+        )
+    if found.verdict == "ambiguous":
+        sets = " or ".join(
+            " + ".join(names) or "nothing" for names, _ in found.alternatives[:4]
+        )
+        return f"This design cannot tell which effect it is: {sets}; {kept}."
+    seen = ", ".join(t.against for t in found.trends[:3]) or "nothing that was recorded"
+    return (
+        "No effect of the library explains the residual: at best "
+        f"{found.lack.rms:.2f} sigma are left, which vary with {seen}; {kept}, "
+        f"{found.after.normalised:.2f} with what was found."
+    )
+
+
+def titles(found: Diagnosis) -> list[str]:
+    """Where every learned function acts, and of what."""
+    every = functions_of(found.campaign, found.model)
+    return [function.title for functions in every for function in functions]
+
+
+def _judged_on(found: Diagnosis) -> str:
+    """Which rows the errors before and after are of."""
+    aside = ~found.split.fitted
+    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
+
+
+def calibration_text(tally: Calibration) -> str:
+    """How often the method is right on this design, in words."""
+
+    def counts(said: dict[str, int]) -> str:
+        return ", ".join(f"{name} {n}" for name, n in sorted(said.items()))
+
+    named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
+    return (
+        f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
+        f"{counts(tally.without)}; with what was found {counts(tally.with_found)}"
+        f"{named}; false claims {100 * tally.false_claims:.1f} %"
+    )
+
+
+def noise_text(factor: NDArray) -> str:
+    """That repeats were believed rather than the sigma stated."""
+    parts = {"rotations": factor[0], "positions": factor[3]}
+    said = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
+    return f"repeats scatter more than the sigma stated, which was taken {said}"
+
+
+def open_text(open_: NDArray) -> str:
+    """In which rows play leaves the pose free, and what is then predicted.
+
+    Args:
+        open_: (R,) bool, by row.
+
+    Returns:
+        One line.
+    """
+    return (
+        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
+        "(marked open): of the poses of least energy one is predicted there, in a "
+        "closed chain the nearest to nominal, in an open one that of play in the middle"
+    )
+
+
+def formula(function: Function) -> str:
+    """A function in words, by component: numbers times what they multiply."""
+    name = function.variables[0].rpartition(".")[2]
+    told = []
+    for component in function.components:
+        numbers = parameters_of(function, component)
+        terms = [
+            f"{numbers[key]:.4g} {_column_text(function.form, key, name)}".rstrip()
+            for key in columns_of(function, component)
+        ]
+        told.append(f"{component} = {' + '.join(terms)}")
+    times = " (times the wrench there)" if function.kind == "compliance" else ""
+    return "; ".join(told) + times
+
+
+def _column_text(form: str, key: str, name: str) -> str:
+    """What a column of a form is, in words."""
+    head, _, word = key.rpartition(".")
+    if form == "powers":
+        return {"0": "", "1": name}.get(key, f"{name}^{key}")
+    if form == "waves":
+        return f"{'sin' if word == 'sine' else 'cos'}({head} {name})"
+    return f"{form}.{key}({name})"

@@ -1,0 +1,195 @@
+"""Terms of many small unknowns that every machine has: geometric errors and springs.
+
+Nobody makes a frame exactly where it was drawn, and nothing is rigid.  Each of these
+unknowns has a Gaussian prior about what is declared: from the frame's ``tolerance``, or
+of one size for all rotations and one for all translations that the readings are asked
+for (:mod:`validation.diagnosis.evidence`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.measurement.conditions import Conditions
+from assembly.model.links import in_series
+from assembly.model.robot import Robot
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.responses import Responses
+
+GEOMETRY, SPRINGS = "geometry", "springs"
+KINDS = ("rotation", "translation")
+
+
+@dataclass(frozen=True, eq=False)
+class SmallTerm:
+    """k small unknowns of one kind and how the readings answer to them.
+
+    Attributes:
+        name: ``"geometry"`` or ``"springs"``.
+        frame: (k,) row of the frame in the campaign's robot.
+        axis: (k,) component of the screw there, 0 to 5.
+        columns: (N, k) change of the whitened readings per unknown.
+        given: (k,) standard deviation of the prior, NaN where it is asked for.
+        lower: the unknowns' lower bound: springs only add compliance.
+        sure: whether it is there whatever the readings say.
+    """
+
+    name: str
+    frame: NDArray
+    axis: NDArray
+    columns: NDArray
+    given: NDArray
+    lower: float
+    sure: bool = False
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @property
+    def group(self) -> NDArray:
+        """(k,) 0 for rotations, 1 for translations, -1 where the prior is given."""
+        return np.where(np.isfinite(self.given), -1, self.axis // 3)
+
+    def take(
+        self, unknowns: NDArray, rows: NDArray | slice = slice(None)
+    ) -> "SmallTerm":
+        """Some of the unknowns, in some of the cells.
+
+        Args:
+            unknowns: mask (k,) or numbers.
+            rows: of the whitened readings.
+
+        Returns:
+            The smaller term.
+        """
+        return replace(
+            self, frame=self.frame[unknowns], axis=self.axis[unknowns],
+            columns=self.columns[rows][:, unknowns], given=self.given[unknowns],
+        )  # fmt: skip
+
+
+def small_terms(
+    campaign: Campaign, here: Conditions, answers: Responses
+) -> list[SmallTerm]:
+    """Geometry and springs of a campaign's robot.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        here: its conditions as declared.
+        answers: of the readings there.
+
+    Returns:
+        Terms whose unknowns show in the readings; none of a kind that does not.
+    """
+    frames = campaign.robot.frames
+    own = [here.robot.index(frame.name) for frame in frames]
+    screws = answers.screws[:, :, own]
+    given = np.array([
+        np.full(6, np.nan) if frame.tolerance is None else frame.tolerance
+        for frame in frames
+    ])
+    geometry = _term(campaign, GEOMETRY, screws, given, -np.inf)
+    bent = screws * answers.wrenches[:, None, own]
+    # what closures meet at, and the platform, have no spring of their own
+    bent[:, :, [not _may_give(campaign.robot, f.name) for f in frames]] = 0.0
+    springs = _term(campaign, SPRINGS, bent, np.full((len(frames), 6), np.nan), 0.0)
+    return [term for term in (geometry, springs) if len(term)]
+
+
+def _may_give(robot: Robot, name: str) -> bool:
+    """Whether a frame may have a joint stiffness."""
+    return name != robot.platform and all(name not in pair for pair in robot.closures)
+
+
+def _term(
+    campaign: Campaign, name: str, changes: NDArray, given: NDArray, lower: float
+) -> SmallTerm:
+    """The unknowns of changes (R, 6, n, 6) that show at all."""
+    whitened = changes[campaign.cells] / campaign.sigma[campaign.cells][:, None, None]
+    count = whitened.shape[1]
+    columns = whitened.reshape(len(whitened), 6 * count)
+    size = np.linalg.norm(columns, axis=0)
+    axis = np.tile(np.arange(6), count)
+    largest = np.array([size[axis // 3 == kind].max(initial=0.0) for kind in (0, 1)])
+    known = given.reshape(-1)
+    # a tolerance of zero says that a direction is exact
+    shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
+    frame = np.repeat(np.arange(count), 6)
+    return SmallTerm(
+        name, frame[shown], axis[shown], columns[:, shown], known[shown], lower,
+        bool(np.isfinite(known[shown]).any()),
+    )  # fmt: skip
+
+
+def added(
+    campaign: Campaign, answers: Responses, here: Conditions,
+    terms: Sequence[SmallTerm], values: Sequence[NDArray],
+    changes: Mapping[str, NDArray],
+) -> NDArray:  # fmt: skip
+    """What small unknowns add to the readings of any rows.
+
+    Args:
+        campaign: of R rows.
+        answers: of its readings.
+        here: its conditions.
+        terms: found on these rows or on others of the same robot.
+        values: (k,) of each term.
+        changes: (R, 6, k) of the readings per unknown of other terms, by their names.
+
+    Returns:
+        (R, 6) [rad, m].
+    """
+    total = np.zeros((len(here), 6))
+    own = np.array([here.robot.index(frame.name) for frame in campaign.robot.frames])
+    for term, x in zip(terms, values, strict=True):
+        if term.name in changes:
+            total += changes[term.name] @ x
+            continue
+        rows = own[term.frame]
+        amount = np.broadcast_to(x, (len(here), len(x)))
+        if term.name == SPRINGS:
+            amount = amount * answers.wrenches[:, rows, term.axis]
+        total += np.einsum("rik,rk->ri", answers.screws[:, :, rows, term.axis], amount)
+    return total
+
+
+def screws_of(
+    campaign: Campaign, terms: Sequence[SmallTerm], values: Sequence[NDArray]
+) -> NDArray:
+    """(n, 6) [rad, m] geometric errors of all frames among small unknowns."""
+    errors = np.zeros((len(campaign.robot.frames), 6))
+    for term, x in zip(terms, values, strict=True):
+        if term.name == GEOMETRY:
+            errors[term.frame, term.axis] = x
+    return errors
+
+
+def with_small(
+    robot: Robot, terms: Sequence[SmallTerm], values: Sequence[NDArray]
+) -> Robot:
+    """A robot with the values of small terms built in.
+
+    Args:
+        robot: as declared.
+        terms: of its campaign; others than geometry and springs are passed over.
+        values: (k,) of each term.
+
+    Returns:
+        The robot, its geometric errors larger by the one and its joints softer, in
+        series with what is declared, by the other.
+    """
+    frames = list(robot.frames)
+    for term, x in zip(terms, values, strict=True):
+        if term.name not in {GEOMETRY, SPRINGS}:
+            continue
+        for i, axis, value in zip(term.frame, term.axis, x, strict=True):
+            frame = frames[i]
+            if term.name == GEOMETRY:
+                error = frame.geometric_error + value * np.eye(6)[axis]
+                frames[i] = replace(frame, geometric_error=error)
+            elif value > 0.0:
+                K = in_series(frame.joint_stiffness, int(axis), float(value))
+                frames[i] = replace(frame, joint_stiffness=K)
+    return replace(robot, frames=tuple(frames))

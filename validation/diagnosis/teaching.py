@@ -1,0 +1,123 @@
+"""Functions learned beside the library's best set, or instead of it.
+
+What the library leaves is searched twice: after its best set, and from the declared
+machine as if there were no library.  The simpler story of both is kept, if it foretells
+what was kept aside better than the library alone.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.measurement.conditions import Conditions
+from assembly.model.function import Function
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.candidates import Answers
+from validation.diagnosis.evidence import background
+from validation.diagnosis.kept_aside import Model
+from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
+from validation.diagnosis.learning import Learned, learn, term_name
+from validation.diagnosis.refit import refit, with_play_held
+from validation.diagnosis.registration import device_frame
+from validation.diagnosis.responses import responses
+from validation.diagnosis.selection import Selection, Update
+from validation.diagnosis.signatures import whiten
+
+_ERROR = 1.0  # standard errors by which rows kept aside must be foretold better
+
+
+def taught(
+    campaign: Campaign,
+    here: Conditions,
+    used: NDArray,
+    found: Selection,
+    update: Update,
+) -> tuple[Selection, tuple[Learned, ...]]:
+    """Learn what the library leaves, where that is more than noise.
+
+    Args:
+        campaign: of R rows.
+        here: conditions of all rows, as declared and registered.
+        used: mask (R,) of the rows fitted.
+        found: what the library says of them.
+        update: told what is done, how much of it and of how much.
+
+    Returns:
+        The selection with the functions behind its effects, or what was given, and the
+        functions.
+    """
+    fitting, some = campaign.take(used), here.take(used)
+    left = found.behind.left(found.fit.residual)
+    unknowns = found.unknowns + round(found.behind.unknowns)
+    if lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT:
+        return found, ()
+    answers = responses(here)
+    places = Answers(here, campaign.robot, answers)
+    device = [device_frame(some)] if campaign.registration == "unknown" else []
+    begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
+    alone = refit(fitting, some, device, begin)
+    stories = [(alone, found.columns[:, : len(begin)])]
+    if found.sets[0].members and found.sets[0].rank:
+        raw = found.behind.raw(found.fit.residual)
+        stories.append((replace(found.fit, residual=raw), found.columns))
+    lessons = [
+        learn(campaign, used, here, places, found.terms, fit.residual, columns, update)
+        for fit, columns in stories
+    ]
+    best = min(range(len(stories)), key=lambda k: lessons[k].cost)
+    lesson, fit = lessons[best], stories[best][0]
+    if not lesson.learned:
+        return found, ()
+    behind = background(lesson.terms, lesson.prior)
+    fit = refit(
+        fitting, with_play_held(some, fit), fit.hypotheses, fit.values, behind=behind
+    )
+    story = replace(found, fit=fit, behind=behind, terms=lesson.terms)
+    if best == 0:
+        nothing = found.screen.fit(())
+        story = replace(story, sets=[nothing, *found.sets], unknowns=len(begin))
+    held = with_play_held(here, found.fit)
+    before = Model(held, answers, found.fit, found.behind)
+    after = Model(here, answers, fit, behind, lesson.learned)
+    if not _foretells(campaign, ~used, before, after):
+        return found, ()
+    return story, lesson.learned
+
+
+def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -> bool:
+    """Whether rows kept aside are foretold better, by more than its own uncertainty."""
+    if not held.any():
+        return True
+    judged = campaign.take(held)
+    squares = [
+        whiten(judged, model.residual(campaign)[held]) ** 2 for model in (before, after)
+    ]
+    rows = np.nonzero(judged.cells)[0]
+    where = judged.configuration[rows]
+    gains = np.array([
+        float((squares[0] - squares[1])[where == name].sum()) for name in set(where)
+    ])
+    error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
+    return bool(gains.sum() > _ERROR * error)
+
+
+def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
+    """The functions of a robot file that were learned, with their numbers.
+
+    Args:
+        campaign: whose robot.
+        model: with what was learned.
+
+    Returns:
+        For every effect learned one function, or several of one kind.
+    """
+    behind = model.behind
+    places = Answers(model.here, campaign.robot, model.answers)
+    values = behind.values(model.fit.residual)
+    everyone = zip(behind.terms, values, behind.deviations(), strict=True)
+    known = {term.name: (x, std) for term, x, std in everyone}
+    return [
+        places.fitted(one.candidate, *known[term_name(k + 1)])
+        for k, one in enumerate(model.learned)
+    ]

@@ -1,0 +1,108 @@
+"""A diagnosis for a terminal."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.results import LISTED, effects, learned, small, steps
+from validation.diagnosis.sentence import (
+    WORDS,
+    calibration_text,
+    noise_text,
+    open_text,
+    sentence,
+)
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.verdict import Calibration
+
+
+def text(found: Diagnosis, tally: Calibration | None = None) -> str:
+    """The diagnosis for a terminal."""
+    lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
+    for effect in effects(found) if found.verdict in LISTED else []:
+        lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
+        for p in effect["parameters"]:
+            lines.append(
+                f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
+            )
+    for name in (GEOMETRY, SPRINGS):
+        lines += _small_text(small(found, name), name)
+    for one in learned(found):
+        where = f"{one['where']} {', '.join(one['components'])}"
+        lines.append(f"learned: {where} of {', '.join(one['variables'])}")
+        told = one["formula"]
+        lines.append(f"  {told if len(told) < 160 else told[:157] + '...'}")
+        if one["equivalent_places"]:
+            lines.append(f"  {len(one['equivalent_places'])} other places do as well")
+    lines += ["", "sets of effects, by probability:"]
+    for names, p in found.alternatives:
+        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
+    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
+    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
+    for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
+        row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
+        if name == "normalised":
+            row[2] = 1.0
+        shown = "".join(
+            f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
+        )
+        lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
+    far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
+    if (found.outliers & ~found.split.fitted).any():
+        cut = [f"{e.normalised:>12.3g}" for e in found.trimmed]
+        lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
+    lines += ["", *_ladder_text(found), *found.remarks]
+    if np.any(found.noise_factor > 1):
+        lines += ["", noise_text(found.noise_factor)]
+    if far:
+        lines += ["", f"left out as outliers: {', '.join(far)}"]
+    if found.open.any():
+        lines += ["", open_text(found.open)]
+    for trend in found.trends:
+        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
+    if found.next is not None:
+        where = ", ".join(f"{k}={v:.4g}" for k, v in found.next.configuration.items())
+        covariates = "".join(f", {k} {v:g}" for k, v in found.next.covariates.items())
+        lines += [
+            "",
+            f"measure next: {where}; load {load_text(found.next.load)}{covariates}",
+            f"  {found.next.why}",
+        ]
+    if tally is not None:
+        lines += ["", calibration_text(tally)]
+    return "\n".join(lines)
+
+
+def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
+    """Geometry or springs in a few lines."""
+    if one is None:
+        return []
+    sizes = ", ".join(
+        f"{size:.2g} {one['unit'][kind]}" for kind, size in one["scale"].items()
+    )
+    frames = sorted(one["frames"], key=lambda f: -f["identifiable"])[:6]
+    where = ", ".join(f"{f['frame']} {f['identifiable']:.1f}" for f in frames)
+    return [
+        f"{WORDS[name]}  (size {sizes or 'as the tolerances say'})",
+        f"  {one['identifiable']:.1f} of {one['unknowns']} known: {where}",
+    ]
+
+
+def _ladder_text(found: Diagnosis) -> list[str]:
+    """What every step bought, on the rows kept aside."""
+    rows = steps(found)
+    unit = rows[-1]["unit"]
+    head = f"{'step':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'bought':>10}"
+    lines = [head]
+    last = math.nan
+    for row in rows:
+        rms, sigma = row["kept_aside_rms"], row["kept_aside_sigma"]
+        bought = f"{last - rms:>10.3g}" if math.isfinite(last) else f"{'':>10}"
+        lines.append(
+            f"{row['term']:<20}{row['unknowns']:>10.0f}{rms:>12.3g}{sigma:>10.3g}{bought}"
+        )
+        last = rms
+    return lines
