@@ -1,8 +1,8 @@
 """What happened to a machine before a row was measured: rows in the order measured.
 
 Some effects remember: what warms slowly lags behind the temperature, clearance is taken
-up on the side from which a joint came.  They depend on the rows before, those that a fit
-sets aside among them.  The value of a row is taken to have been there since the row
+up on the side from which a joint came.  They depend on the rows before, those that a
+fit sets aside among them.  The value of a row is taken to have been there since the row
 before, or since time 0.
 
 Sources:
