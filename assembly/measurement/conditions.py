@@ -234,7 +234,8 @@ def as_declared(
     count = len(T)
 
     def rows(values: ArrayLike, *shape: int) -> NDArray:
-        return np.array(np.broadcast_to(values, (count, *shape)), dtype=float)
+        filled = np.broadcast_to(values, (count, *shape))
+        return np.array(filled, dtype=float, order="C")
 
     return Conditions(
         robot=robot,

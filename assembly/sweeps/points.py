@@ -195,7 +195,7 @@ def _solve_reached(
     _note_singularities(question, robot, T, solved, rows)
     conditions = point_conditions(question, robot, postures, errors)
     T, mismatch = conditions.transforms, conditions.mismatch
-    if robot.effects:
+    if robot.has_effects:
         robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     failed: dict[int, str] = {}

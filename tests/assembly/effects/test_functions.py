@@ -68,7 +68,7 @@ def test_a_screw_of_the_base_carries_the_robot():
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
     shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
     shift = replace(shift, variables=("cov.temperature",))
-    there = here(arm(), q=0.0, temperature=5.0, covariates={"tilt": 1e-5})
+    there = here(arm(), q=0.0, temperature=5.0, tilt=1e-5)
     expected = [0, 1e-5, 0, 5e-6, 0, -1e-5 * L]
     assert seen(there, turn, shift)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
 
@@ -159,7 +159,9 @@ def campaign_of(times, **columns):
         coordinates=np.array([p.coordinates for p in postures]),
         transforms=np.array([p.transforms for p in postures]),
     )
-    return with_history(as_declared(rows, time=times, **columns))
+    session = columns.pop("session", None)
+    known = {"time": times, **columns}
+    return with_history(as_declared(rows, covariates=known, session=session))
 
 
 def test_a_lag_settles_exponentially():

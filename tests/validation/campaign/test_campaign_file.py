@@ -298,7 +298,7 @@ def test_the_files_of_the_docs_are_read(tmp_path):
     """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
-    assert len(blocks) == 2
+    assert len(blocks) == 3
     (tmp_path / "campaign.toml").write_text("".join(blocks), encoding="utf-8")
     (tmp_path / "measurements.csv").write_text(
         "id;pose.tx;pose.tz;load.fx;meas.tx;meas.ry;cov.time\n"
