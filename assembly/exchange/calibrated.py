@@ -30,7 +30,7 @@ def with_calibration(home: Posture) -> Robot:
     """
     robot = home.robot
     constant = {k: v for k, v in robot.effects.items() if k in CONSTANT}
-    plain = replace(home, robot=replace(robot, effects={}))
+    plain = replace(home, robot=robot.without_effects())
     errors = apply_effects(as_declared(plain, None), constant).errors[0]
     frames = []
     for frame, T, error in zip(
@@ -44,7 +44,7 @@ def with_calibration(home: Posture) -> Robot:
                 frame, translation=T[:3, 3], rotation=turn, geometric_error=np.zeros(6)
             )
         frames.append(frame)
-    return replace(robot, frames=tuple(frames), effects={})
+    return replace(robot.without_effects(), frames=tuple(frames))
 
 
 def not_rigid(robot: Robot) -> tuple[str, ...]:
@@ -59,6 +59,10 @@ def not_rigid(robot: Robot) -> tuple[str, ...]:
             for f in frames
             if not isinstance(f.link, BeamLink | MatrixLink | None)
         ],
-        "effects": [name for name in robot.effects if name not in CONSTANT],
+        "effects": [
+            *(name for name in robot.effects if name not in CONSTANT),
+            *(f"those of session {session}" for session in robot.session_effects),
+            *(function.title for function in robot.functions),
+        ],
     }
     return tuple(line for what, names in kinds.items() for line in counted(what, names))

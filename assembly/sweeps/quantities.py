@@ -25,6 +25,9 @@ STATUSES = (
 TEXTS = ("reason", "near_singularity")
 
 
+_READING = ("registration", "drift")  # effects that change readings, not screws
+
+
 @dataclass(frozen=True, eq=False)
 class Question:
     """The quantities asked for at every point; sent to each worker once.
@@ -70,7 +73,11 @@ class Question:
     @property
     def reads_otherwise(self) -> bool:
         """Whether readings of a measuring device differ from the screw."""
-        return any(name in self.robot.effects for name in ("registration", "drift"))
+        robot = self.robot
+        effects = [robot.effects, *robot.session_effects.values()]
+        return any(name in every for every in effects for name in _READING) or any(
+            function.where == "reading" for function in robot.functions
+        )
 
 
 @dataclass(frozen=True)
