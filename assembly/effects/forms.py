@@ -122,7 +122,8 @@ def _spline(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
     answer = np.ones((len(inputs[0]), len(names)))
     for k, x in enumerate(inputs):
         ends = [f"{end}.{k + 1}" if len(inputs) > 1 else end for end in _ENDS]
-        knots = np.linspace(*(shapes[end] for end in ends), int(indices[:, k].max()))
+        first, last = (shapes[end] for end in ends)
+        knots = np.linspace(first, last, int(indices[:, k].max()))
         answer *= natural_spline(knots, x)[:, indices[:, k] - 1]
     return answer
 
@@ -188,9 +189,16 @@ def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
 
 
 _WAVES = ("sine", "cosine")
-_MEMORY = {"shapes": {"time_constant": True}, "indices": None,
-           "words": ("gain", "start"), "basis": _remembered,
-           "remembers": True}  # fmt: skip
+
+
+def _memory(name: str, summary: str) -> Form:
+    """A form that lags behind its variable."""
+    return Form(
+        name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
+        remembers=True,
+    )  # fmt: skip
+
+
 FORMS: dict[str, Form] = {
     form.name: form
     for form in (
@@ -199,8 +207,8 @@ FORMS: dict[str, Form] = {
              (-_MOST, _MOST), _WAVES, _waves),
         Form("spline", "a smooth curve through values at even knots", 2,
              dict.fromkeys(_ENDS, True), (1, _MOST), ("",), _spline),
-        Form("lag", "what follows slowly", 1, **_MEMORY),
-        Form("creep", "what yields slowly", 1, **_MEMORY),
+        _memory("lag", "what follows slowly"),
+        _memory("creep", "what yields slowly"),
         Form("step", "a jump", 1, {"at": True}, None, ("size",), _step),
         Form("slow_wave", "one slow wave", 1, {"period": True}, None, _WAVES,
              _slow_wave),

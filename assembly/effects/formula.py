@@ -65,8 +65,8 @@ def _check(node: ast.AST, depth: int) -> None:
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
-        case ast.Constant(value=value) if type(value) in (int, float):
-            if not abs(value) < 1e100:
+        case ast.Constant(value=int() | float() as x) if not isinstance(x, bool):
+            if not abs(x) < 1e100:
                 raise BadInput("found a number beyond 1e100 in the formula")
         case ast.Name():
             pass

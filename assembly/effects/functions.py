@@ -5,7 +5,7 @@ load.  One that depends on a wrench, as every compliance does, makes its place y
 it is solved together with the equilibrium (:mod:`assembly.measurement.yields`).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -157,9 +157,10 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
     """
     numbers = parameters_of(function, component)
     if function.form == FORMULA:
-        names = variable_names(function.variables)
-        known = {name: inputs[k] for name, k in names.items()}
-        answer = evaluate(_parsed(function.formula), {**numbers, **known})
+        aliases = variable_names(function.variables)
+        known = {name: np.asarray(number) for name, number in numbers.items()}
+        known |= {name: inputs[k] for name, k in aliases.items()}
+        answer = evaluate(_parsed(function.formula), known)
         return np.broadcast_to(answer, inputs[0].shape)
     names = columns_of(function, component)
     columns = FORMS[function.form].basis(names, inputs, numbers)
@@ -244,8 +245,8 @@ def _yielding(
     here: Conditions, function: Function, where: str, inputs: NDArray, acts: NDArray
 ) -> Conditions:
     """A place that gives under what goes through it."""
-    slots = {}  # of the inputs, by number of the wrench that goes there
-    through = []
+    slots: dict[int, int] = {}  # of the inputs, by the number of its wrench
+    through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
         if name.startswith("wrench."):
             frame, _, component = name.removeprefix("wrench.").rpartition(".")
@@ -287,9 +288,12 @@ def in_session_alone(here: Conditions, changed: Conditions, session: str) -> Con
         The mixture.
     """
     acts = in_session(here, session)[:, None]
-    mixed: Mapping[str, NDArray] = {
-        name: np.where(acts, getattr(changed, name), getattr(here, name))
-        for name in ("load", "gravity", "reading", "base", "tool")
-    }
+
+    def mixed(name: str) -> NDArray:
+        return np.where(acts, getattr(changed, name), getattr(here, name))
+
     errors = np.where(acts[:, :, None], changed.errors, here.errors)
-    return replace(here, errors=errors, **mixed)
+    return replace(
+        here, errors=errors, load=mixed("load"), gravity=mixed("gravity"),
+        reading=mixed("reading"), base=mixed("base"), tool=mixed("tool"),
+    )  # fmt: skip

@@ -6,8 +6,6 @@ from typing import Annotated
 
 import typer
 
-import forcefit.commands.statistics  # adds its commands
-import forcefit.commands.sweep  # likewise
 from forcefit.commands import assembly, stiffness, validation
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars

@@ -24,6 +24,8 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.progress import one_thread
+from forcefit.commands.statistics import statistics, tolerances
+from forcefit.commands.sweep import plot, sweep
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import (
     PIXELS,
@@ -250,3 +252,7 @@ def show(
     else:
         save_pixels(plotter.screenshot(return_img=True), output)
     plotter.close()
+
+
+for command in (statistics, tolerances, sweep, plot):
+    app.command()(command)

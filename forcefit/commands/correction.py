@@ -83,6 +83,10 @@ def compensate(
         Path | None,
         typer.Option(help="Also what is to be added to each drive, row by row (CSV)."),
     ] = None,
+    diagnosed: Annotated[
+        Path | None,
+        typer.Option(help="Answer of diagnose --json: the error to be expected."),
+    ] = None,
     as_read: Annotated[
         bool,
         typer.Option(
@@ -105,15 +109,31 @@ def compensate(
     check_writable(output, TABLE)
     if offsets is not None:
         check_writable(offsets, TABLE)
+    left = None if diagnosed is None else _left(diagnosed)
     found = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
+    table = tables.summary(found, left)
     write_text(tables.command_table(found), output)
     if offsets is not None:
         write_text(tables.offset_table(found), offsets)
-    write_json(tables.summary(found), json)
+    write_json(table, json)
     if json != "-":
-        print(tables.summary_text(found))
+        print(tables.summary_text(found, table))
     if any(found.reason):
         raise typer.Exit(1)
+
+
+def _left(path: Path) -> dict[str, float]:
+    """What a diagnosis left on rows kept aside, from its answer."""
+    from json import loads
+
+    from forcefit.inputs.table import read_text
+
+    try:
+        after = loads(read_text(path))["error"]["after"]
+        return {key: float(after[key] or 0.0) for key in ("position", "rotation")}
+    except (ValueError, KeyError, TypeError):
+        expected = "expected the answer of forcefit validation diagnose --json"
+        raise BadInput(f"{path}: found no error after; {expected}") from None
 
 
 def carry(

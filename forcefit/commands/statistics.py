@@ -1,7 +1,4 @@
-"""The commands ``forcefit assembly statistics`` and ``tolerances``.
-
-Importing this module adds them to the application.
-"""
+"""The commands ``forcefit assembly statistics`` and ``tolerances``."""
 
 import sys
 from collections.abc import Generator, Sequence
@@ -11,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JointOption,
@@ -36,7 +32,6 @@ PlayOption = Annotated[
 ]
 
 
-@app.command()
 def statistics(
     robot: RobotArgument,
     errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
@@ -149,7 +144,6 @@ def _interruptible(output: Path | None) -> Generator[None, None, None]:
         raise typer.Exit(130) from None
 
 
-@app.command()
 def tolerances(
     robot: RobotArgument,
     grid: Annotated[

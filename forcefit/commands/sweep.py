@@ -1,7 +1,4 @@
-"""The commands ``forcefit assembly sweep`` and ``plot``.
-
-Importing this module adds them to the application.
-"""
+"""The commands ``forcefit assembly sweep`` and ``plot``."""
 
 import sys
 from contextlib import ExitStack
@@ -10,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.assembly import app
 from forcefit.commands.options import (
     GravityOption,
     JsonOption,
@@ -26,7 +22,6 @@ from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
 
-@app.command()
 def sweep(
     robot: RobotArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
@@ -148,7 +143,6 @@ def sweep(
         print(summary_text(summary, data))
 
 
-@app.command()
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
     output: Annotated[

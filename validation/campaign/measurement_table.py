@@ -185,7 +185,9 @@ def _header(
 ) -> list[str]:
     """The first line, if every name in it is a column's."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
-    groups = {"pose": POSE, "load": LOAD, "meas": READING, "sigma": READING}
+    groups: dict[str, tuple[str, ...]] = {
+        "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
+    }  # fmt: skip
     for point in points:
         groups |= dict.fromkeys((f"meas.{point}", f"sigma.{point}"), READING[3:])
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]

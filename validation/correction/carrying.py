@@ -117,7 +117,7 @@ def carry(
     for session in campaign.sessions or (None,):
         of_it = np.ones(len(campaign), dtype=bool)
         if session is not None:
-            of_it = campaign.session == session
+            of_it = np.asarray(campaign.session == session)
         chosen = setup[of_it]
         which = f"session {quoted(session)}" if session is not None else campaign.name
         if not chosen.any() or chosen.all():

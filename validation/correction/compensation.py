@@ -128,11 +128,11 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     spread = deviation_spread(
         robot, lambda other: machine.conditions(replace(last, robot=other))
     )
-    at_limit = (q <= limits[0]) | (q >= limits[1])
+    at_limit = np.asarray((q <= limits[0]) | (q >= limits[1]))
     return Compensation(
         targets, tuple(robot.frames[i].name for i in driven), q,
         there.conditions.transforms, last.coordinates, before, there.error, spread,
-        at_limit.any(axis=1), reason,
+        np.asarray(at_limit.any(axis=1)), reason,
     )  # fmt: skip
 
 

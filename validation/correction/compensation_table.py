@@ -1,5 +1,6 @@
 """What was compensated, for controllers, machines and people."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,30 @@ def _text(found: Compensation, columns: dict[str, Any]) -> str:
     return csv_text(rows, list(columns))
 
 
-def summary(found: Compensation) -> dict[str, Any]:
-    """The same for machines: errors to be expected, and what stands in the way."""
+def summary(
+    found: Compensation, diagnosed: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """The same for machines: errors to be expected, and what stands in the way.
+
+    Args:
+        found: of any targets.
+        diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading that the
+            robot's diagnosis left on rows kept aside, if known.
+
+    Returns:
+        Plain values; ``expected`` is what the diagnosis left, as vectors of three, or
+        else by the spread that the file states, None where neither says anything.
+    """
     ids = found.targets.ids
+    spread = _sizes(found.spread)
+    expected: dict[str, float | None] = {"position": None, "rotation": None}
+    if diagnosed is not None:
+        expected = {
+            key: float(np.hypot(size or 0.0, np.sqrt(3.0) * diagnosed[key]))
+            for key, size in _sizes(found.after).items()
+        }
+    elif found.spread.any():
+        expected = _sizes(np.hypot(found.after, found.spread))
     return {
         "rows": len(ids),
         "drives": list(found.drives),
@@ -82,8 +104,8 @@ def summary(found: Compensation) -> dict[str, Any]:
             "unit": {"position": "m", "rotation": "rad"},
             "before": _sizes(found.before),
             "after": _sizes(found.after),
-            "spread": _sizes(found.spread),
-            "expected": _sizes(np.hypot(found.after, found.spread)),
+            "spread": spread,
+            "expected": expected,
         },
         "limited": [ids[i] for i in np.flatnonzero(found.limited)],
         "without_answer": [
@@ -103,9 +125,8 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
     return {"position": rms(error[:, 3:]), "rotation": rms(error[:, :3])}
 
 
-def summary_text(found: Compensation) -> str:
-    """The same for people."""
-    table = summary(found)
+def summary_text(found: Compensation, table: Mapping[str, Any]) -> str:
+    """The same for people, ``table`` being :func:`summary`'s."""
     lines = [f"{table['rows']} commands, drives {', '.join(found.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",
@@ -113,11 +134,18 @@ def summary_text(found: Compensation) -> str:
     }  # fmt: skip
     for key, words in says.items():
         size = table["error"][key]
+        if key == "spread" and not found.spread.any():
+            continue
         if size["position"] is not None:
             lines.append(
                 f"{words}: {1e6 * size['position']:.4g} um, "
                 f"{1e6 * size['rotation']:.4g} urad"
             )
+    if table["error"]["expected"]["position"] is None:
+        lines.append(
+            "to be expected: what the robot's diagnosis left (--diagnosed says it); "
+            "the file states no uncertainty"
+        )
     if table["limited"]:
         lines.append(f"at a joint's limit: {', '.join(table['limited'][:10])}")
     lines += [f"{row['id']}: {row['reason']}" for row in table["without_answer"][:10]]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class Foretold:
 
     __repr__, _repr_html_ = short_repr, html_table
 
-    def table(self) -> dict[str, object]:
+    def table(self) -> dict[str, Any]:
         """For machines."""
         position, rotation, sigma = self.error.tolist()
         return {
@@ -121,7 +122,9 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     Returns:
         A triple for each.
     """
-    points = [""] if commands.point is None else list(dict.fromkeys(commands.point))
+    points = [""]
+    if commands.point is not None:
+        points = list(dict.fromkeys(commands.point.tolist()))
     names = []
     for point in points:
         rows = np.ones(len(commands), dtype=bool)
@@ -131,7 +134,9 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
         if not commands.cells.any():
             taken = np.array([not point] * 3 + [True] * 3)
         at = f"meas.{point}" if point else "meas"
-        names += [(f"{at}.{READING[k]}", point, k) for k in np.flatnonzero(taken)]
+        names += [
+            (f"{at}.{READING[k]}", point, k) for k in np.flatnonzero(taken).tolist()
+        ]
     return names
 
 

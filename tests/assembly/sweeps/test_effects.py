@@ -8,6 +8,7 @@ import pytest
 from assembly.effects.acting import act
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
+from assembly.model.function import Function
 from assembly.robots import load_robot
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
@@ -79,6 +80,31 @@ def test_points_with_effects_are_those_of_one_posture(load):
         )
         plain = solve_assembly(replace(posture, robot=replace(robot, effects={})))
         assert abs(one.energy / plain.energy - 1) > 0.05
+
+
+@pytest.mark.parametrize("load", [None, [0.0, 0, 0, 30.0, 0, -50.0]])
+def test_functions_act_at_every_point(load):
+    """A screw of a joint, and with a load a compliance where the drive is."""
+    wave = Function("leg1.drive", ("rz",), ("q.leg1.drive",), "waves", {"2.sine": 3e-4})
+    soft = Function("leg2.drive", ("rz",), ("cov.tilt",), "powers", {"1": 1e-6},
+                    kind="compliance")  # fmt: skip
+    functions = (wave,) if load is None else (wave, soft)
+    robot = replace(irsbot2_with(NUMBERS["cases"][0]), functions=functions)
+    under = {} if load is None else {"tilt": 5.0}
+    data = swept(robot, GRID, under=under, load=load or (0.0,) * 6)
+    for tx in (-0.1, 0.1):
+        there = data.sel(tx=tx, tz=-0.45, method="nearest")
+        posture = place_robot(robot, pose={"tx": tx, "tz": -0.45})
+        acting = act(posture, load, covariates=under)
+        one = solve_assembly(acting.posture, acting.load)
+        size = np.abs(one.platform_screw).max()
+        assert there.platform_screw.values == pytest.approx(
+            one.platform_screw, abs=1e-3 * size
+        )
+        plain = replace(posture, robot=robot.without_effects())
+        other = solve_assembly(plain, load).platform_screw
+        change = (one.platform_screw - other)[3:]  # the rods keep it from turning
+        assert np.abs(change).max() > 0.02 * np.abs(other[3:]).max()
 
 
 def test_what_a_device_reads_stands_beside_the_pose():

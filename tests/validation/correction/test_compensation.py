@@ -47,7 +47,11 @@ def two_links(x, y, length):
 def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
     robot, table = written(tmp_path, LONGER + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     out, offsets = tmp_path / "out.csv", tmp_path / "offsets.csv"
-    options = ["--offsets", str(offsets), "--json", str(tmp_path / "j.json")]
+    left = tmp_path / "diagnosis.json"
+    after = {"position": 4e-5, "rotation": None}
+    left.write_text(json.dumps({"error": {"after": after}}))
+    options = ["--offsets", str(offsets), "--json", str(tmp_path / "j.json"),
+               "--diagnosed", str(left)]  # fmt: skip
     words = ["compensate", robot, table, "-o", str(out), *options]
     code, text, error = run("validation", *words)
     assert (code, error) == (0, "")
@@ -63,6 +67,7 @@ def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
     again = read_commands(out, load_robot(robot))
     assert again.ids == ("a", "b")
     found = json.loads((tmp_path / "j.json").read_text())["error"]
+    assert found["expected"]["position"] == pytest.approx(3**0.5 * 4e-5)
     assert found["before"]["position"] > 8e-3 > 1e-8 > found["after"]["position"]
 
 
