@@ -99,29 +99,31 @@ class Candidate:
 class Answers:
     """How readings answer to components at any place, and the variables of the rows."""
 
-    def __init__(self, here: Conditions, robot: Robot, answers: Responses) -> None:
+    def __init__(
+        self, conditions: Conditions, robot: Robot, answers: Responses
+    ) -> None:
         """Keep what candidates are made of.
 
         Args:
-            here: R situations as declared.
+            conditions: R situations as declared.
             robot: the campaign's.
             answers: of the readings there.
         """
-        self.here, self.robot, self._answers = here, robot, answers
+        self.conditions, self.robot, self._answers = conditions, robot, answers
         self.basis = lru_cache(maxsize=None)(self._basis)
 
     def answer(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         axis = AXES.index(component)
         if where == "reading":
-            return np.broadcast_to(np.eye(6)[axis], (len(self.here), 6))
+            return np.broadcast_to(np.eye(6)[axis], (len(self.conditions), 6))
         if where == "base":
-            screw = np.zeros((len(self.here), 6))
+            screw = np.zeros((len(self.conditions), 6))
             screw[:, axis] = 1.0
-            origin = self.here.postures.platform[:, :3, 3]
+            origin = self.conditions.postures.platform[:, :3, 3]
             screw[:, 3:] += np.cross(screw[:, :3], origin)
             return np.einsum("rij,rj->ri", self._answers.reading, screw)
-        row = self.here.robot.index(where)
+        row = self.conditions.robot.index(where)
         answer = self._answers.screws[:, :, row, axis]
         if kind == "compliance":
             return answer * self._answers.wrenches[:, row, axis, None]
@@ -131,7 +133,7 @@ class Answers:
         """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
         numbers = dict.fromkeys(shape.names, 0.0) | dict(shape.given)
         function = Function("reading", ("tx",), (name,), shape.form, numbers)
-        raw = np.nan_to_num(basis(self.here, function, shape.names))
+        raw = np.nan_to_num(basis(self.conditions, function, shape.names))
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -178,7 +180,7 @@ class Answers:
         Returns:
             One function for each of its parts.
         """
-        found, at = [], 0
+        functions, at = [], 0
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variable, one.shape)
             numbers, spread = dict(one.shape.given), {}
@@ -191,27 +193,27 @@ class Answers:
                 for name, v, s in zip(one.shape.names, values, stds, strict=True):
                     key = name if alone else f"{component}.{name}"
                     numbers[key], spread[key] = float(v), float(s)
-            found.append(replace(function, parameters=numbers, std=spread))
-        return found
+            functions.append(replace(function, parameters=numbers, std=spread))
+        return functions
 
 
-def variables_of(here: Conditions) -> list[str]:
+def variables_of(conditions: Conditions) -> list[str]:
     """Public names of what was varied, and is known in every row.
 
     Args:
-        here: R situations.
+        conditions: R situations.
 
     Returns:
         Coordinates of drives, loads and their size, positions, covariates.
     """
-    names = [f"q.{name}" for name in drives(here.robot)]
+    names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
     names += ["load.force", *(f"position.{axis}" for axis in "xyz")]
     names += ["cov.temperature", "time", "approach"]
-    names += [f"cov.{name}" for name in here.covariates]
+    names += [f"cov.{name}" for name in conditions.covariates]
     varied = []
     for name in names:
-        values = variable(here, name)
+        values = variable(conditions, name)
         if np.isfinite(values).all() and np.ptp(values) > 0:
             varied.append(name)
     return varied
@@ -280,9 +282,9 @@ def first_shapes(robot: Robot, name: str) -> list[Shape]:
     return [_powers(0, 1, 2, 3)]
 
 
-def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
+def all_shapes(conditions: Conditions, name: str, kind: str) -> list[Shape]:
     """Every form that is tried where a variable counts, those with a name first."""
-    x = variable(here, name)
+    x = variable(conditions, name)
     low, high = float(x.min()), float(x.max())
     if name == "approach":
         return [_powers(1)]
@@ -290,10 +292,10 @@ def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
               _powers(0, 1, 2, 3)]  # fmt: skip
     if name.startswith("q."):
         shapes.append(REVERSAL)
-    if is_angle(here.robot, name):
+    if is_angle(conditions.robot, name):
         shapes += [_waves(k) for k in range(1, 9)]
         shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]
-        if len(here) >= MANY:
+        if len(conditions) >= MANY:
             shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
         if kind == "compliance":
             shapes += [
@@ -312,10 +314,10 @@ def all_shapes(here: Conditions, name: str, kind: str) -> list[Shape]:
         ]
     if (
         name.startswith("cov.")
-        and np.isfinite(here.time).all()
-        and np.ptp(here.time) > 0
+        and np.isfinite(conditions.time).all()
+        and np.ptp(conditions.time) > 0
     ):
-        span = float(np.ptp(here.time))
+        span = float(np.ptp(conditions.time))
         shapes += [
             Shape("lag", ("gain", "start"), (("time_constant", part * span),))
             for part in (0.02, 0.05, 0.1, 0.2, 0.5)

@@ -172,32 +172,34 @@ def diagnose(
     declared = conditions_of(campaign)
     finite = finite or declared.exact
     complete = with_finite_motions if finite else with_second_order
-    declared = here = complete(declared)
+    declared = conditions = complete(declared)
     if campaign.registration == "unknown":
-        here = register(campaign.take(parts.fitted), here)
+        conditions = register(campaign.take(parts.fitted), conditions)
     impossible = impossible_rows(campaign)
     outliers = impossible.copy()
     factor, slack = np.ones(6), 1.0
     for _ in range(_PASSES):
         used = parts.fitted & ~outliers
         fitting = campaign.take(used)
-        found = select(fitting, here.take(used), update, finite=finite)
-        left = found.behind.left(found.fit.residual)
+        selection = select(fitting, conditions.take(used), update, finite=finite)
+        left = selection.behind.left(selection.fit.residual)
         far = np.zeros_like(outliers)
         called = int((outliers & ~impossible).sum())
         most = max(0, len(campaign) // _BLUNDERS - called)
         far[used] = outlying(fitting, left, most)
-        bent = _with_errors(campaign, here, used, found, complete)
+        bent = _with_errors(campaign, conditions, used, selection, complete)
         if far.any():
             outliers |= far
             continue
-        if bent is not here:
-            here = bent
+        if bent is not conditions:
+            conditions = bent
             continue
-        found, learned = taught(campaign, here, used, found, update)
-        left = found.behind.left(found.fit.residual)
+        selection, learned = taught(campaign, conditions, used, selection, update)
+        left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
-        lack = lack_of_fit(fitting, left, found.unknowns + round(found.behind.unknowns))
+        lack = lack_of_fit(
+            fitting, left, selection.unknowns + round(selection.behind.unknowns)
+        )
         if np.any(larger > 1.0):
             factor = factor * larger
         elif slack == 1.0 and lack.significant and lack.rms > _LOOSE:
@@ -210,11 +212,11 @@ def diagnose(
     return _judge(
         campaign,
         declared,
-        here,
+        conditions,
         parts,
         outliers,
         (factor, slack),
-        found,
+        selection,
         learned,
         finite,
     )
@@ -227,84 +229,91 @@ def _in_sigmas(rung: Rung, slack: float) -> Rung:
 
 
 def _with_errors(
-    campaign: Campaign, here: Conditions, used: NDArray, found: Selection,
+    campaign: Campaign, conditions: Conditions, used: NDArray, selection: Selection,
     complete: Callable[[Conditions], Conditions],
 ) -> Conditions:  # fmt: skip
     """Conditions whose finite part is that of the geometric errors found, too."""
     # the errors change with it, and are followed until it stays
-    behind, fitting = found.behind, campaign.take(used)
-    raw = behind.raw(found.fit.residual)
-    own = [here.robot.index(frame.name) for frame in campaign.robot.frames]
+    behind, fitting = selection.behind, campaign.take(used)
+    raw = behind.raw(selection.fit.residual)
+    own = [conditions.robot.index(frame.name) for frame in campaign.robot.frames]
     for _ in range(_PASSES):
         values = behind.values(behind.whitened(raw))
         errors = screws_of(campaign, behind.terms, values)
         if not errors.any():
             break
-        there = here.errors.copy()
+        there = conditions.errors.copy()
         there[:, own] += errors
-        bent = complete(replace(here, errors=there))
-        bent = replace(here, second_order=bent.second_order)
-        change = predict(bent.take(used)).deviation - predict(here.take(used)).deviation
+        bent = complete(replace(conditions, errors=there))
+        bent = replace(conditions, second_order=bent.second_order)
+        change = (
+            predict(bent.take(used)).deviation
+            - predict(conditions.take(used)).deviation
+        )
         if np.nanmax(np.abs(change / fitting.sigma), initial=0.0) < _BENT:
             break
-        here, raw = bent, raw - np.nan_to_num(whiten(fitting, change))
-    return here
+        conditions, raw = bent, raw - np.nan_to_num(whiten(fitting, change))
+    return conditions
 
 
 def _judge(
-    campaign: Campaign, unregistered: Conditions, here: Conditions, parts: Split,
-    outliers: NDArray, noise: tuple[NDArray, float], found: Selection,
+    campaign: Campaign, unregistered: Conditions, conditions: Conditions, parts: Split,
+    outliers: NDArray, noise: tuple[NDArray, float], selection: Selection,
     learned: tuple[Learned, ...], finite: bool,
 ) -> Diagnosis:  # fmt: skip
     """The verdict, then the rows kept aside."""
     factor, slack = noise  # repeats said; nothing explained
     used = parts.fitted & ~outliers
     fitting, measured = campaign.take(used), campaign.measured
-    declared = lack_of_fit(fitting, slack * found.tangents.residual, 0)
-    sets = by_names(found.screen, found.sets)
-    probability = inclusion(found.screen, found.sets)
-    best = named(found.screen, found.sets[0])
-    linear = here if finite else replace(here, second_order=0.0)
+    declared = lack_of_fit(fitting, slack * selection.tangents.residual, 0)
+    sets = by_names(selection.screen, selection.sets)
+    probability = inclusion(selection.screen, selection.sets)
+    best = named(selection.screen, selection.sets[0])
+    linear = conditions if finite else replace(conditions, second_order=0.0)
     declared_model = predict(linear)
     before = measured - declared_model.deviation
-    if not finite and not found.sets[0].members and not found.behind:
-        gain = np.sum(whiten(fitting, before[used]) ** 2) - found.fit.rss
+    if not finite and not selection.sets[0].members and not selection.behind:
+        gain = np.sum(whiten(fitting, before[used]) ** 2) - selection.fit.rss
         sets, probability = linear_or_finite(sets, probability, float(gain))
         if sets[0][0] == (FINITE,):
             motions = [Hypothesis(FINITE, (), ())]
-            fit = refit(fitting, here.take(used), motions, np.zeros(0))
-            found, best = replace(found, fit=fit), (FINITE,)
-    left = found.behind.left(found.fit.residual)
-    unknowns = found.unknowns + round(found.behind.unknowns)
+            fit = refit(fitting, conditions.take(used), motions, np.zeros(0))
+            selection, best = replace(selection, fit=fit), (FINITE,)
+    left = selection.behind.left(selection.fit.residual)
+    unknowns = selection.unknowns + round(selection.behind.unknowns)
     lack = lack_of_fit(fitting, slack * left, unknowns)
-    small = bool(found.behind)
-    said, claimed = verdict(sets, probability, lack.significant, small=small)
+    small = bool(selection.behind)
+    decision, claimed = verdict(sets, probability, lack.significant, small=small)
     if learned:  # the library's own scores speak of it without what was learned
         sets = ((best, 1.0),)
         probability = {name: float(name in best) for name in probability}
-    if learned and said != "outside_library":
-        said, claimed = "learned", best
-    remarks = implausible(campaign, found.fit, found.behind)
-    if remarks and said in {"explained", "learned"}:
-        said, claimed = "outside_library", ()
+    if learned and decision != "outside_library":
+        decision, claimed = "learned", best
+    remarks = implausible(campaign, selection.fit, selection.behind)
+    if remarks and decision in {"explained", "learned"}:
+        decision, claimed = "outside_library", ()
     impossible = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if impossible:
         listed = ", ".join(impossible[:10])
         remarks += (f"a temperature that no sensor has, left out: {listed}",)
-    model = Model(here, responses(here), found.fit, found.behind, learned)
-    explained = predict(apply_effects(here, found.fit.effects))
+    model = Model(
+        conditions, responses(conditions), selection.fit, selection.behind, learned
+    )
+    explained = predict(apply_effects(conditions, selection.fit.effects))
     residual_after = model.residual(campaign)
     open_ = declared_model.undetermined | explained.undetermined
     varies: tuple[Trend, ...] = ()
-    if said == "outside_library":
-        varies = tuple(trends(fitting, here.take(used), residual_after[used]))
+    if decision == "outside_library":
+        varies = tuple(trends(fitting, conditions.take(used), residual_after[used]))
     further = None
-    if said == "ambiguous":
-        best_fit = found.fit
+    if decision == "ambiguous":
+        best_fit = selection.fit
         if finite:  # of all rivals alike, so that it tells nothing apart
             there = replace(best_fit.conditions, exact=False)
             best_fit = replace(best_fit, conditions=there)
-        further = next_measurement(fitting, here.take(used), best_fit, found.rivals)
+        further = next_measurement(
+            fitting, conditions.take(used), best_fit, selection.rivals
+        )
     held = ~parts.fitted
     if not held.any():
         held = used
@@ -313,25 +322,26 @@ def _judge(
     most = max(0, len(campaign) // _BLUNDERS - int(outliers.sum()))
     far[held] = outlying(judged, whiten(judged, residual_after[held]), most)
     outliers = outliers | far
-    shown = before if said == "none_needed" else residual_after
+    shown = before if decision == "none_needed" else residual_after
     rungs = ladder(
         campaign,
         unregistered,
         model,
-        found.terms,
+        selection.terms,
         used,
         held,
-        found.sets[0].rank,
+        selection.sets[0].rank,
         residual_after,
     )
     rungs = [_in_sigmas(rung, slack) for rung in rungs]
     campaign = replace(campaign, sigma=campaign.sigma / slack)
     return Diagnosis(
-        campaign, said, model, claimed, probability, sets, best, lack,
+        campaign, decision, model, claimed, probability, sets, best, lack,
         declared, errors_of(campaign, before, held), errors_of(campaign, shown, held),
         errors_of(campaign, campaign.sigma, held),
         (errors_of(campaign, before, held & ~outliers),
          errors_of(campaign, shown, held & ~outliers)),
-        factor, tuple(rungs), parts, outliers, here, open_, before, residual_after,
-        found.screen, found.sets[0], varies, further, remarks,
+        factor, tuple(rungs), parts, outliers, conditions, open_, before,
+        residual_after,
+        selection.screen, selection.sets[0], varies, further, remarks,
     )  # fmt: skip

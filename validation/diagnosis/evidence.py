@@ -210,8 +210,8 @@ class Evidence:
         along = self._basis.T @ residual
         rest = -float(residual @ residual) / 2
         choices = product(*((True,) if s else (False, True) for s in self._sure))
-        found = [self._fitted(chosen, along, rest) for chosen in choices]
-        return max(found, key=lambda prior: prior.evidence)
+        priors = [self._fitted(chosen, along, rest) for chosen in choices]
+        return max(priors, key=lambda prior: prior.evidence)
 
     @property
     def always(self) -> bool:

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 _BEFORE, _AFTER = "C3", "C0"
 
 
-def error_figure(found: Diagnosis) -> "Figure":
+def error_figure(diagnosis: Diagnosis) -> "Figure":
     """Before, after and noise on the rows kept aside [um, urad].
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         Bars, position and rotation beside each other.
@@ -31,7 +31,11 @@ def error_figure(found: Diagnosis) -> "Figure":
     for panel, kind, unit in zip(
         panels, ("position", "rotation"), ("um", "urad"), strict=True
     ):
-        bars = {"before": found.before, "after": found.after, "noise": found.noise}
+        bars = {
+            "before": diagnosis.before,
+            "after": diagnosis.after,
+            "noise": diagnosis.noise,
+        }
         values = [1e6 * getattr(e, kind) for e in bars.values()]
         shown = [v if np.isfinite(v) else 0.0 for v in values]
         panel.barh(list(bars), shown, color=[_BEFORE, _AFTER, "0.6"])
@@ -44,18 +48,18 @@ def error_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
-def ladder_figure(found: Diagnosis) -> "Figure":
+def ladder_figure(diagnosis: Diagnosis) -> "Figure":
     """What every step bought, on the rows kept aside.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         Bars in the order of the steps, in sigmas.
     """
     from matplotlib.figure import Figure
 
-    steps = found.ladder
+    steps = diagnosis.ladder
     figure = Figure(figsize=(7, 0.35 * len(steps) + 0.9), layout="constrained")
     panel = figure.subplots()
     values = [rung.error.normalised for rung in steps]
@@ -70,24 +74,24 @@ def ladder_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
-def vector_figure(found: Diagnosis) -> "Figure":
+def vector_figure(diagnosis: Diagnosis) -> "Figure":
     """Residual displacements where they were measured, seen from the top and the side.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         Arrows before and after, all to the same scale.
     """
     from matplotlib.figure import Figure
 
-    platform = found.conditions.postures.platform
-    where = platform[:, :3, 3] + platform[:, :3, :3] @ found.conditions.point
-    known = ~found.outliers
+    platform = diagnosis.conditions.postures.platform
+    where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
+    known = ~diagnosis.outliers
     figure = Figure(figsize=(9, 8), layout="constrained")
     panels = figure.subplots(2, 2)
-    both = {"before": found.residual_before, "after": found.residual_after}
-    size = np.linalg.norm(np.nan_to_num(found.residual_before[known, 3:]), axis=1)
+    both = {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
+    size = np.linalg.norm(np.nan_to_num(diagnosis.residual_before[known, 3:]), axis=1)
     span = float(np.ptp(where, axis=0).max()) or 1.0
     factor = max(float(np.quantile(size, 0.9)), 1e-12) / (0.12 * span)
     for column, (name, residual) in zip(panels.T, both.items(), strict=True):
@@ -107,29 +111,29 @@ def vector_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
-def covariate_figure(found: Diagnosis) -> "Figure":
+def covariate_figure(diagnosis: Diagnosis) -> "Figure":
     """Size of the residual against everything that was varied, before and after.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         A panel for each of load, pose components and covariates.
     """
     from matplotlib.figure import Figure
 
-    varied = {k: v for k, v in _varied(found).items() if np.ptp(v) > 0}
+    varied = {k: v for k, v in _varied(diagnosis).items() if np.ptp(v) > 0}
     columns = 3
     rows = max(1, -(-len(varied) // columns))
     figure = Figure(figsize=(9, 2.4 * rows), layout="constrained")
     panels = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
-    kept = ~found.outliers
+    kept = ~diagnosis.outliers
     for panel, (name, values) in zip(panels, varied.items(), strict=False):
         for residual, color, label in (
-            (found.residual_before, _BEFORE, "before"),
-            (found.residual_after, _AFTER, "after"),
+            (diagnosis.residual_before, _BEFORE, "before"),
+            (diagnosis.residual_after, _AFTER, "after"),
         ):
-            z = np.sqrt(np.nanmean((residual / found.campaign.sigma) ** 2, axis=1))
+            z = np.sqrt(np.nanmean((residual / diagnosis.campaign.sigma) ** 2, axis=1))
             panel.plot(values[kept], z[kept], ".", ms=4, color=color, label=label)
         panel.axhline(1.0, color="0.5", lw=0.8)
         panel.set(xlabel=plot_label(name), yscale="log")
@@ -140,9 +144,9 @@ def covariate_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
-def _varied(found: Diagnosis) -> dict[str, NDArray]:
+def _varied(diagnosis: Diagnosis) -> dict[str, NDArray]:
     """What the residual may depend on, by its label."""
-    campaign = found.campaign
+    campaign = diagnosis.campaign
     varied = {"load size [N]": np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
         if frame.actuated and len(varied) < 8:
@@ -154,18 +158,18 @@ def _varied(found: Diagnosis) -> dict[str, NDArray]:
     return varied
 
 
-def probability_figure(found: Diagnosis) -> "Figure":
+def probability_figure(diagnosis: Diagnosis) -> "Figure":
     """Probability of every effect that the design can show.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         Bars, the likeliest on top.
     """
     from matplotlib.figure import Figure
 
-    ranked = sorted(found.probability.items(), key=lambda item: item[1])
+    ranked = sorted(diagnosis.probability.items(), key=lambda item: item[1])
     figure = Figure(figsize=(7, 0.3 * len(ranked) + 0.8), layout="constrained")
     panel = figure.subplots()
     panel.barh([n for n, _ in ranked], [p for _, p in ranked], color=_AFTER)
@@ -175,17 +179,17 @@ def probability_figure(found: Diagnosis) -> "Figure":
     return figure
 
 
-def separability_of(found: Diagnosis) -> Separability:
+def separability_of(diagnosis: Diagnosis) -> Separability:
     """Angles between the signatures of effects, by the design of this campaign.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         The comparison, each effect in its most general form.
     """
     columns: dict[str, NDArray] = {}
-    for signature in found.screen.signatures:
+    for signature in diagnosis.screen.signatures:
         h = signature.hypothesis
         scale = np.array([slot.unknown.scale for slot in h.slots])
         shown = signature.columns * scale
@@ -194,18 +198,18 @@ def separability_of(found: Diagnosis) -> Separability:
     return compare_signatures(columns)
 
 
-def confounding_figure(found: Diagnosis) -> "Figure":
+def confounding_figure(diagnosis: Diagnosis) -> "Figure":
     """What can imitate what: share of the row's effect that the column's can show.
 
     Args:
-        found: the diagnosis.
+        diagnosis: the diagnosis.
 
     Returns:
         A matrix of numbers from 0 to 1.
     """
     from matplotlib.figure import Figure
 
-    angles = separability_of(found)
+    angles = separability_of(diagnosis)
     count = len(angles.names)
     figure = Figure(figsize=(8, 7), layout="constrained")
     panel = figure.subplots()

@@ -81,31 +81,35 @@ class Hypothesis:
         )
 
 
-def hypotheses(here: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
+def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
     """All hypotheses that conditions can tell anything about.
 
     Args:
-        here: the conditions of a campaign, as declared.
+        conditions: the conditions of a campaign, as declared.
         loads: components of the load that the campaign records, such as ``["fx"]``.
 
     Returns:
         Hypotheses, effect by effect in the library's order.
     """
-    return [h for effect in LIBRARY.values() for h in _of(effect, here, loads)]
+    return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
 
-def _of(effect: Effect, here: Conditions, loads: Sequence[str]) -> Iterator[Hypothesis]:
+def _of(
+    effect: Effect, conditions: Conditions, loads: Sequence[str]
+) -> Iterator[Hypothesis]:
     """Hypotheses of one effect."""
     for covariate in effect.needs:
-        values = getattr(here, covariate)
+        values = getattr(conditions, covariate)
         if not np.isfinite(values).all() or not np.any(values):
             return
-    unknowns = effect.unknowns(here.robot)
+    unknowns = effect.unknowns(conditions.robot)
     if effect.frames is None:
         for chosen in _choices(effect, unknowns, loads):
-            yield from _scanned(effect, (), [((u.name,), u) for u in chosen], here)
+            yield from _scanned(
+                effect, (), [((u.name,), u) for u in chosen], conditions
+            )
         return
-    places = effect.frames(here.robot)
+    places = effect.frames(conditions.robot)
     for groups in _groupings(places, len(unknowns)):
         slots = [
             (tuple(at(f, u.name) for f in group), u)
@@ -115,7 +119,7 @@ def _of(effect: Effect, here: Conditions, loads: Sequence[str]) -> Iterator[Hypo
         ]
         where = tuple(f for group in groups for f in group)
         slots += [(tuple(at(f, u.name) for f in where), u) for u in unknowns if u.scan]
-        yield from _scanned(effect, where, slots, here)
+        yield from _scanned(effect, where, slots, conditions)
 
 
 def _choices(
@@ -161,12 +165,12 @@ def _groupings(
 
 def _scanned(
     effect: Effect, where: tuple[str, ...],
-    slots: list[tuple[tuple[str, ...], Unknown]], here: Conditions,
+    slots: list[tuple[tuple[str, ...], Unknown]], conditions: Conditions,
 ) -> Iterator[Hypothesis]:  # fmt: skip
     """One hypothesis, or one for each value at which a shape is looked at."""
     scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
     by = next((u.scan_by for _, u in slots if u.scan_by), "")
-    size = float(np.ptp(getattr(here, by))) if by else 1.0
+    size = float(np.ptp(getattr(conditions, by))) if by else 1.0
     if size == 0.0:
         return
     for value in scan:

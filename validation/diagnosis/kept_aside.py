@@ -88,14 +88,14 @@ class Model:
     """Effects and small unknowns together.
 
     Attributes:
-        here: conditions of all R rows, as declared and registered.
+        conditions: conditions of all R rows, as declared and registered.
         answers: of the readings there.
         fit: of effects, on the rows fitted.
         behind: small terms beside them.
         learned: functions among these.
     """
 
-    here: Conditions
+    conditions: Conditions
     answers: Responses
     fit: Fit
     behind: Background
@@ -103,9 +103,9 @@ class Model:
 
     def residual(self, campaign: Campaign) -> NDArray:
         """(R, 6) [rad, m] readings minus the model; NaN where not measured."""
-        there = apply_effects(self.here, self.fit.effects)
+        there = apply_effects(self.conditions, self.fit.effects)
         small = added(
-            campaign, self.answers, self.here, self.behind.terms,
+            campaign, self.answers, self.conditions, self.behind.terms,
             self.behind.values(self.fit.residual),
             {term_name(k + 1): one.changes for k, one in enumerate(self.learned)},
         )  # fmt: skip
@@ -132,8 +132,8 @@ def ladder(
         One rung a step; a step that nothing asked for repeats the one before.
     """
     fitting = campaign.take(used)
-    here = with_play_held(model.here, model.fit)
-    some = here.take(used)
+    conditions = with_play_held(model.conditions, model.fit)
+    some = conditions.take(used)
     names = [term.name for term in model.behind.terms]
     first = [name for name in (GEOMETRY, SPRINGS) if name in names]
 
@@ -142,7 +142,7 @@ def ladder(
         begin = np.concatenate([np.zeros(0), *(h.start for h in members)])
         start = model.fit.values if same else begin
         fit = refit(fitting, some, members, start, behind=behind)
-        step = Model(here, model.answers, fit, behind, model.learned)
+        step = Model(conditions, model.answers, fit, behind, model.learned)
         error = errors_of(campaign, step.residual(campaign), held)
         rungs.append(Rung(name, behind.unknowns - known, error))
 

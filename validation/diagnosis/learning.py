@@ -160,7 +160,7 @@ class _School:
 
 
 def learn(
-    campaign: Campaign, used: NDArray, here: Conditions, answers: Answers,
+    campaign: Campaign, used: NDArray, conditions: Conditions, answers: Answers,
     terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
     update: Callable[[str, int, int], None],
 ) -> Lesson:  # fmt: skip
@@ -169,7 +169,7 @@ def learn(
     Args:
         campaign: of R rows.
         used: mask (R,) of the rows fitted.
-        here: conditions of all rows.
+        conditions: conditions of all rows.
         answers: of all rows.
         terms: small terms of the rows fitted, N cells.
         residual: (N,) whitened readings minus the best set of effects.
@@ -180,17 +180,17 @@ def learn(
         The lesson; no function where nothing can be shown.
     """
     school = _School(campaign, used, answers, terms, residual, effects)
-    names = variables_of(here.take(used))
+    names = variables_of(conditions.take(used))
     every = list(places_of(campaign.robot, names))
     for turn in range(MOST):
         update("functions learned", turn, MOST)
         if school.done:
             break
-        found = _best(school, here, every)
-        if found is None or not _foretells(school, found):
+        function = _best(school, conditions, every)
+        if function is None or not _foretells(school, function):
             break
-        school.learned.append(found)
-        school.terms.append(_term(school, found, len(school.learned)))
+        school.learned.append(function)
+        school.terms.append(_term(school, function, len(school.learned)))
         school.update()
     update("functions learned", MOST, MOST)
     unknowns = school.effects.shape[1] + school.behind.unknowns
@@ -214,7 +214,9 @@ def _term(school: _School, one: Learned, number: int) -> SmallTerm:
 
 
 def _best(
-    school: _School, here: Conditions, every: Sequence[tuple[str, tuple[Part, ...]]]
+    school: _School,
+    conditions: Conditions,
+    every: Sequence[tuple[str, tuple[Part, ...]]],
 ) -> Learned | None:
     """The likeliest function, of those worth it."""
     robot = school.campaign.robot
@@ -225,7 +227,7 @@ def _best(
     first = sorted(((_worth(few, c), c) for c in looked), key=lambda one: -one[0])
     chosen = list(dict.fromkeys((c.kind, c.parts) for _, c in first))[:_REFINED]
     refined = []
-    fitted = here.take(school.used)
+    fitted = conditions.take(school.used)
     for kind, parts in chosen:
         for shape in all_shapes(fitted, parts[0].variable, kind):
             one = Candidate(parts, kind, shape)

@@ -53,7 +53,7 @@ class NextMeasurement:
 
 
 def next_measurement(
-    campaign: Campaign, here: Conditions, fit: Fit, rivals: Sequence[Fit]
+    campaign: Campaign, conditions: Conditions, fit: Fit, rivals: Sequence[Fit]
 ) -> NextMeasurement | None:
     """The measurement that would decide between a fit and its likeliest rival.
 
@@ -64,14 +64,14 @@ def next_measurement(
 
     Args:
         campaign: what was measured.
-        here: its conditions, as declared and registered.
+        conditions: its conditions, as declared and registered.
         fit: the best explanation.
         rivals: others, likeliest first.
 
     Returns:
         The measurement, None if none of those tried tells any rival from the fit.
     """
-    there = _situations(here)
+    there = _situations(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
     size = np.abs(there.load).sum(axis=1)
     a, Ja = _model(there, fit, sigma)
@@ -109,15 +109,15 @@ def _measurement(
     )  # fmt: skip
 
 
-def _situations(here: Conditions) -> Conditions:
+def _situations(conditions: Conditions) -> Conditions:
     """Situations to choose from: within reach, loads and covariates wider."""
     rng = np.random.default_rng(0)
-    there = _between(here.take(rng.integers(0, len(here), _TRIED)), rng)
-    largest = np.abs(here.load).max(axis=0)
+    there = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
+    largest = np.abs(conditions.load).max(axis=0)
     corner = rng.choice([-1.0, 0.0, 1.0], (_TRIED, 6))
     temperature = there.temperature
     if np.isfinite(temperature).all():
-        low, high = here.temperature.min(), here.temperature.max()
+        low, high = conditions.temperature.min(), conditions.temperature.max()
         # a campaign at one temperature: ten kelvin are within reach of a workshop
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
@@ -156,8 +156,8 @@ def _model(there: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArra
     """(S, 6) whitened predictions of a fit, and (S, 6, k) their derivatives."""
 
     def read(values: NDArray, finite: bool) -> NDArray:
-        here = apply_effects(there, fit.at(values))
-        return predict(replace(here, exact=finite)).deviation / sigma
+        conditions = apply_effects(there, fit.at(values))
+        return predict(replace(conditions, exact=finite)).deviation / sigma
 
     answer = read(fit.values, fit.conditions.exact)
     # finite motions hardly change the slopes, and take a hundred times longer

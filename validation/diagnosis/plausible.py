@@ -77,21 +77,21 @@ def implausible(campaign: Campaign, fit: Fit, behind: Background) -> tuple[str, 
                 continue
             for name, value in values.items():
                 unit = LIBRARY[effect].unit(robot, name)
-                said = f"{effect} {name} = {value:.3g} {unit}"
+                statement = f"{effect} {name} = {value:.3g} {unit}"
                 if name.endswith(".phase"):
                     continue
                 if abs(value) > largest.get(unit, np.inf):
-                    yield f"{said}, larger than {largest[unit]:.2g}"
+                    yield f"{statement}, larger than {largest[unit]:.2g}"
                 if unit in softest and effect.endswith("_compliance"):
                     if value < softest[unit]:
-                        yield f"{said}, which the loads would bend out of reach"
+                        yield f"{statement}, which the loads would bend out of reach"
                 low, high, why = _RANGES.get(unit, (-np.inf, np.inf, ""))
                 if not low <= value <= high:
-                    yield f"{said}: {why}"
+                    yield f"{statement}: {why}"
                 if unit == "1" and effect in _FACTORS:
                     low, high = _FACTORS[effect]
                     if not low <= value <= high:
-                        yield f"{said}, expected {low:g} to {high:g}"
+                        yield f"{statement}, expected {low:g} to {high:g}"
         for kind, size_found, most in zip(
             KINDS, behind.scales.get(GEOMETRY, ()), largest.values(), strict=False
         ):

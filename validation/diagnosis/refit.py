@@ -103,26 +103,28 @@ def _public(
     members: Sequence[Hypothesis], values: NDArray, robot: Robot
 ) -> dict[str, dict[str, float]]:
     """Parameters of all members by effect; those of one effect join."""
-    found: dict[str, dict[str, float]] = {}
+    fitted: dict[str, dict[str, float]] = {}
     at = 0
     for h in members:
         own = h.public(robot, values[at : at + len(h.slots)])
-        found.setdefault(h.effect, {}).update(own)
+        fitted.setdefault(h.effect, {}).update(own)
         at += len(h.slots)
-    return found
+    return fitted
 
 
-def adds_play(here: Conditions, members: Sequence[Hypothesis]) -> bool:
+def adds_play(conditions: Conditions, members: Sequence[Hypothesis]) -> bool:
     """Whether a set puts play into closed chains, where it is found row by row."""
     added = any(LIBRARY[h.effect].clearance for h in members)
-    return added and bool(here.robot.closures) and here.rest is None
+    return added and bool(conditions.robot.closures) and conditions.rest is None
 
 
-def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDArray:
+def resting(
+    conditions: Conditions, members: Sequence[Hypothesis], x: NDArray
+) -> NDArray:
     """Where play rests by the least energy with hypotheses at some values.
 
     Args:
-        here: conditions without the effects.
+        conditions: conditions without the effects.
         members: the hypotheses.
         x: their unknowns, one after the other.
 
@@ -130,42 +132,42 @@ def resting(here: Conditions, members: Sequence[Hypothesis], x: NDArray) -> NDAr
         (R, n, 6) in units of its bounds; a foundation's frame is left out.
     """
     there = with_rest_positions(
-        apply_effects(here, dict(_public(members, x, here.robot)))
+        apply_effects(conditions, dict(_public(members, x, conditions.robot)))
     )
     assert there.rest is not None
-    return there.rest[:, -len(here.robot.frames) :]
+    return there.rest[:, -len(conditions.robot.frames) :]
 
 
-def with_play_held(here: Conditions, fit: Fit) -> Conditions:
+def with_play_held(conditions: Conditions, fit: Fit) -> Conditions:
     """Conditions in which play that a fit adds to closed chains rests where it does.
 
     Args:
-        here: without the fit's effects.
+        conditions: without the fit's effects.
         fit: any.
 
     Returns:
         The same where the fit adds no such play.
     """
-    if not adds_play(here, fit.hypotheses):
-        return here
-    return replace(here, rest=resting(here, fit.hypotheses, fit.values))
+    if not adds_play(conditions, fit.hypotheses):
+        return conditions
+    return replace(conditions, rest=resting(conditions, fit.hypotheses, fit.values))
 
 
 def in_full(
-    campaign: Campaign, here: Conditions, fit: Fit, behind: Background = NOTHING
+    campaign: Campaign, conditions: Conditions, fit: Fit, behind: Background = NOTHING
 ) -> Fit:
     """A fit whose residual has play where the least energy puts it now.
 
     Args:
         campaign: what was measured.
-        here: its conditions without the effects.
+        conditions: its conditions without the effects.
         fit: made with play held.
         behind: small terms that are there too.
 
     Returns:
         The same numbers with the full model's residual.
     """
-    there = apply_effects(here, fit.effects)
+    there = apply_effects(conditions, fit.effects)
     model = whiten(campaign, predict(there).deviation)
     left = whiten(campaign, campaign.measured) - model
     left = np.where(np.isfinite(left), left, _LOST)
@@ -173,14 +175,14 @@ def in_full(
 
 
 def refit(
-    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
-    defect: NDArray | float = 0.0, behind: Background = NOTHING,
+    campaign: Campaign, conditions: Conditions, members: Sequence[Hypothesis],
+    start: NDArray, defect: NDArray | float = 0.0, behind: Background = NOTHING,
 ) -> Fit:  # fmt: skip
     """Fit a set of hypotheses in the full model.
 
     Args:
         campaign: what was measured.
-        here: its conditions without the effects; with ``rest``, play is held there.
+        conditions: without the effects; with ``rest``, play is held there.
         members: hypotheses of different effects.
         start: where to begin, one unknown after the other.
         defect: (N,) whitened, what finite motions add about there, where it is known.
@@ -191,10 +193,10 @@ def refit(
     """
     linear = [h for h in members if h.effect != FINITE]
     if not linear or len(linear) == len(members):
-        return _refit(campaign, here, members, start, behind=behind)
+        return _refit(campaign, conditions, members, start, behind=behind)
     # finite motions take a hundred times longer: their defect is fitted, not they
     for _ in range(_MOST_DEFECTS):
-        fit = _refit(campaign, here, linear, start, defect, behind)
+        fit = _refit(campaign, conditions, linear, start, defect, behind)
         there = replace(fit.conditions, exact=True)
         read = [
             whiten(campaign, predict(at).deviation) for at in (fit.conditions, there)
@@ -209,8 +211,8 @@ def refit(
 
 
 def _refit(
-    campaign: Campaign, here: Conditions, members: Sequence[Hypothesis], start: NDArray,
-    defect: NDArray | float = 0.0, behind: Background = NOTHING,
+    campaign: Campaign, conditions: Conditions, members: Sequence[Hypothesis],
+    start: NDArray, defect: NDArray | float = 0.0, behind: Background = NOTHING,
 ) -> Fit:  # fmt: skip
     """The fit of a model to which a constant ``defect`` (N,) is added."""
     slots = [slot for h in members for slot in h.slots]
@@ -223,8 +225,8 @@ def _refit(
     measured = whiten(campaign, campaign.measured) - defect
 
     def there(x: NDArray) -> Conditions:
-        effects: dict[str, Values] = dict(_public(members, x, here.robot))
-        return apply_effects(here, effects)
+        effects: dict[str, Values] = dict(_public(members, x, conditions.robot))
+        return apply_effects(conditions, effects)
 
     def left(scaled: NDArray) -> NDArray:
         model = whiten(campaign, predict(there(scaled * size)).deviation)
@@ -245,13 +247,13 @@ def _refit(
         return Fit(tuple(members), x0, np.zeros((0, 0)), residual, there(x0))
     inside = np.clip(x0 / size, lower / size, upper / size)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = least_squares(
+        fitted = least_squares(
             left, inside, jac=slopes, bounds=(lower / size, upper / size),
             max_nfev=_MOST_CALLS, xtol=1e-8, ftol=1e-8, gtol=1e-10, x_scale="jac",
         )  # fmt: skip
-    J = found.jac / size
+    J = fitted.jac / size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))
     scale[scale == 0] = 1.0
     C = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-12, hermitian=True)
-    x = found.x * size
-    return Fit(tuple(members), x, C / np.outer(scale, scale), found.fun, there(x))
+    x = fitted.x * size
+    return Fit(tuple(members), x, C / np.outer(scale, scale), fitted.fun, there(x))

@@ -37,12 +37,12 @@ def device_frame(robot_unknowns: Conditions) -> Hypothesis:
     return Hypothesis("registration", (), tuple(slots))
 
 
-def register(campaign: Campaign, here: Conditions) -> Conditions:
+def register(campaign: Campaign, conditions: Conditions) -> Conditions:
     """Conditions with the measuring frame where it fits the declared model best.
 
     Args:
         campaign: rows from which it is found.
-        here: all conditions to be registered, of these rows or of more.
+        conditions: all conditions to be registered, of these rows or of more.
 
     Returns:
         The same conditions, registered; each session by itself.
@@ -54,11 +54,11 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
     from validation.diagnosis.signatures import conditions_of
 
     own = with_second_order(conditions_of(campaign))
-    if campaign.session is None or here.session is None:
+    if campaign.session is None or conditions.session is None:
         for values in _device(campaign, own):
-            here = apply_effects(here, {"registration": values})
-        return here
-    for session in dict.fromkeys(here.session):
+            conditions = apply_effects(conditions, {"registration": values})
+        return conditions
+    for session in dict.fromkeys(conditions.session):
         rows = campaign.session == session
         if not rows.any():
             raise BadInput(
@@ -66,9 +66,9 @@ def register(campaign: Campaign, here: Conditions) -> Conditions:
                 "registration could be found; expected some"
             )
         for values in _device(campaign.take(rows), own.take(rows)):
-            turned = apply_effects(here, {"registration": values})
-            here = in_session_alone(here, turned, session)
-    return here
+            turned = apply_effects(conditions, {"registration": values})
+            conditions = in_session_alone(conditions, turned, session)
+    return conditions
 
 
 def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
@@ -80,10 +80,10 @@ def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
     return [start, dict(fine.effects["registration"])]
 
 
-def coarse_frame(campaign: Campaign, here: Conditions) -> dict[str, float]:
+def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
     """A first guess: Kabsch's rotation of points, or the mean of rotations."""
-    model = predict(here).deviation
-    nominal = here.measured_points
+    model = predict(conditions).deviation
+    nominal = conditions.measured_points
     full = np.isfinite(campaign.measured[:, 3:]).all(axis=1)
     full &= np.isfinite(model).all(axis=1)
     turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)

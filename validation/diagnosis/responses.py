@@ -50,16 +50,16 @@ class Responses:
     wrenches: NDArray
 
 
-def responses(here: Conditions) -> Responses:
+def responses(conditions: Conditions) -> Responses:
     """Answers to small screws at all frames, play where it rests.
 
     Args:
-        here: R situations of a robot.
+        conditions: R situations of a robot.
 
     Returns:
         The answers; rows that do not close have zeros.
     """
-    tight = _without_clearance(here)
+    tight = _without_clearance(conditions)
     distinct, which = in_groups(tight.postures)
     R, n = len(tight), len(tight.robot.frames)
     platform = np.zeros((len(distinct.transforms), 6, 6 * n))
@@ -83,15 +83,15 @@ def responses(here: Conditions) -> Responses:
     return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
 
 
-def _without_clearance(here: Conditions) -> Conditions:
+def _without_clearance(conditions: Conditions) -> Conditions:
     """The same situations with play where it rests."""
-    if not virtual_joints(here.robot).cones.shape[1]:
-        return here
-    if here.rest is not None:
-        return with_clearances_at_rest(here)
-    if not here.robot.closures:
-        return with_clearances_taken_up(here)[0]
-    return replace(here, robot=without_joint_clearances(here.robot))
+    if not virtual_joints(conditions.robot).cones.shape[1]:
+        return conditions
+    if conditions.rest is not None:
+        return with_clearances_at_rest(conditions)
+    if not conditions.robot.closures:
+        return with_clearances_taken_up(conditions)[0]
+    return replace(conditions, robot=without_joint_clearances(conditions.robot))
 
 
 def _some(postures: Posture, rows: slice) -> Posture:
@@ -103,11 +103,11 @@ def _some(postures: Posture, rows: slice) -> Posture:
     )
 
 
-def _reading(here: Conditions) -> NDArray:
+def _reading(conditions: Conditions) -> NDArray:
     """(R, 6, 6) change of what is read per unit platform screw."""
-    D = np.zeros((len(here), 6, 6))
+    D = np.zeros((len(conditions), 6, 6))
     for k in range(6):
-        screw = np.zeros((len(here), 6))
+        screw = np.zeros((len(conditions), 6))
         screw[:, k] = _STEP
-        D[:, :, k] = (read(here, screw) - read(here, -screw)) / (2 * _STEP)
+        D[:, :, k] = (read(conditions, screw) - read(conditions, -screw)) / (2 * _STEP)
     return D

@@ -20,73 +20,80 @@ LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
 
 
-def table(found: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
+def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
     """The diagnosis in the public format.
 
     Args:
-        found: a diagnosis.
+        diagnosis: a diagnosis.
         tally: how often it is right on this design, if that was simulated.
 
     Returns:
         Plain values.
     """
-    listed = found.verdict in LISTED
-    held = ~found.split.fitted
+    listed = diagnosis.verdict in LISTED
+    held = ~diagnosis.split.fitted
     return {
-        "campaign": found.campaign.name,
-        "robot": found.campaign.robot.name,
-        "verdict": found.verdict,
-        "sentence": sentence(found),
-        "effects": effects(found) if listed else [],
+        "campaign": diagnosis.campaign.name,
+        "robot": diagnosis.campaign.robot.name,
+        "verdict": diagnosis.verdict,
+        "sentence": sentence(diagnosis),
+        "effects": effects(diagnosis) if listed else [],
         "alternatives": [
-            {"names": list(names), "probability": p} for names, p in found.alternatives
+            {"names": list(names), "probability": p}
+            for names, p in diagnosis.alternatives
         ],
-        "probabilities": found.probability,
-        "best_by_score": list(found.best_by_score),
+        "probabilities": diagnosis.probability,
+        "best_by_score": list(diagnosis.best_by_score),
         "error": {
             "unit": {"position": "m", "rotation": "rad"},
-            "before": _errors(found.before),
-            "after": _errors(found.after),
+            "before": _errors(diagnosis.before),
+            "after": _errors(diagnosis.after),
             "noise": {
-                "position": found.noise.position,
-                "rotation": found.noise.rotation,
+                "position": diagnosis.noise.position,
+                "rotation": diagnosis.noise.rotation,
             },
             "without_outliers": {
-                "before": _errors(found.trimmed[0]),
-                "after": _errors(found.trimmed[1]),
+                "before": _errors(diagnosis.trimmed[0]),
+                "after": _errors(diagnosis.trimmed[1]),
             },
         },
-        "noise_factor": dict(zip(KINDS, found.noise_factor[::3].tolist(), strict=True)),
-        "ladder": steps(found),
-        "geometry": small(found, GEOMETRY),
-        "springs": small(found, SPRINGS),
-        "learned": learned(found),
-        "held_out": {"rows": int(held.sum()), "how": found.split.how},
+        "noise_factor": dict(
+            zip(KINDS, diagnosis.noise_factor[::3].tolist(), strict=True)
+        ),
+        "ladder": steps(diagnosis),
+        "geometry": small(diagnosis, GEOMETRY),
+        "springs": small(diagnosis, SPRINGS),
+        "learned": learned(diagnosis),
+        "held_out": {"rows": int(held.sum()), "how": diagnosis.split.how},
         "lack_of_fit": {
-            "rms": found.lack.rms,
-            "probability": found.lack.probability,
-            "between_repeats": found.lack.repeats,
+            "rms": diagnosis.lack.rms,
+            "probability": diagnosis.lack.probability,
+            "between_repeats": diagnosis.lack.repeats,
         },
-        "remarks": list(found.remarks),
+        "remarks": list(diagnosis.remarks),
         "outliers": [
-            i for i, far in zip(found.campaign.ids, found.outliers, strict=True) if far
+            i
+            for i, far in zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
+            if far
         ],
         "open": [
-            i for i, free in zip(found.campaign.ids, found.open, strict=True) if free
+            i
+            for i, free in zip(diagnosis.campaign.ids, diagnosis.open, strict=True)
+            if free
         ],
         "structure": [
             {"against": t.against, "share": t.share, "probability": t.probability}
-            for t in found.trends
+            for t in diagnosis.trends
         ],
-        "next_measurement": _next(found),
+        "next_measurement": _next(diagnosis),
         "calibration": None if tally is None else asdict(tally),
     }
 
 
-def steps(found: Diagnosis) -> list[dict[str, Any]]:
+def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The ladder in the public format, rms in m or, without positions, in rad."""
     rows = []
-    for rung in found.ladder:
+    for rung in diagnosis.ladder:
         error = rung.error
         placed = math.isfinite(error.position)
         rows.append({
@@ -103,11 +110,11 @@ def steps(found: Diagnosis) -> list[dict[str, Any]]:
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
-def small(found: Diagnosis, name: str) -> dict[str, Any] | None:
+def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
     """Geometric errors, or springs, of all frames in the public format.
 
     Args:
-        found: a diagnosis.
+        diagnosis: a diagnosis.
         name: ``"geometry"`` or ``"springs"``.
 
     Returns:
@@ -115,13 +122,13 @@ def small(found: Diagnosis, name: str) -> dict[str, Any] | None:
         unknown its value, standard deviation and the share that the readings say; None
         if the machine is as declared.
     """
-    behind = found.behind
-    values, stds = behind.values(found.fit.residual), behind.deviations()
+    behind = diagnosis.behind
+    values, stds = behind.values(diagnosis.fit.residual), behind.deviations()
     everyone = zip(behind.terms, values, stds, behind.identified(), strict=True)
     for term, value, std, share in everyone:
         if term.name != name:
             continue
-        frames = found.campaign.robot.frames
+        frames = diagnosis.campaign.robot.frames
         known = np.bincount(term.frame, share, minlength=len(frames))
         scale = dict(zip(KINDS, behind.scales[name], strict=True))
         return {
@@ -146,20 +153,20 @@ def small(found: Diagnosis, name: str) -> dict[str, Any] | None:
     return None
 
 
-def effects(found: Diagnosis) -> list[dict[str, Any]]:
+def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The best set's effects with their parameters, as in the public format."""
-    robot = found.campaign.robot
+    robot = diagnosis.campaign.robot
     shown = []
-    for k, h in enumerate(found.fit.hypotheses):
-        if h.effect not in found.best_by_score:
+    for k, h in enumerate(diagnosis.fit.hypotheses):
+        if h.effect not in diagnosis.best_by_score:
             continue  # a device's frame fitted anyway, or finite motions beside others
-        parameters = found.fit.parameters(k)
+        parameters = diagnosis.fit.parameters(k)
         acting = {n for name, *_ in parameters for n in (name, name.rpartition(".")[0])}
         shown.append({
             "name": h.effect,
             # frames found rigid or tight have no parameter left
             "where": [frame for frame in h.where if frame in acting],
-            "probability": found.probability.get(h.effect, 0.0),
+            "probability": diagnosis.probability.get(h.effect, 0.0),
             "parameters": [
                 {
                     "name": name,
@@ -174,27 +181,27 @@ def effects(found: Diagnosis) -> list[dict[str, Any]]:
     return shown
 
 
-def corrected(found: Diagnosis) -> Robot:
+def corrected(diagnosis: Diagnosis) -> Robot:
     """The declared robot with what was found built in, beside any effects it had."""
-    behind = found.behind
-    unknowns = behind.values(found.fit.residual)
-    robot = with_small(found.campaign.robot, behind.terms, unknowns)
+    behind = diagnosis.behind
+    unknowns = behind.values(diagnosis.fit.residual)
+    robot = with_small(diagnosis.campaign.robot, behind.terms, unknowns)
     merged = {name: dict(values) for name, values in robot.effects.items()}
-    for name, fitted in found.fit.effects.items():
-        if name in found.claimed:
-            merged[name] = {**merged.get(name, {}), **fitted}
-    new = functions_of(found.campaign, found.model)
+    for name, values in diagnosis.fit.effects.items():
+        if name in diagnosis.claimed:
+            merged[name] = {**merged.get(name, {}), **values}
+    new = functions_of(diagnosis.campaign, diagnosis.model)
     functions = (*robot.functions, *(f for some in new for f in some))
     robot = replace(robot, effects=merged, functions=functions)
-    unknown = found.campaign.registration == "unknown"
-    return _registered(found, robot) if unknown else robot
+    unknown = diagnosis.campaign.registration == "unknown"
+    return _registered(diagnosis, robot) if unknown else robot
 
 
-def _registered(found: Diagnosis, robot: Robot) -> Robot:
+def _registered(diagnosis: Diagnosis, robot: Robot) -> Robot:
     """The robot with the measuring frame as it was found, in each session its own."""
-    fitted = {"registration": found.fit.effects.get("registration", {})}
-    base = apply_effects(found.model.here, fitted).base
-    base = np.broadcast_to(base, (len(found.campaign), 6))
+    fitted = {"registration": diagnosis.fit.effects.get("registration", {})}
+    base = apply_effects(diagnosis.model.conditions, fitted).base
+    base = np.broadcast_to(base, (len(diagnosis.campaign), 6))
     tool = {
         k: v for k, v in robot.effects.get("registration", {}).items() if k not in BASE
     }
@@ -202,27 +209,27 @@ def _registered(found: Diagnosis, robot: Robot) -> Robot:
     def placed(row: int) -> dict[str, float]:
         return dict(zip(BASE, base[row].tolist(), strict=True))
 
-    if found.campaign.session is None:
+    if diagnosis.campaign.session is None:
         effects = {**robot.effects, "registration": {**tool, **placed(0)}}
         return replace(robot, effects=effects)
     effects = {k: v for k, v in robot.effects.items() if k != "registration"}
     if tool:
         effects["registration"] = tool
     sessions = dict(robot.session_effects)
-    for session in found.campaign.sessions:
-        row = int(np.flatnonzero(found.campaign.session == session)[0])
+    for session in diagnosis.campaign.sessions:
+        row = int(np.flatnonzero(diagnosis.campaign.session == session)[0])
         own = {**sessions.get(session, {}), "registration": placed(row)}
         sessions[session] = own
     return replace(robot, effects=effects, session_effects=sessions)
 
 
-def learned(found: Diagnosis) -> list[dict[str, Any]]:
+def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """What was learned, in the public format: a function of a robot file each."""
-    rungs = [r.error for r in found.ladder if r.term == "learned effects"]
-    first = next(r.error for r in found.ladder if r.term == "library effects")
+    rungs = [r.error for r in diagnosis.ladder if r.term == "learned effects"]
+    first = next(r.error for r in diagnosis.ladder if r.term == "library effects")
     shown = []
-    for k, functions in enumerate(functions_of(found.campaign, found.model)):
-        same = found.model.learned[k].equivalent
+    for k, functions in enumerate(functions_of(diagnosis.campaign, diagnosis.model)):
+        same = diagnosis.model.learned[k].equivalent
         for function in functions:
             shown.append({
                 "where": function.where,
@@ -252,13 +259,13 @@ def _errors(errors: Errors) -> dict[str, float]:
     }
 
 
-def _next(found: Diagnosis) -> dict[str, Any] | None:
-    if found.next is None:
+def _next(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    if diagnosis.next is None:
         return None
     return {
-        "why": found.next.why,
-        "configuration": found.next.configuration,
-        "load": list(found.next.load),
-        "covariates": found.next.covariates,
-        "power": found.next.power,
+        "why": diagnosis.next.why,
+        "configuration": diagnosis.next.configuration,
+        "load": list(diagnosis.next.load),
+        "covariates": diagnosis.next.covariates,
+        "power": diagnosis.next.power,
     }

@@ -183,11 +183,11 @@ class Screen:
         Returns:
             Sets, best score first.
         """
-        found: dict[tuple[int, ...], Scored] = {(): self.fit(())}
+        scored: dict[tuple[int, ...], Scored] = {(): self.fit(())}
         everyone = range(len(self.signatures))
         for i in everyone:
-            found[(i,)] = self.fit((i,))
-        alone = sorted(everyone, key=lambda i: -found[(i,)].score)
+            scored[(i,)] = self.fit((i,))
+        alone = sorted(everyone, key=lambda i: -scored[(i,)].score)
         ways: dict[str, list[int]] = {}
         for i in everyone:  # the first way of every effect is its most general
             ways.setdefault(self.effects[i], []).append(i)
@@ -196,14 +196,14 @@ class Screen:
             chosen.update(sorted(own, key=alone.index)[:_WAYS])
         pairs: set[tuple[int, ...]] = {*combinations(sorted(chosen), 2)}
         pairs |= {(i, j) for i in alone[:_BEST] for j in everyone if i != j}
-        self._enlarge(found, pairs)
+        self._enlarge(scored, pairs)
         for size in range(3, largest + 1):
-            best = [s for s in found.values() if len(s.members) == size - 1]
+            best = [s for s in scored.values() if len(s.members) == size - 1]
             best.sort(key=lambda s: -s.score)
             self._enlarge(
-                found, {(*s.members, j) for s in best[:_BEST] for j in chosen}
+                scored, {(*s.members, j) for s in best[:_BEST] for j in chosen}
             )
-        return sorted(found.values(), key=self.order)
+        return sorted(scored.values(), key=self.order)
 
     def order(self, one: Scored) -> tuple[float, int]:
         """Best score first; of equal ones, the one that acts at fewer frames.
@@ -218,13 +218,13 @@ class Screen:
         return -round(one.score, _DIGITS), where
 
     def _enlarge(
-        self, found: dict[tuple[int, ...], Scored], sets: set[tuple[int, ...]]
+        self, scored: dict[tuple[int, ...], Scored], sets: set[tuple[int, ...]]
     ) -> None:
         """Fit sets of different effects that are not yet found."""
         for members in sorted({tuple(sorted(one)) for one in sets}):
             effects = {self.effects[i] for i in members}
-            if len(effects) == len(members) and members not in found:
-                found[members] = self.fit(members)
+            if len(effects) == len(members) and members not in scored:
+                scored[members] = self.fit(members)
 
 
 def _within(
@@ -279,11 +279,11 @@ def posterior(sets: Sequence[Scored]) -> NDArray:
 
 def inclusion(screen: Screen, sets: Sequence[Scored]) -> dict[str, float]:
     """Probability of every effect: the weight of all sets that have it."""
-    found = dict.fromkeys(screen.effects, 0.0)
+    scored = dict.fromkeys(screen.effects, 0.0)
     for one, weight in zip(sets, posterior(sets), strict=True):
         for name in named(screen, one):
-            found[name] += float(weight)
-    return found
+            scored[name] += float(weight)
+    return scored
 
 
 def named(screen: Screen, one: Scored) -> tuple[str, ...]:

@@ -67,7 +67,7 @@ class Selection:
 
 
 def select(
-    campaign: Campaign, here: Conditions, update: Update, *, finite: bool = False
+    campaign: Campaign, conditions: Conditions, update: Update, *, finite: bool = False
 ) -> Selection:
     """Score all small sets, refit the best, and again about it until it stays.
 
@@ -75,39 +75,43 @@ def select(
 
     Args:
         campaign: rows to be fitted.
-        here: their conditions as declared, with the registration if that was fitted.
+        conditions: of them as declared, with the registration if that was fitted.
         update: told what is done, how much of it and of how much.
         finite: whether the best set is fitted once more with finite motions.
 
     Returns:
         The selection.
     """
-    found = _select_settled(campaign, here, update)
+    selected = _select_settled(campaign, conditions, update)
     if not finite:
-        return found
-    members = (*found.fit.hypotheses, Hypothesis(FINITE, (), ()))
-    exact = refit(campaign, here, members, found.fit.values, behind=found.behind)
-    return replace(found, fit=exact)
+        return selected
+    members = (*selected.fit.hypotheses, Hypothesis(FINITE, (), ()))
+    exact = refit(
+        campaign, conditions, members, selected.fit.values, behind=selected.behind
+    )
+    return replace(selected, fit=exact)
 
 
-def _select_settled(campaign: Campaign, here: Conditions, update: Update) -> Selection:
-    """The selection with motions to first order beside what ``here`` carries."""
+def _select_settled(
+    campaign: Campaign, conditions: Conditions, update: Update
+) -> Selection:
+    """The selection with motions to first order beside what ``conditions`` carries."""
     # where play rests in closed chains is found row by row, too slowly for every trial
-    play = here.robot.closures and virtual_joints(here.robot).cones.shape[1]
+    play = conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]
     if not play:
-        return _select(campaign, here, update)
-    found = _select(campaign, with_rest_positions(here), update)
-    there = with_rest_positions(apply_effects(here, found.fit.effects))
+        return _select(campaign, conditions, update)
+    selected = _select(campaign, with_rest_positions(conditions), update)
+    there = with_rest_positions(apply_effects(conditions, selected.fit.effects))
     assert there.rest is not None
-    rest = there.rest[:, -len(here.robot.frames) :]
-    return _select(campaign, replace(here, rest=rest), update)
+    rest = there.rest[:, -len(conditions.robot.frames) :]
+    return _select(campaign, replace(conditions, rest=rest), update)
 
 
-def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
+def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selection:
     """Score all small sets; refit the best; score again about it until it stays."""
-    tangents = Tangents(campaign, here)
-    nuisance = [device_frame(here)] if campaign.registration == "unknown" else []
-    candidates = hypotheses(here, loaded_components(campaign))
+    tangents = Tangents(campaign, conditions)
+    nuisance = [device_frame(conditions)] if campaign.registration == "unknown" else []
+    candidates = hypotheses(conditions, loaded_components(campaign))
     if nuisance:
         candidates = [h for h in candidates if not _moves_base(h)]
     signatures = []
@@ -119,7 +123,9 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
     project = _Projector([tangents.at_start(h) for h in nuisance])
     finite = next((s.offset for s in signatures if s.hypothesis.effect == FINITE), 0.0)
     screens = _Screens(
-        small_terms(campaign, here, responses(here)), project, tangents.residual
+        small_terms(campaign, conditions, responses(conditions)),
+        project,
+        tangents.residual,
     )
     prior = screens.first(signatures)
     best: tuple[Hypothesis, ...] = ()
@@ -138,14 +144,16 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
             every = [*nuisance, *members]
-            if adds_play(here, every):
-                rest = resting(here, every, start) if rest is None else rest
-                held = replace(here, rest=rest)
+            if adds_play(conditions, every):
+                rest = resting(conditions, every, start) if rest is None else rest
+                held = replace(conditions, rest=rest)
                 fits[one.members] = refit(campaign, held, every, start, behind=behind)
             elif _names(every) in known:
                 fits[one.members] = known[_names(every)]
             else:
-                fits[one.members] = refit(campaign, here, every, start, finite, behind)
+                fits[one.members] = refit(
+                    campaign, conditions, every, start, finite, behind
+                )
                 known[_names(every)] = fits[one.members]
             if not waiting:  # the best set needs each of its members
                 refitted = _with_fits(screen, sets, fits)
@@ -166,11 +174,11 @@ def _select(campaign: Campaign, here: Conditions, update: Update) -> Selection:
         if not settled:
             prior = again
             known = {}
-        if adds_play(here, best):
-            rest = resting(here, best, chosen.values)
+        if adds_play(conditions, best):
+            rest = resting(conditions, best, chosen.values)
         signatures = _about(tangents, signatures, chosen, len(nuisance))
-    if adds_play(here, chosen.hypotheses):
-        chosen = in_full(campaign, here, chosen, behind)
+    if adds_play(conditions, chosen.hypotheses):
+        chosen = in_full(campaign, conditions, chosen, behind)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rivals = _rivals(screen, sets, fits)
     tangent = [tangents.at_start(h) for h in nuisance]
@@ -248,12 +256,12 @@ def _rivals(
 ) -> tuple[Fit, ...]:
     """The best fits of sets of effects that do not contain the best's, nor it them."""
     own = frozenset(screen.effects[i] for i in sets[0].members)
-    found: dict[frozenset[str], Fit] = {}
+    selected: dict[frozenset[str], Fit] = {}
     for one in sets:
         other = frozenset(screen.effects[i] for i in one.members)
         if one.members in fits and not (own <= other or other <= own):
-            found.setdefault(other, fits[one.members])
-    return tuple(found.values())
+            selected.setdefault(other, fits[one.members])
+    return tuple(selected.values())
 
 
 def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
@@ -265,9 +273,9 @@ def _worth_refitting(screen: Screen, sets: Sequence[Scored]) -> list[Scored]:
         kinds.setdefault(frozenset(screen.effects[i] for i in s.members), s)
     others = list(kinds.values())[:_KINDS]
     parts |= {s.members for s in others if s.score > sets[0].score - _NEAR}
-    found = [s for s in sets if s.members in parts]
-    slow = [s for s in found if len(s.members) > 1 and _has_finite(screen, s)]
-    return [s for s in found if s not in slow[_SLOW:]]
+    selected = [s for s in sets if s.members in parts]
+    slow = [s for s in selected if len(s.members) > 1 and _has_finite(screen, s)]
+    return [s for s in selected if s not in slow[_SLOW:]]
 
 
 def _parts(screen: Screen, one: Scored) -> list[Scored]:

@@ -14,58 +14,61 @@ from validation.diagnosis.verdict import Calibration
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 
-def sentence(found: Diagnosis) -> str:
+def sentence(diagnosis: Diagnosis) -> str:
     """What may be said, and no more."""
-    where = _judged_on(found)
-    kept = f"on {where} the residual is {found.before.normalised:.2f} sigma before"
-    if found.verdict == "none_needed":
+    where = _judged_on(diagnosis)
+    kept = f"on {where} the residual is {diagnosis.before.normalised:.2f} sigma before"
+    if diagnosis.verdict == "none_needed":
         return (
             "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({found.before.normalised:.2f} sigma on {where})."
+            f"can tell ({diagnosis.before.normalised:.2f} sigma on {where})."
         )
-    if found.verdict == "explained":
-        small_ones = [WORDS[term.name] for term in found.behind.terms]
-        names = " and ".join([*found.claimed, *small_ones])
+    if diagnosis.verdict == "explained":
+        small_ones = [WORDS[term.name] for term in diagnosis.behind.terms]
+        names = " and ".join([*diagnosis.claimed, *small_ones])
         return (
-            f"The declared model lacks {names}; {kept}, {found.after.normalised:.2f} "
-            "after (1 is noise)."
+            f"The declared model lacks {names}; {kept}, "
+            f"{diagnosis.after.normalised:.2f} after (1 is noise)."
         )
-    if found.verdict == "learned":
-        names = " and ".join([*found.claimed, *titles(found)][:6])
+    if diagnosis.verdict == "learned":
+        names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
         return (
             f"The library lacks what was learned: {names}; {kept}, "
-            f"{found.after.normalised:.2f} after (1 is noise)."
+            f"{diagnosis.after.normalised:.2f} after (1 is noise)."
         )
-    if found.verdict == "ambiguous":
+    if diagnosis.verdict == "ambiguous":
         sets = " or ".join(
-            " + ".join(names) or "nothing" for names, _ in found.alternatives[:4]
+            " + ".join(names) or "nothing" for names, _ in diagnosis.alternatives[:4]
         )
         return f"This design cannot tell which effect it is: {sets}; {kept}."
-    seen = ", ".join(t.against for t in found.trends[:3]) or "nothing that was recorded"
+    seen = (
+        ", ".join(t.against for t in diagnosis.trends[:3])
+        or "nothing that was recorded"
+    )
     return (
         "No effect of the library explains the residual: at best "
-        f"{found.lack.rms:.2f} sigma are left, which vary with {seen}; {kept}, "
-        f"{found.after.normalised:.2f} with what was found."
+        f"{diagnosis.lack.rms:.2f} sigma are left, which vary with {seen}; {kept}, "
+        f"{diagnosis.after.normalised:.2f} with what was found."
     )
 
 
-def titles(found: Diagnosis) -> list[str]:
+def titles(diagnosis: Diagnosis) -> list[str]:
     """Where every learned function acts, and of what."""
-    every = functions_of(found.campaign, found.model)
+    every = functions_of(diagnosis.campaign, diagnosis.model)
     return [function.title for functions in every for function in functions]
 
 
-def _judged_on(found: Diagnosis) -> str:
+def _judged_on(diagnosis: Diagnosis) -> str:
     """Which rows the errors before and after are of."""
-    aside = ~found.split.fitted
+    aside = ~diagnosis.split.fitted
     return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
 
 
 def calibration_text(tally: Calibration) -> str:
     """How often the method is right on this design, in words."""
 
-    def counts(said: dict[str, int]) -> str:
-        return ", ".join(f"{name} {n}" for name, n in sorted(said.items()))
+    def counts(words: dict[str, int]) -> str:
+        return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
 
     named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
     return (
@@ -78,8 +81,8 @@ def calibration_text(tally: Calibration) -> str:
 def noise_text(factor: NDArray) -> str:
     """That repeats were believed rather than the sigma stated."""
     parts = {"rotations": factor[0], "positions": factor[3]}
-    said = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
-    return f"repeats scatter more than the sigma stated, which was taken {said}"
+    words = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
+    return f"repeats scatter more than the sigma stated, which was taken {words}"
 
 
 def open_text(open_: NDArray) -> str:
@@ -101,16 +104,16 @@ def open_text(open_: NDArray) -> str:
 def formula(function: Function) -> str:
     """A function in words, by component: numbers times what they multiply."""
     name = function.variables[0].rpartition(".")[2]
-    told = []
+    words = []
     for component in function.components:
         numbers = parameters_of(function, component)
         terms = [
             f"{numbers[key]:.4g} {_column_text(function.form, key, name)}".rstrip()
             for key in columns_of(function, component)
         ]
-        told.append(f"{component} = {' + '.join(terms)}")
+        words.append(f"{component} = {' + '.join(terms)}")
     times = " (times the wrench there)" if function.kind == "compliance" else ""
-    return "; ".join(told) + times
+    return "; ".join(words) + times
 
 
 def _column_text(form: str, key: str, name: str) -> str:
@@ -118,6 +121,8 @@ def _column_text(form: str, key: str, name: str) -> str:
     head, _, word = key.rpartition(".")
     if form == "powers":
         return {"0": "", "1": name}.get(key, f"{name}^{key}")
+    if form == "waves" and head == "0":
+        return ""
     if form == "waves":
         return f"{'sin' if word == 'sine' else 'cos'}({head} {name})"
     return f"{form}.{key}({name})"

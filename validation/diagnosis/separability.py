@@ -78,7 +78,7 @@ class Separability:
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
         alike &= np.outer(self.traced, self.traced)
         waiting = list(range(len(self.names)))
-        found = []
+        groups = []
         while waiting:
             group, edge = set(), {waiting[0]}
             while edge:
@@ -87,8 +87,8 @@ class Separability:
                 edge = set(near.tolist()) - group
             waiting = [i for i in waiting if i not in group]
             if len(group) > 1:
-                found.append(tuple(self.names[i] for i in sorted(group)))
-        return found
+                groups.append(tuple(self.names[i] for i in sorted(group)))
+        return groups
 
     def imitated(self) -> list[tuple[str, str]]:
         """Pairs (a, b): whatever a does b can do as well, but not the other way."""

@@ -101,20 +101,20 @@ class Tangents:
 
     Attributes:
         campaign: of R rows, N measured cells.
-        here: its conditions as declared, with the registration if that was fitted.
+        conditions: as declared, with the registration if that was fitted.
         declared: (N,) what they predict, whitened.
         residual: (N,) whitened readings minus that.
     """
 
-    def __init__(self, campaign: Campaign, here: Conditions) -> None:
+    def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         """Predict what the declared model reads.
 
         Args:
             campaign: what was measured.
-            here: under which conditions.
+            conditions: under which conditions.
         """
-        self.campaign, self.here = campaign, here
-        prediction = predict(here)
+        self.campaign, self.conditions = campaign, conditions
+        prediction = predict(conditions)
         self.declared = whiten(campaign, prediction.deviation)
         self.residual = whiten(campaign, campaign.measured) - self.declared
         self._columns: dict[object, NDArray] = {}
@@ -128,7 +128,7 @@ class Tangents:
         Returns:
             (N,) whitened; NaN where the model has no answer.
         """
-        there = apply_effects(self.here, effects)
+        there = apply_effects(self.conditions, effects)
         settles = any(LIBRARY[name].clearance for name in effects)
         if settles and there.rest is None and not there.exact:
             there, _ = with_clearances_taken_up(there)
@@ -165,10 +165,10 @@ class Tangents:
     def _invisible(self, hypothesis: Hypothesis) -> bool:
         """Whether an effect without unknowns hardly shows where loads are largest."""
         # the exact model is a hundred times slower than the linear one
-        load = np.linalg.norm(self.here.load, axis=1)
-        size = np.linalg.norm(predict(self.here).deviation[:, :3], axis=1)
+        load = np.linalg.norm(self.conditions.load, axis=1)
+        size = np.linalg.norm(predict(self.conditions).deviation[:, :3], axis=1)
         rows = np.unique([*np.argsort(-load)[:_PROBED], *np.argsort(-size)[:_PROBED]])
-        some, part = self.campaign.take(rows), self.here.take(rows)
+        some, part = self.campaign.take(rows), self.conditions.take(rows)
         there = apply_effects(part, {hypothesis.effect: {}})
         change = predict(there).deviation - predict(part).deviation
         size = whiten(some, change)
@@ -181,9 +181,9 @@ class Tangents:
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._columns:
             step = _STEP * slot.unknown.scale
-            here = slot.unknown.start + step
-            values = {**shapes, **dict.fromkeys(slot.names, here)}
-            public = LIBRARY[effect].public(self.here.robot, values)
+            start = slot.unknown.start + step
+            values = {**shapes, **dict.fromkeys(slot.names, start)}
+            public = LIBRARY[effect].public(self.conditions.robot, values)
             self._columns[key] = (self.model({effect: public}) - self.declared) / step
         return self._columns[key]
 
@@ -200,7 +200,7 @@ class Tangents:
         Returns:
             The tangent.
         """
-        robot = self.here.robot
+        robot = self.conditions.robot
 
         def model(values: NDArray) -> NDArray:
             own = {hypothesis.effect: hypothesis.public(robot, values)}

@@ -71,20 +71,20 @@ class SmallTerm:
 
 
 def small_terms(
-    campaign: Campaign, here: Conditions, answers: Responses
+    campaign: Campaign, conditions: Conditions, answers: Responses
 ) -> list[SmallTerm]:
     """Geometry and springs of a campaign's robot.
 
     Args:
         campaign: of R rows, N measured cells.
-        here: its conditions as declared.
+        conditions: its conditions as declared.
         answers: of the readings there.
 
     Returns:
         Terms whose unknowns show in the readings; none of a kind that does not.
     """
     frames = campaign.robot.frames
-    own = [here.robot.index(frame.name) for frame in frames]
+    own = [conditions.robot.index(frame.name) for frame in frames]
     screws = answers.screws[:, :, own]
     given = np.array([
         np.full(6, np.nan) if frame.tolerance is None else frame.tolerance
@@ -124,7 +124,7 @@ def _term(
 
 
 def added(
-    campaign: Campaign, answers: Responses, here: Conditions,
+    campaign: Campaign, answers: Responses, conditions: Conditions,
     terms: Sequence[SmallTerm], values: Sequence[NDArray],
     changes: Mapping[str, NDArray],
 ) -> NDArray:  # fmt: skip
@@ -133,7 +133,7 @@ def added(
     Args:
         campaign: of R rows.
         answers: of its readings.
-        here: its conditions.
+        conditions: its conditions.
         terms: found on these rows or on others of the same robot.
         values: (k,) of each term.
         changes: (R, 6, k) of the readings per unknown of other terms, by their names.
@@ -141,14 +141,16 @@ def added(
     Returns:
         (R, 6) [rad, m].
     """
-    total = np.zeros((len(here), 6))
-    own = np.array([here.robot.index(frame.name) for frame in campaign.robot.frames])
+    total = np.zeros((len(conditions), 6))
+    own = np.array([
+        conditions.robot.index(frame.name) for frame in campaign.robot.frames
+    ])
     for term, x in zip(terms, values, strict=True):
         if term.name in changes:
             total += changes[term.name] @ x
             continue
         rows = own[term.frame]
-        amount = np.broadcast_to(x, (len(here), len(x)))
+        amount = np.broadcast_to(x, (len(conditions), len(x)))
         if term.name == SPRINGS:
             amount = amount * answers.wrenches[:, rows, term.axis]
         total += np.einsum("rik,rk->ri", answers.screws[:, :, rows, term.axis], amount)

@@ -39,25 +39,29 @@ class Trend:
     probability: float
 
 
-def trends(campaign: Campaign, here: Conditions, residual: NDArray) -> list[Trend]:
+def trends(
+    campaign: Campaign, conditions: Conditions, residual: NDArray
+) -> list[Trend]:
     """What a residual varies with, the strongest first.
 
     Args:
         campaign: of R rows.
-        here: its conditions.
+        conditions: its conditions.
         residual: (R, 6) [rad, m]; NaN where not measured.
 
     Returns:
         At most six trends that noise would hardly show.
     """
     z = residual / campaign.sigma
-    tried = list(_candidates(campaign, here))
-    found = [_test(name, X, z, len(tried)) for name, X in tried]
-    seen = [t for t in found if t is not None and t.probability < _SEEN]
+    tried = list(_candidates(campaign, conditions))
+    tested = [_test(name, X, z, len(tried)) for name, X in tried]
+    seen = [t for t in tested if t is not None and t.probability < _SEEN]
     return sorted(seen, key=lambda t: -t.share)[:_MOST]
 
 
-def _candidates(campaign: Campaign, here: Conditions) -> Iterator[tuple[str, NDArray]]:
+def _candidates(
+    campaign: Campaign, conditions: Conditions
+) -> Iterator[tuple[str, NDArray]]:
     """Names, and functions (R, p) without the constant."""
     loads = campaign.loads
     force = loads[:, 3:]
@@ -67,14 +71,14 @@ def _candidates(campaign: Campaign, here: Conditions) -> Iterator[tuple[str, NDA
     yield "size of the load", size[:, None]
     for name, w in zip(LOAD, loads.T, strict=True):
         yield f"load.{name}", w[:, None]
-    pose = pose_components(here.postures.platform)
+    pose = pose_components(conditions.postures.platform)
     yield "pose, linearly", pose
     for name, p in zip(POSE, pose.T, strict=True):
         yield f"pose.{name} and its square", _powers(p)
-    for i, frame in enumerate(here.robot.frames):
+    for i, frame in enumerate(conditions.robot.frames):
         if not frame.actuated:
             continue
-        q = here.coordinates[:, i]
+        q = conditions.coordinates[:, i]
         yield f"q.{frame.name} and its square", _powers(q)
         if frame.joint == "revolute":
             for n in (1, 2):

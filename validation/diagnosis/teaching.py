@@ -29,59 +29,68 @@ _ERROR = 1.0  # standard errors by which rows kept aside must be foretold better
 
 def taught(
     campaign: Campaign,
-    here: Conditions,
+    conditions: Conditions,
     used: NDArray,
-    found: Selection,
+    selection: Selection,
     update: Update,
 ) -> tuple[Selection, tuple[Learned, ...]]:
     """Learn what the library leaves, where that is more than noise.
 
     Args:
         campaign: of R rows.
-        here: conditions of all rows, as declared and registered.
+        conditions: conditions of all rows, as declared and registered.
         used: mask (R,) of the rows fitted.
-        found: what the library says of them.
+        selection: what the library says of them.
         update: told what is done, how much of it and of how much.
 
     Returns:
         The selection with the functions behind its effects, or what was given, and the
         functions.
     """
-    fitting, some = campaign.take(used), here.take(used)
-    left = found.behind.left(found.fit.residual)
-    unknowns = found.unknowns + round(found.behind.unknowns)
+    fitting, some = campaign.take(used), conditions.take(used)
+    left = selection.behind.left(selection.fit.residual)
+    unknowns = selection.unknowns + round(selection.behind.unknowns)
     if lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT:
-        return found, ()
-    answers = responses(here)
-    places = Answers(here, campaign.robot, answers)
+        return selection, ()
+    answers = responses(conditions)
+    places = Answers(conditions, campaign.robot, answers)
     device = [device_frame(some)] if campaign.registration == "unknown" else []
     begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
     alone = refit(fitting, some, device, begin)
-    stories = [(alone, found.columns[:, : len(begin)])]
-    if found.sets[0].members and found.sets[0].rank:
-        raw = found.behind.raw(found.fit.residual)
-        stories.append((replace(found.fit, residual=raw), found.columns))
+    stories = [(alone, selection.columns[:, : len(begin)])]
+    if selection.sets[0].members and selection.sets[0].rank:
+        raw = selection.behind.raw(selection.fit.residual)
+        stories.append((replace(selection.fit, residual=raw), selection.columns))
     lessons = [
-        learn(campaign, used, here, places, found.terms, fit.residual, columns, update)
+        learn(
+            campaign,
+            used,
+            conditions,
+            places,
+            selection.terms,
+            fit.residual,
+            columns,
+            update,
+        )
         for fit, columns in stories
     ]
     best = min(range(len(stories)), key=lambda k: lessons[k].cost)
     lesson, fit = lessons[best], stories[best][0]
     if not lesson.learned:
-        return found, ()
+        return selection, ()
     behind = background(lesson.terms, lesson.prior)
     fit = refit(
         fitting, with_play_held(some, fit), fit.hypotheses, fit.values, behind=behind
     )
-    story = replace(found, fit=fit, behind=behind, terms=lesson.terms)
+    story = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
     if best == 0:
-        nothing = found.screen.fit(())
-        story = replace(story, sets=[nothing, *found.sets], unknowns=len(begin))
-    held = with_play_held(here, found.fit)
-    before = Model(held, answers, found.fit, found.behind)
-    after = Model(here, answers, fit, behind, lesson.learned)
+        nothing = selection.screen.fit(())
+        story = replace(story, sets=[nothing, *selection.sets], unknowns=len(begin))
+    held = with_play_held(conditions, selection.fit)
+    before = Model(held, answers, selection.fit, selection.behind)
+    after = Model(conditions, answers, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
-        return found, ()
+        return selection, ()
     return story, lesson.learned
 
 
@@ -113,7 +122,7 @@ def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
         For every effect learned one function, or several of one kind.
     """
     behind = model.behind
-    places = Answers(model.here, campaign.robot, model.answers)
+    places = Answers(model.conditions, campaign.robot, model.answers)
     values = behind.values(model.fit.residual)
     everyone = zip(behind.terms, values, behind.deviations(), strict=True)
     known = {term.name: (x, std) for term, x, std in everyone}

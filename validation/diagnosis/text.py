@@ -19,57 +19,66 @@ from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.verdict import Calibration
 
 
-def text(found: Diagnosis, tally: Calibration | None = None) -> str:
+def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     """The diagnosis for a terminal."""
-    lines = [f"{found.campaign.name}: {found.verdict}", sentence(found), ""]
-    for effect in effects(found) if found.verdict in LISTED else []:
+    lines = [f"{diagnosis.campaign.name}: {diagnosis.verdict}", sentence(diagnosis), ""]
+    for effect in effects(diagnosis) if diagnosis.verdict in LISTED else []:
         lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
         for p in effect["parameters"]:
             lines.append(
                 f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
             )
     for name in (GEOMETRY, SPRINGS):
-        lines += _small_text(small(found, name), name)
-    for one in learned(found):
+        lines += _small_text(small(diagnosis, name), name)
+    for one in learned(diagnosis):
         where = f"{one['where']} {', '.join(one['components'])}"
         lines.append(f"learned: {where} of {', '.join(one['variables'])}")
-        told = one["formula"]
-        lines.append(f"  {told if len(told) < 160 else told[:157] + '...'}")
+        formula = one["formula"]
+        lines.append(f"  {formula if len(formula) < 160 else formula[:157] + '...'}")
         if one["equivalent_places"]:
             lines.append(f"  {len(one['equivalent_places'])} other places do as well")
     lines += ["", "sets of effects, by probability:"]
-    for names, p in found.alternatives:
+    for names, p in diagnosis.alternatives:
         lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    aside = "rows kept aside" if (~found.split.fitted).any() else "rows fitted"
+    aside = "rows kept aside" if (~diagnosis.split.fitted).any() else "rows fitted"
     lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
-        row = [getattr(e, name) for e in (found.before, found.after, found.noise)]
+        row = [
+            getattr(e, name)
+            for e in (diagnosis.before, diagnosis.after, diagnosis.noise)
+        ]
         if name == "normalised":
             row[2] = 1.0
         shown = "".join(
             f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
         )
         lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    far = [i for i, o in zip(found.campaign.ids, found.outliers, strict=True) if o]
-    if (found.outliers & ~found.split.fitted).any():
-        cut = [f"{e.normalised:>12.3g}" for e in found.trimmed]
+    far = [
+        i for i, o in zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True) if o
+    ]
+    if (diagnosis.outliers & ~diagnosis.split.fitted).any():
+        cut = [f"{e.normalised:>12.3g}" for e in diagnosis.trimmed]
         lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
-    lines += ["", *_ladder_text(found), *found.remarks]
-    if np.any(found.noise_factor > 1):
-        lines += ["", noise_text(found.noise_factor)]
+    lines += ["", *_ladder_text(diagnosis), *diagnosis.remarks]
+    if np.any(diagnosis.noise_factor > 1):
+        lines += ["", noise_text(diagnosis.noise_factor)]
     if far:
         lines += ["", f"left out as outliers: {', '.join(far)}"]
-    if found.open.any():
-        lines += ["", open_text(found.open)]
-    for trend in found.trends:
+    if diagnosis.open.any():
+        lines += ["", open_text(diagnosis.open)]
+    for trend in diagnosis.trends:
         lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
-    if found.next is not None:
-        where = ", ".join(f"{k}={v:.4g}" for k, v in found.next.configuration.items())
-        covariates = "".join(f", {k} {v:g}" for k, v in found.next.covariates.items())
+    if diagnosis.next is not None:
+        where = ", ".join(
+            f"{k}={v:.4g}" for k, v in diagnosis.next.configuration.items()
+        )
+        covariates = "".join(
+            f", {k} {v:g}" for k, v in diagnosis.next.covariates.items()
+        )
         lines += [
             "",
-            f"measure next: {where}; load {load_text(found.next.load)}{covariates}",
-            f"  {found.next.why}",
+            f"measure next: {where}; load {load_text(diagnosis.next.load)}{covariates}",
+            f"  {diagnosis.next.why}",
         ]
     if tally is not None:
         lines += ["", calibration_text(tally)]
@@ -91,9 +100,9 @@ def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
     ]
 
 
-def _ladder_text(found: Diagnosis) -> list[str]:
+def _ladder_text(diagnosis: Diagnosis) -> list[str]:
     """What every step bought, on the rows kept aside."""
-    rows = steps(found)
+    rows = steps(diagnosis)
     unit = rows[-1]["unit"]
     head = f"{'step':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'bought':>10}"
     lines = [head]

@@ -152,11 +152,11 @@ def calibrate(
         sets = trial.search()
         freedom = screen.count - sets[0].rank
         more = float(chi2.sf(sets[0].rss, freedom)) < SIGNIFICANT
-        said, claimed = verdict(by_names(trial, sets), inclusion(trial, sets), more)
-        tally[there][said] += 1
+        decision, claimed = verdict(by_names(trial, sets), inclusion(trial, sets), more)
+        tally[there][decision] += 1
         expected = truth if there else ()
-        right += there and said == "explained" and claimed == truth
-        wrong += said == "explained" and claimed != expected
+        right += there and decision == "explained" and claimed == truth
+        wrong += decision == "explained" and claimed != expected
         update(k + 1, 2 * count)
     return Calibration(
         count, dict(tally[False]), dict(tally[True]),

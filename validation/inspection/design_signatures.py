@@ -52,14 +52,14 @@ def design_signatures(
     Returns:
         The signatures.
     """
-    here, unregistered = conditions_of(campaign), ""
+    conditions, unregistered = conditions_of(campaign), ""
     if campaign.registration == "unknown":
         try:
-            here = register(campaign, here)
+            conditions = register(campaign, conditions)
         except BadInput as error:
             unregistered = str(error)
-    tangents = Tangents(campaign, here)
-    shown = _one_each(hypotheses(here, loaded_components(campaign)))
+    tangents = Tangents(campaign, conditions)
+    shown = _one_each(hypotheses(conditions, loaded_components(campaign)))
     columns, untestable = {}, {}
     for done, name in enumerate(LIBRARY):
         progress(done, len(LIBRARY))
@@ -141,7 +141,7 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
             scale = slot.unknown.scale
             size = slot.start + scale if effect.linear else scale
             values = {**rest, **shapes, **dict.fromkeys(slot.names, size)}
-            public = effect.public(tangents.here.robot, values)
+            public = effect.public(tangents.conditions.robot, values)
             columns.append(tangents.model({effect.name: public}) - tangents.declared)
     return np.column_stack(columns)
 

@@ -15,9 +15,9 @@ from validation.inspection.remark import CAREFUL, LOST
 from validation.inspection.repeats import RepeatNoise
 
 
-def inspection_text(found: Inspection) -> str:
+def inspection_text(inspection: Inspection) -> str:
     """An inspection for people."""
-    c = found.campaign
+    c = inspection.campaign
     kinds = row_counts(c.configuration)
     lines = [
         f"{c.name}: {len(c)} rows of {c.robot.name}, {kinds['count']} "
@@ -25,17 +25,17 @@ def inspection_text(found: Inspection) -> str:
         *_reading_lines(c),
         *_load_lines(c),
         *_covariate_lines(c),
-        f"repeats: {found.repeats.sets} sets of {found.repeats.rows} rows, "
-        f"{found.repeats.order}",
-        *_noise_lines(c, found.noise),
-        *([open_text(found.open)] if found.open.any() else []),
+        f"repeats: {inspection.repeats.sets} sets of {inspection.repeats.rows} rows, "
+        f"{inspection.repeats.order}",
+        *_noise_lines(c, inspection.noise),
+        *([open_text(inspection.open)] if inspection.open.any() else []),
         "",
-        *_separability_lines(found),
+        *_separability_lines(inspection),
     ]
     heads = {LOST: "What this campaign cannot tell:", CAREFUL: "Be careful:"}
     for weight, head in heads.items():
-        said = [f"  {r.text}" for r in found.remarks if r.weight == weight]
-        lines += ["", head, *said] if said else []
+        remarks = [f"  {r.text}" for r in inspection.remarks if r.weight == weight]
+        lines += ["", head, *remarks] if remarks else []
     return "\n".join(lines)
 
 
