@@ -1,6 +1,6 @@
 """A simulated machine corrected: its error at the machine before and after.
 
-    python benchmarks/compensation.py OUT.json --count 20 [--first 0]
+    python benchmarks/compensation.py OUT.json --count 20 [--first 0] [--robots arm6]
 
 Case k, drawn from seed k: a robot of six drives, or a Delta (positions alone), with one
 or two hidden effects of the library or outside it, each 5 times the noise.  It is
@@ -54,11 +54,11 @@ NAMES = [
 ]  # fmt: skip
 
 
-def draw_case(seed: int) -> Synthetic:
+def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
     """A measured machine; draws again what a robot cannot have."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
-        robot = without_clearance(load_robot(str(rng.choice(ROBOTS))))
+        robot = without_clearance(load_robot(str(rng.choice(robots))))
         names = rng.choice(NAMES, int(rng.integers(1, 3)), replace=False)
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-4] * 3, *[1e-4] * 3]
         try:
@@ -89,10 +89,10 @@ def plan_table(plan: CampaignPlan) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run_case(seed: int) -> dict[str, Any]:
+def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
     """Errors at the machine before and after, in units of the noise."""
     begin = time.process_time()
-    case = draw_case(seed)
+    case = draw_case(seed, robots)
     rng = np.random.default_rng([seed, 999])
     design = replace(_design(case.robot), configurations=TARGETS, rows=TARGETS)
     plan = plan_campaign(case.robot, design, rng)
@@ -140,10 +140,12 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--robots", default=",".join(ROBOTS))
     given = parser.parse_args()
+    robots = tuple(given.robots.split(","))
     answers = []
     for seed in range(given.first, given.first + given.count):
-        answers.append(run_case(seed))
+        answers.append(run_case(seed, robots))
         given.out.write_text(json.dumps(answers, indent=1))
         print(json.dumps(answers[-1]), flush=True)
     for key in ("before", "after", "before_um", "after_um"):

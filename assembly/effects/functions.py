@@ -20,6 +20,7 @@ from assembly.measurement.conditions import Conditions, Yield
 from assembly.measurement.variables import LOADS, past, variable
 from assembly.model.function import Function
 from assembly.model.robot import BASE, Robot
+from forcefit.inputs.errors import BadInput
 from stiffness.screws import SCREW
 
 AXES = tuple(axis.lower() for axis in SCREW)
@@ -199,6 +200,9 @@ def apply_functions(
 
     Returns:
         Conditions with all of them.
+
+    Raises:
+        BadInput: a function has no finite value in some situation.
     """
     recorded = conditions if recorded is None else recorded
     for function in functions:
@@ -232,13 +236,25 @@ def _with_function(
     change = np.zeros((len(conditions), 6))
     for component in function.components:
         row = components_of(where).index(component)
-        values = value_of(function, component, list(inputs.T))
-        change[:, row] += np.where(acts, values, 0.0)
+        values = np.where(acts, value_of(function, component, list(inputs.T)), 0.0)
+        _check_finite(function, values, inputs)
+        change[:, row] += values
     if where == "reading":
         return replace(conditions, reading=conditions.reading + change)
     if where == "load":
         return replace(conditions, load=conditions.load + change)
     return with_screws(conditions, where, change)
+
+
+def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
+    """Refuse a function that has no value where it is asked for one."""
+    for row in np.flatnonzero(~np.isfinite(values))[:1]:
+        known = zip(function.variables, inputs[row], strict=False)
+        where = ", ".join(f"{name} = {x:g}" for name, x in known)
+        raise BadInput(
+            f'effect "{function.title}": found {values[row]:g} at {where}, expected a '
+            "finite number"
+        )
 
 
 def _yielding(

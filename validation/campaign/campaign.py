@@ -114,7 +114,9 @@ class Campaign:
     @property
     def sessions(self) -> tuple[str, ...]:
         """Names of its sessions in the order of first use; none where it has none."""
-        return () if self.session is None else tuple(dict.fromkeys(self.session))
+        return (
+            () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
+        )
 
     @property
     def targets(self) -> NDArray:

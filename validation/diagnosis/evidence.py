@@ -189,6 +189,7 @@ class Evidence:
         self._given = np.concatenate([np.zeros(0), *(t.given for t in terms)])
         J = np.hstack([np.zeros((cells, 0)), *(term.columns for term in terms)])
         norm = np.linalg.norm(J, axis=0)
+        norm[norm == 0.0] = 1.0  # what others imitate wholly shows nothing
         values, V = np.linalg.eigh((J / norm).T @ (J / norm))
         shown = values > _RANK * values.max(initial=1.0)
         root = np.sqrt(values[shown])

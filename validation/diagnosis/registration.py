@@ -58,7 +58,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
         for values in _device(campaign, own):
             conditions = apply_effects(conditions, {"registration": values})
         return conditions
-    for session in dict.fromkeys(conditions.session):
+    for session in dict.fromkeys(conditions.session.tolist()):
         rows = campaign.session == session
         if not rows.any():
             raise BadInput(

@@ -117,6 +117,13 @@ def test_functions_act_in_solve_and_exact(command, tmp_path, run):
     assert screw["platform_screw"] == pytest.approx(expected, rel=1e-3, abs=1e-8)
 
 
+def test_a_formula_without_a_value_is_refused_where_it_is_used(tmp_path, run):
+    path = str(arm_with(tmp_path, FORMULA.replace("sin(3*q)", "log(q)")))
+    code, _, error = run("assembly", "solve", path, "--joint", "drive=-0.3")
+    assert code == 2
+    assert "found nan at q.drive = -0.3, expected a finite number" in error
+
+
 def test_a_session_is_asked_for_by_its_name(tmp_path, run):
     path = str(arm_with(tmp_path, PUBLIC))
     words = ["solve", path, "--joint", "drive=0.5"]

@@ -10,8 +10,10 @@ from assembly.files.robot_file import write_robot
 from assembly.robots import load_robot
 from stiffness.screws import rotation_matrix, rotation_vector
 from tests.campaigns_for_tests import write_campaign
-from validation.campaign.campaign_file import read_commands
+from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.prediction import foretell
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import corrected
 
 SIGMA = 2e-5
 DEVICE = np.array([0.3, -0.2, 0.5, 1.2, -0.4, 0.7])
@@ -114,6 +116,23 @@ def test_zeros_set_anew_are_found_when_asked_for(machine, run):
     assert day["error"]["normalised"] < 1.4
     # the first joint's zero is a turn of the base: the registration's, too
     assert without["error"]["normalised"] < 1.4
+
+
+def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):
+    """The device stood elsewhere each day: the file says where, and noise is left."""
+    tight = load_robot(machine / "declared.toml")
+    tight = replace(
+        tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
+    )
+    zeros = {f.name: 5e-4 for f in tight.frames if f.actuated}
+    write_robot(tight, machine / "declared.toml")
+    hidden = replace(tight, effects={"encoder_offset": zeros})
+    write_robot(hidden, machine / "saved.toml")
+    folder = measured(machine, 60, 0.8, ["a", "b"] * 30)
+    write_robot(corrected(diagnose(read_campaign(folder))), machine / "found.toml")
+    again = read_commands(folder, load_robot(machine / "found.toml"))
+    error = foretell(replace(again, registration="known")).error
+    assert 0.8 < error[2] < 1.1
 
 
 def test_sessions_are_carried_one_by_one(machine, run):
