@@ -84,11 +84,11 @@ class _Path:
     def pull(self, local: Expansion) -> NDArray:
         """(N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
-        return slopes_of(local.here, unit)
+        return slopes_of(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
         """(N,) product with a motion, as lengths on the path count."""
-        return self.weight * motion / local.here.model.units**2
+        return self.weight * motion / local.placement.model.units**2
 
 
 def follow_load(
@@ -148,7 +148,7 @@ def _begin(
     """The first equilibrium, its tangent, and the weight that balances both lengths."""
     B, q = local.basis, path.pull(local)
     motion = B @ np.linalg.solve(B.T @ local.hessian @ B, B.T @ q)
-    size = np.linalg.norm(motion / local.here.model.units)
+    size = np.linalg.norm(motion / local.placement.model.units)
     weight = 1.0 / (size * path.range) ** 2
     # half of the length is the load's
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
@@ -159,7 +159,7 @@ def _begin(
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
     """The next equilibrium, and the corrections taken; None if they do not settle."""
-    x0, load = place.local.here.x, place.load
+    x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise
     normal_to = path.covector(place.local, place.motion)
@@ -168,7 +168,7 @@ def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, in
         local = path.expand(x, load, place.local)
         B = local.basis
         closing = np.zeros(len(x))
-        closing[local.loose] = -local.inverse @ local.here.residual
+        closing[local.loose] = -local.inverse @ local.placement.residual
         left = B.T @ (local.gradient + local.hessian @ closing)
         long_of = normal_to @ (x + closing - x0) + rise * (load - place.load) - step
         change = _solve(path, local, normal_to, rise, np.append(left, long_of))
@@ -220,13 +220,13 @@ def _oriented(
 
 def _curve(path: _Path, posture: Posture, places: list[_Place]) -> DeflectionCurve:
     """What was met, with its limit points."""
-    screws = np.array([p.local.here.platform_screw for p in places])
-    moved = [p.local.here.platform_rows[path.component] @ p.motion for p in places]
+    screws = np.array([p.local.placement.platform_screw for p in places])
+    moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
     with np.errstate(divide="ignore"):
         slopes = np.array([p.rise for p in places]) / np.array(moved)
     return DeflectionCurve(
         posture, path.component, np.array([p.load for p in places]), screws,
-        np.array([energy_of(p.local.here) for p in places]), slopes,
+        np.array([energy_of(p.local.placement) for p in places]), slopes,
         (frozenset(),) * len(places), np.zeros(len(places), dtype=bool),
         tuple(_limits(places)),
     )  # fmt: skip
