@@ -41,7 +41,7 @@ OWNERS = {
         "assembly/sweeps/dataset.py",
         "assembly/statistics/monte_carlo.py",
         "assembly/statistics/importance_table.py",
-        "assembly/statistics/tolerances.py",
+        "assembly/statistics/allocated_tolerances.py",
         "assembly/model/tables.py",
     ),
     "pandas": ("assembly/model/tables.py",),

@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from assembly.batch.compiled_energy import small_answer
 from assembly.batch.compiled_zone import farthest, turn_first
+from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
-from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.vectors import copy, fill, inner
 
 SOLVED, UNCERTIFIED = range(2)
-_STOP = 1e-2
+_STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
 _PROJECTIONS, _INWARDS = 30, 0.8
-_MARGIN_GAP = 1e-8  # as in assembly.batch.compiled_zone
 
 
 @kernel
 def least_energies(
     Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
     cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
-    energy: NDArray, bound: NDArray, road: NDArray,
+    energy: NDArray, bound: NDArray, outcome: NDArray,
 ) -> None:  # fmt: skip
     """Minimise |G u + h|^2 / 2 for every row of h.
 
@@ -33,25 +33,25 @@ def least_energies(
         starts: (cones + 1,) first clearance of each cone, and nu.
         h: (k, r) [sqrt(2 J)].
         inverse: (nu, r) pseudoinverse of G.
-        cones: (nu, r) how y pulls each clearance, before any elimination.
+        cones: (nu, r) generalised force of y on each clearance, before elimination.
         gram: (r, r) the springs' complementary energy is y.gram y / 2.
         slip: [per size of y] how much the free motions may gain by rounding.
         u: (k, nu) to fill: clearances in units of their cones.
         y: (k, r) to fill: multipliers, scaled to the best proof.
         energy: (k,) to fill [J].
         bound: (k,) to fill [J], certified lower bound.
-        road: (k,) to fill: SOLVED or UNCERTIFIED.
+        outcome: (k,) to fill: SOLVED or UNCERTIFIED.
     """
     nu, r = Gt.shape
     norm = 0.0
     for c in range(nu):
-        here = 0.0
+        squares = 0.0
         for i in range(r):
-            here += Gt[c, i] * Gt[c, i]
-        norm = max(norm, np.sqrt(here))
+            squares += Gt[c, i] * Gt[c, i]
+        norm = max(norm, np.sqrt(squares))
     own, right = np.empty(nu), np.empty(r)
     G = np.empty((nu, r))
-    answer = np.empty(r)
+    own_y = np.empty(r)
     for point in range(len(h)):
         size = 0.0
         for i in range(r):
@@ -59,19 +59,19 @@ def least_energies(
         without = 0.5 * size
         size = max(np.sqrt(size), norm)
         fill(own, 0.0)
-        copy(h[point], answer)
+        copy(h[point], own_y)
         if nu and without > 0.0 and _within(Gt, starts, h[point], inverse, own):
-            fill(answer, 0.0)
+            fill(own_y, 0.0)
         elif nu and without > 0.0:
             fill(own, 0.0)
             for i in range(r):
                 right[i] = h[point, i] / size
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
-            absolute = _STOP * GAP_WITHOUT_PLAY * without / (size * size)
-            small_answer(G, right, starts, _STOP * GAP, absolute, own, answer)
+            absolute = _STOP * GAP_WITHOUT_CLEARANCE * without / (size * size)
+            small_answer(G, right, starts, _STOP * GAP, absolute, own, own_y)
             for i in range(r):
-                answer[i] *= size
+                own_y[i] *= size
         total = 0.0
         for i in range(r):
             v = h[point, i]
@@ -81,48 +81,48 @@ def least_energies(
         for c in range(nu):
             u[point, c] = own[c]
         energy[point] = 0.5 * total
-        worth, cost, pull_size = 0.0, 0.0, 0.0
+        worth, cost, y_size = 0.0, 0.0, 0.0
         for i in range(r):
-            worth += h[point, i] * answer[i]
-            pull_size += answer[i] * answer[i]
+            worth += h[point, i] * own_y[i]
+            y_size += own_y[i] * own_y[i]
             for l in range(r):
-                cost += answer[i] * gram[i, l] * answer[l]
-        worth -= slip * np.sqrt(pull_size)
+                cost += own_y[i] * gram[i, l] * own_y[l]
+        worth -= slip * np.sqrt(y_size)
         for c in range(len(starts) - 1):
-            reach = 0.0
+            size_of_cone = 0.0
             for a in range(starts[c], starts[c + 1]):
-                pull = 0.0
+                component = 0.0
                 for i in range(r):
-                    pull += cones[a, i] * answer[i]
-                reach += pull * pull
-            worth -= np.sqrt(reach)
-        # any multiple of y is as good a proof: the best one, zero inside a zone
+                    component += cones[a, i] * own_y[i]
+                size_of_cone += component * component
+            worth -= np.sqrt(size_of_cone)
+        # any multiple of y proves a bound: the best one, zero inside a zone
         factor = max(0.0, worth) / cost if cost > 0.0 else 0.0
         bound[point] = 0.5 * factor * factor * cost
         for i in range(r):
-            y[point, i] = factor * answer[i]
-        allowed = GAP * energy[point] + GAP_WITHOUT_PLAY * without
-        # written so that a value that is not a number fails
-        fine = energy[point] - bound[point] <= allowed
-        road[point] = SOLVED if fine else UNCERTIFIED
+            y[point, i] = factor * own_y[i]
+        allowed = GAP * energy[point] + GAP_WITHOUT_CLEARANCE * without
+        # written so that NaN fails
+        certified = energy[point] - bound[point] <= allowed
+        outcome[point] = SOLVED if certified else UNCERTIFIED
 
 
 @part
 def _within(Gt: Matrix, starts: Indices, h: Vector, inverse: Matrix, u: Vector) -> bool:
-    """Look for clearances within their cones with G u = -h: no energy at all."""
-    # y = h may prove that there are none; else project on the cones and that plane
+    """Look for clearances within their cones with G u = -h: zero energy."""
+    # y = h may prove that there are none; else alternating projections
     nu, r = Gt.shape
     worth = 0.0
     for i in range(r):
         worth += h[i] * h[i]
     for c in range(len(starts) - 1):
-        reach = 0.0
+        size_of_cone = 0.0
         for a in range(starts[c], starts[c + 1]):
-            pull = 0.0
+            component = 0.0
             for i in range(r):
-                pull += Gt[a, i] * h[i]
-            reach += pull * pull
-        worth -= np.sqrt(reach)
+                component += Gt[a, i] * h[i]
+            size_of_cone += component * component
+        worth -= np.sqrt(size_of_cone)
     if worth > 0.0:
         return False
     left = np.empty(r)
@@ -141,7 +141,7 @@ def _within(Gt: Matrix, starts: Indices, h: Vector, inverse: Matrix, u: Vector) 
                 size += u[a] * u[a]
             if size > 1.0:
                 outside = True
-                # a little further in, so that an end is reached
+                # a little further inside, so that the projections end
                 size = _INWARDS / np.sqrt(size)
                 for a in range(starts[c], starts[c + 1]):
                     u[a] *= size
@@ -153,7 +153,7 @@ def _within(Gt: Matrix, starts: Indices, h: Vector, inverse: Matrix, u: Vector) 
 @kernel
 def least_margins(
     B: NDArray, starts: NDArray, right: NDArray, margin: NDArray,
-    bound: NDArray, pulls: NDArray,
+    bound: NDArray, multipliers: NDArray,
 ) -> None:  # fmt: skip
     """Least t with B u = right, |u_k| <= t, for every row of right.
 
@@ -161,31 +161,31 @@ def least_margins(
         B: (p, nu) orthonormal rows.
         starts: (cones + 1,) first clearance of each cone, and nu.
         right: (k, p).
-        margin: (k,) to fill; not a number where the certificate falls short.
+        margin: (k,) to fill; NaN where the certificate falls short.
         bound: (k,) to fill, certified lower bound.
-        pulls: (k, p) to fill: multipliers q that prove it, q.right = bound.
+        multipliers: (k, p) to fill: multipliers q that prove it, q.right = bound.
     """
     p = len(B)
     for point in range(len(right)):
         w = right[point].copy()
         size = np.sqrt(inner(w, w))
-        fill(pulls[point], 0.0)
+        fill(multipliers[point], 0.0)
         if not size > 0.0:
             margin[point], bound[point] = 0.0, 0.0
             continue
         own = B.copy()
         turn_first(own, w, size)
-        u, pull = farthest(own, starts)
+        u, gradient = farthest(own, starts)
         reach, most = inner(own[0], u), 0.0
         for c in range(len(starts) - 1):
             part = 0.0
             for i in range(starts[c], starts[c + 1]):
-                part += pull[i] * pull[i]
+                part += gradient[i] * gradient[i]
             most += np.sqrt(part)
         margin[point], bound[point] = size / reach, size / most
         for i in range(p):
-            pulls[point, i] = inner(B[i], pull) / most
+            multipliers[point, i] = inner(B[i], gradient) / most
         if not (
-            reach > 0.0 and margin[point] - bound[point] <= _MARGIN_GAP * margin[point]
+            reach > 0.0 and margin[point] - bound[point] <= MARGIN_GAP * margin[point]
         ):
             margin[point] = np.nan

@@ -1,8 +1,8 @@
 """Problem (22) without loads, compiled from the frames' poses to the certified answer.
 
-What this road does not cover it hands back, with a code that says why; nothing is
-returned as an answer whose certificate, computed from the wrenches on the problem
-before any elimination, leaves more than the gap asked for.
+Points that this does not cover go to the fallback, with a code for the reason.  A point
+counts as solved only if its certificate, computed from the wrenches on the problem
+before any elimination, proves the gap asked for.
 """
 
 from typing import NamedTuple
@@ -25,6 +25,7 @@ from assembly.batch.compiled_reduction import (
     small_problem,
     spring_rows,
 )
+from assembly.linear.thresholds import MISMATCH_FACTOR, NOISE, OPEN, RANK
 from assembly.solvers.compiled import (
     Indices,
     Matrices,
@@ -33,55 +34,52 @@ from assembly.solvers.compiled import (
     kernel,
     part,
 )
-from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import copy, divide, inner, into_cones
 
-NEWTON, INTERIOR, RIGID, RANK, UNCERTIFIED, BOUNDED = range(6)
-_RANK = 1e-10  # as in assembly.linear.reduction, and so is the noise floor
-_NOISE = 1e-12
-_LEFT_OPEN = 1e-11  # [rad, lengths] most that a closure may stay open
+NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED = range(6)
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
-# gap from which Newton's method finishes: of the energy, of that without play
-_NEAR, _NEAR_WITHOUT_PLAY = 1e-8, 1e-9
+# gap from which Newton's method finishes: of the energy, of that without clearance
+_NEAR, _NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
-_SHARP = 1e6  # its first sigma after an interior point, see dual_newton
+_FIRST_SIGMA = 1e6  # after the interior-point method, see dual_newton
 
 
-class Answers(NamedTuple):
+class Solutions(NamedTuple):
     """Rows of arrays filled by :func:`assemble_all`, one row a point.
 
     Attributes:
-        road: (k,) NEWTON or INTERIOR, or the code of what handed the point back.
+        outcome: (k,) NEWTON or INTERIOR, or the reason for the fallback.
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound of it.
-        without_play: (k,) [J] energy if every clearance stayed at zero.
+        without_clearance: (k,) [J] energy if every clearance stayed at zero.
         platform_screw: (k, 6) [rad, m].
         clearances: (k, nu) in units of their cones.
         motions: (k, nq) [rad, m].
         multipliers: (k, 6 closures) of the scaled closures.
-        open: (k,) [rad, lengths] largest component left open in a closure.
+        residual: (k,) [rad, reference lengths] largest of the closures.
     """
 
-    road: Indices
+    outcome: Indices
     energy: Vector
     bound: Vector
-    without_play: Vector
+    without_clearance: Vector
     platform_screw: Matrix
     clearances: Matrix
     motions: Matrix
     multipliers: Matrix
-    open: Vector
+    residual: Vector
 
 
 @kernel
 def assemble_all(
     s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: Answers,
+    out: Solutions,
 ) -> None:  # fmt: skip
-    """Solve every point; see :class:`Answers`.
+    """Solve every point; see :class:`Solutions`.
 
     Args:
         s: the robot.
@@ -92,7 +90,7 @@ def assemble_all(
     """
     for point in range(len(T)):
         own = errors[point if len(errors) > 1 else 0]
-        tolerance = _RANK + 30.0 * mismatch[point]
+        tolerance = RANK + MISMATCH_FACTOR * mismatch[point]
         P = paths_of(T[point], s)
         closures = s.patterns.shape[1]
         m, nq = 6 * closures, len(s.free_frame)
@@ -101,7 +99,7 @@ def assemble_all(
         turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
         free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
         if free < 0:
-            out.road[point] = RANK
+            out.outcome[point] = AMBIGUOUS
             continue
         Z = orthogonal_rows(F, turns, free, m)
         # springs
@@ -110,21 +108,21 @@ def assemble_all(
         count = len(Z)
         y_turns, y_diagonal = np.empty(count), np.empty(count)
         y_order = np.empty(count, np.int64)
-        noise = _NOISE * largest_spring(s, P)
+        noise = NOISE * largest_spring(s, P)
         rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
         if rank < 0:
-            out.road[point] = RANK
+            out.outcome[point] = AMBIGUOUS
             continue
         eliminate_springs(Z, Y, y_diagonal, y_order, rank)
         known = misfit_of(s, P, own)
         if rigid_rows(s, P, Z, rank, known, own, tolerance):
-            out.road[point] = RIGID
+            out.outcome[point] = RIGID
             continue
-        # the small problem in the clearances
+        # the reduced problem in the clearances
         Gt, h = small_problem(s, P, Z, rank, known)
         u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
-        road = _minimise(s, Gt, h, u, v, y)
-        # the way back
+        outcome = _minimise(s, Gt, h, u, v, y)
+        # back to the full problem
         multipliers = out.multipliers[point]
         for a in range(m):
             multipliers[a] = 0.0
@@ -136,19 +134,19 @@ def assemble_all(
         copy(v, spring)
         turn(Y, y_turns, rank, spring)
         out.energy[point] = 0.5 * inner(v, v)
-        out.without_play[point] = 0.5 * inner(h, h)
+        out.without_clearance[point] = 0.5 * inner(h, h)
         moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
         motions = out.motions[point]
         least_motions(F, turns, diagonal, order, free, moved, motions)
-        out.road[point] = _certify(point, s, P, own, moved, road, out)
+        out.outcome[point] = _certify(point, s, P, own, moved, outcome, out)
 
 
 @part
 def _certify(
-    point: int, s: Structure, P: Matrices, errors: Matrix, moved: Vector, road: int,
-    out: Answers,
+    point: int, s: Structure, P: Matrices, errors: Matrix, moved: Vector, outcome: int,
+    out: Solutions,
 ) -> int:  # fmt: skip
-    """The certificate on the problem before elimination, and what the platform does."""
+    """The certificate on the problem before elimination, and the platform screw."""
     m = len(moved)
     motions, screw = out.motions[point], out.platform_screw[point]
     for c in range(len(motions)):
@@ -168,23 +166,23 @@ def _certify(
                     screw[a] += P[j, axis, a] * errors[j, axis]
     for a in range(3, 6):
         screw[a] *= s.size
-    left, work = 0.0, 0.0
+    residual, work = 0.0, 0.0
     for a in range(m):
-        left = max(left, abs(moved[a]))
+        residual = max(residual, abs(moved[a]))
         work += abs(moved[a] * out.multipliers[point, a])
-    out.open[point] = left
+    out.residual[point] = residual
     gain, cost = _complementary(s, P, errors, out.multipliers[point], motions)
-    # any multiple of the wrenches is as good a proof: the best one, zero inside a zone
+    # any multiple of the wrenches proves a bound: the best one, zero inside a zone
     factor = max(0.0, gain - work) / cost if cost > 0.0 else 0.0
     bound = 0.5 * factor * factor * cost
     for a in range(m):
         out.multipliers[point, a] *= factor
     out.bound[point] = bound
     energy = out.energy[point]
-    allowed = GAP * energy + GAP_WITHOUT_PLAY * out.without_play[point]
-    # written so that a value that is not a number fails
-    if energy - bound <= allowed and left <= _LEFT_OPEN:
-        return road
+    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * out.without_clearance[point]
+    # written so that NaN fails
+    if energy - bound <= allowed and residual <= OPEN:
+        return outcome
     return UNCERTIFIED
 
 
@@ -193,7 +191,7 @@ def _complementary(
     s: Structure, P: Matrices, errors: Matrix, multipliers: Vector, motions: Vector
 ) -> tuple[float, float]:
     """Wrenches times f prove f gain - f^2 cost / 2: (gain, cost)."""
-    # the complementary energy of assembly.linear.energy.Assembly.bound
+    # the complementary energy of assembly.linear.assembled.Assembly.bound
     n = len(P)
     wrenches = np.zeros((n, 6))
     at_platform = np.zeros(6)
@@ -211,15 +209,15 @@ def _complementary(
                 wrenches[j, axis] += P[j, axis, a] * at_platform[a]
             total -= wrenches[j, axis] * errors[j, axis]
     for c in range(len(s.springs)):
-        pull = 0.0
+        component = 0.0
         for axis in range(6):
-            pull += s.springs[c, axis] * wrenches[s.spring_frame[c], axis]
-        cost += pull * pull
+            component += s.springs[c, axis] * wrenches[s.spring_frame[c], axis]
+        cost += component * component
     for c in range(len(s.starts) - 1):
         size = 0.0
         for i in range(s.starts[c], s.starts[c + 1]):
-            pull = s.cone_size[i] * wrenches[s.cone_frame[i], s.cone_axis[i]]
-            size += pull * pull
+            component = s.cone_size[i] * wrenches[s.cone_frame[i], s.cone_axis[i]]
+            size += component * component
         total -= np.sqrt(size)
     for c in range(len(motions)):
         total -= abs(wrenches[s.free_frame[c], s.free_axis[c]] * motions[c])
@@ -233,26 +231,26 @@ def _minimise(
 ) -> int:  # fmt: skip
     """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
     nu, r = Gt.shape
-    road = NEWTON
+    outcome = NEWTON
     size = np.sqrt(inner(h, h))
     if nu == 0 or size == 0.0:
         copy(h, y)
         copy(h, v)
-        return road
+        return outcome
     for c in range(nu):
         size = max(size, np.sqrt(inner(Gt[c], Gt[c])))
     G, right = np.empty((nu, r)), divide(h, size)
     for c in range(nu):
         for i in range(r):
             G[c, i] = Gt[c, i] / size
-    absolute = _STOP * GAP_WITHOUT_PLAY * 0.5 * inner(right, right)
-    road = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
+    absolute = _STOP * GAP_WITHOUT_CLEARANCE * 0.5 * inner(right, right)
+    outcome = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
     for i in range(r):
         v[i] = h[i]
         y[i] *= size
         for c in range(nu):
             v[i] += Gt[c, i] * u[c]
-    return road
+    return outcome
 
 
 @part
@@ -260,7 +258,7 @@ def small_answer(
     Gt: Matrix, h: Vector, starts: Indices, relative: float,
     absolute: float, u: Vector, y: Vector,
 ) -> int:  # fmt: skip
-    """Newton alone where all play is used up, else after an interior point."""
+    """Newton alone where all constraints are active, else after an interior point."""
     r, d = len(h), np.zeros(len(u))
     if dual_newton(
         Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
@@ -268,8 +266,8 @@ def small_answer(
         return NEWTON
     G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
     H = np.zeros((0, len(u)))
-    near = _NEAR_WITHOUT_PLAY * 0.5 * inner(h, h)
-    # at a zone's edge the interior point breaks down early; Newton then takes longer
+    near = _NEAR_WITHOUT_CLEARANCE * 0.5 * inner(h, h)
+    # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
@@ -277,7 +275,7 @@ def small_answer(
         copy(inside, u)
         into_cones(starts, u)
         if dual_newton(
-            Gt, h, d, r, starts, relative, absolute, steps, _SHARP, u, y
+            Gt, h, d, r, starts, relative, absolute, steps, _FIRST_SIGMA, u, y
         ) >= 0:  # fmt: skip
             break
     return INTERIOR

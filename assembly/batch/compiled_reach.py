@@ -1,9 +1,9 @@
-"""Which platform screws (22) leaves possible, compiled; and how far they reach.
+"""The reachable set of platform screws of (27) and its farthest point, compiled.
 
-Readings ``frozen`` and ``free`` of (27): deformations stay, unloaded clearances move,
-passive joints follow.  See :mod:`assembly.linear.pose_error` for what is asked, and
-:mod:`assembly.solvers.farthest` for the search.  What hangs on rounding is handed back,
-and a point where a passive joint could pass the bound of its motion.
+Readings ``frozen`` and ``free``: deformations stay, unloaded clearances move, passive
+joints follow.  See :mod:`assembly.linear.pose_error` for the problem, and
+:mod:`assembly.solvers.farthest` for the search.  Points with a numerically ambiguous
+rank, or where a passive joint could pass the bound of its motion, go to the fallback.
 """
 
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from assembly.batch.compiled_reduction import (
     small_problem,
 )
 from assembly.batch.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.linear.thresholds import MISMATCH_FACTOR, RANK, UNBOUNDED
 from assembly.solvers.compiled import (
     Indices,
     Mask,
@@ -30,36 +31,33 @@ from assembly.solvers.compiled import (
     part,
 )
 from assembly.solvers.farthest import DONE, advance, begin
-from assembly.solvers.householder import triangulate, turn_all
-from assembly.solvers.interior import LANES
+from assembly.solvers.householder import CLEAR, triangulate, turn_all
+from assembly.solvers.layers import LANES
 from assembly.solvers.polytope import empty_polytope
-from assembly.solvers.support import Body
+from assembly.solvers.support import ConvexBody
 from assembly.solvers.vectors import copy, into_cones
 
-SOLVED, HANDED_BACK = range(2)
-_RANK = 1e-10  # as in assembly.linear.reduction
-_UNBOUNDED = 1e-8  # as in assembly.linear.pose_error
-_CLEAR = 10.0  # what is within this factor of a threshold decides nothing
+SOLVED, FALLBACK = range(2)
 _APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
 
 
-class Loads(NamedTuple):
-    """What (22) says of k points' clearances.
+class ClearanceLoads(NamedTuple):
+    """Loads and slack of the clearances of k points, from the solution of (22).
 
     Attributes:
-        structure: the robot as (22) saw it.
+        structure: the robot of (22).
         multipliers: (k, 6 closures) of the scaled closures.
         clearances: (k, nu) in units of these cones.
         energy: (k,) [J].
-        without_play: (k,) [J] energy if every clearance stayed at zero.
-        cone_of: (cones,) the cone here of each cone of the robot that is asked about.
+        without_clearance: (k,) [J] energy if every clearance stayed at zero.
+        cone_of: (cones,) the cone of (22) of each cone of the reading.
     """
 
     structure: Structure
     multipliers: Matrix
     clearances: Matrix
     energy: Vector
-    without_play: Vector
+    without_clearance: Vector
     cone_of: Indices
 
 
@@ -72,7 +70,7 @@ class Bounds(NamedTuple):
         rotation_screw: (k, 6) [rad, m] attains the lower bound.
         translation_screw: (k, 6) likewise.
         supports: (k,) support functions computed.
-        road: (k,) SOLVED or HANDED_BACK.
+        outcome: (k,) SOLVED or FALLBACK.
     """
 
     rotation: NDArray
@@ -80,16 +78,16 @@ class Bounds(NamedTuple):
     rotation_screw: NDArray
     translation_screw: NDArray
     supports: NDArray
-    road: NDArray
+    outcome: NDArray
 
 
 @kernel
 def bound_all(
     s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
-    clearances: NDArray, motions: NDArray, loads: Loads, offset: NDArray,
+    clearances: NDArray, motions: NDArray, loads: ClearanceLoads, offset: NDArray,
     tolerance: NDArray, out: Bounds,
 ) -> None:  # fmt: skip
-    """Bracket the largest pose errors of all points that are not handed back yet.
+    """Bracket the largest pose errors of all points not left to the fallback.
 
     Args:
         s: the robot, without springs.
@@ -99,25 +97,25 @@ def bound_all(
         clearances: (k, nu) of (22), in these cones.
         motions: (k, nq) [rad, m] of (22) where they have a bound, else anything.
         loads: which of them are held.
-        offset: (3,) [m] from the platform's origin to the point asked about.
+        offset: (3,) [m] from the platform's origin to the point whose error is meant.
         tolerance: (2,) [rad, m] asked of upper minus lower bounds.
-        out: arrays to fill; rows whose road is HANDED_BACK are left out.
+        out: arrays to fill; rows whose outcome is FALLBACK are left out.
     """
     outer = empty_polytope()
     for i in range(len(T)):
-        if out.road[i] != SOLVED:
+        if out.outcome[i] != SOLVED:
             continue
         decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
-        found, body = body_of(
+        bounded, body = body_of(
             s, T[i], mismatch[i], centre[i], clearances[i], motions[i], loaded, offset
         )
-        if not (decided and found):
-            out.road[i] = HANDED_BACK
+        if not (decided and bounded):
+            out.outcome[i] = FALLBACK
             continue
         for half in range(2):
             search = begin(body, 3 * half, tolerance[half], outer)
             if advance(body, search) != DONE:
-                out.road[i] = HANDED_BACK
+                out.outcome[i] = FALLBACK
             out.supports[i] += search.counts[1]
             if half == 0:
                 copy(search.bounds, out.rotation[i])
@@ -128,40 +126,40 @@ def bound_all(
 
 
 @part
-def loaded_cones(loads: Loads, P: Matrices, point: int) -> tuple[bool, Mask]:
-    """Which clearances press on their bound, as in :mod:`assembly.linear.pose_error`.
+def loaded_cones(loads: ClearanceLoads, P: Matrices, point: int) -> tuple[bool, Mask]:
+    """Clearances whose constraint is active, as in :mod:`assembly.linear.reach`.
 
     Load times slack is about the solver's gap, so one of the two is nearly zero.
 
     Args:
-        loads: what (22) says.
+        loads: of the solution of (22).
         P: (n, 6, 6) unit screws of every frame at the platform.
         point: which one.
 
     Returns:
-        Whether that is clear of all; (cones,) bool.
+        Whether that is unambiguous; (cones,) bool.
     """
     h, wrench = loads.structure, loads.multipliers[point]
     energy = loads.energy[point]
-    scale = max(energy, 1e-9 * loads.without_play[point], 1e-300)
+    scale = max(energy, 1e-9 * loads.without_clearance[point], 1e-300)
     loaded, decided = np.zeros(len(loads.cone_of), np.bool_), True
     for c in range(len(loaded)):
-        push, size = 0.0, 0.0
+        squares, size = 0.0, 0.0
         own = loads.cone_of[c]
         for i in range(h.starts[own], h.starts[own + 1]):
-            j, pull = h.cone_frame[i], 0.0
+            j, component = h.cone_frame[i], 0.0
             for k in range(h.patterns.shape[1]):
                 sign = h.patterns[h.pattern_of[j], k]
                 if sign != 0.0:
                     for a in range(6):
-                        pull += sign * wrench[6 * k + a] * P[j, h.cone_axis[i], a]
-            push += (pull * h.cone_size[i]) ** 2
+                        component += sign * wrench[6 * k + a] * P[j, h.cone_axis[i], a]
+            squares += (component * h.cone_size[i]) ** 2
             size += loads.clearances[point, i] ** 2
-        load = np.sqrt(push) / scale
+        load = np.sqrt(squares) / scale
         slack = max(0.0, 1.0 - np.sqrt(size))
         loaded[c] = load > slack and load > 1e-9
         apart = load > _APART * slack or slack > _APART * load
-        # written so that what is not a number is not clear
+        # written so that NaN is ambiguous
         decided = decided and (apart or max(load, slack) <= 1e-9)
     return decided, loaded
 
@@ -170,8 +168,8 @@ def loaded_cones(loads: Loads, P: Matrices, point: int) -> tuple[bool, Mask]:
 def body_of(
     s: Structure, T: Matrices, mismatch: float, centre: Vector, clearances: Vector,
     motions: Vector, loaded: Mask, offset: Vector,
-) -> tuple[bool, Body]:  # fmt: skip
-    """The set of platform screws of one point, and whether it was found.
+) -> tuple[bool, ConvexBody]:  # fmt: skip
+    """The set of platform screws of one point, and whether it is valid.
 
     Args:
         s: as in :func:`bound_all`, like all others, for one point.
@@ -184,10 +182,10 @@ def body_of(
         offset: see there.
 
     Returns:
-        Whether no rank hangs on rounding, the platform moves within bounds, and no
-        passive joint comes to the bound of its own motion; the set.
+        Whether ranks are unambiguous, the platform moves within bounds, and no passive
+        joint comes to the bound of its own motion; the set.
     """
-    tolerance = _RANK + 30.0 * mismatch
+    tolerance = RANK + MISMATCH_FACTOR * mismatch
     P = paths_of(T, s)
     m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
     F = free_columns(s, P, m)
@@ -197,12 +195,12 @@ def body_of(
     _shift(centre.reshape(6, 1), offset)
     nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
     if rank < 0:
-        return False, Body(centre, *nothing)
+        return False, ConvexBody(centre, *nothing)
     bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
     if not bounded or not _within_bounds(
         s, P, F, turns, diagonal, order, rank, clearances, motions, loaded
     ):
-        return False, Body(centre, *nothing)
+        return False, ConvexBody(centre, *nothing)
     Z = orthogonal_rows(F, turns, rank, m)
     columns, _ = small_problem(s, P, Z, len(Z), np.zeros(m))
     kept = 0
@@ -227,7 +225,7 @@ def body_of(
     into_cones(starts, start)
     _shift(X, offset)
     decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
-    return decided, Body(centre, X, B, start, starts)
+    return decided, ConvexBody(centre, X, B, start, starts)
 
 
 @part
@@ -235,10 +233,10 @@ def _follow(
     s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
     order: Indices, rank: int, m: int,
 ) -> tuple[bool, Matrix]:  # fmt: skip
-    """What the platform does, scaled (6, m), as free motions follow the closures.
+    """Scaled platform screws (6, m) as free motions follow the closures.
 
     Returns:
-        False where free motions move the platform and no closure; what it does.
+        False where free motions move the platform and no closure; the screws.
     """
     nq = len(s.free_frame)
     follow, largest = np.zeros((m, LANES)), 0.0
@@ -254,7 +252,7 @@ def _follow(
             else:
                 largest = max(largest, abs(drive[i]))
     turn_all(F, turns, rank, follow)
-    return largest <= _UNBOUNDED / _CLEAR, np.ascontiguousarray(follow[:, :6].T)
+    return largest <= UNBOUNDED / CLEAR, np.ascontiguousarray(follow[:, :6].T)
 
 
 @part
@@ -262,7 +260,7 @@ def _within_bounds(
     s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
     order: Indices, rank: int, clearances: Vector, motions: Vector, loaded: Mask,
 ) -> bool:  # fmt: skip
-    """Whether no play takes a passive joint past its bound; see ``linear/reach.py``."""
+    """Whether no passive joint passes its bound; see :mod:`assembly.linear.reach`."""
     nq, m = F.shape
     bounded = False
     for q in range(nq):
@@ -288,7 +286,7 @@ def _within_bounds(
         for q in range(nq):
             most[q] += np.sqrt(squares[q])
     for q in range(nq):
-        # written so that what is not a number is not within
+        # written so that NaN is not within
         if s.free_bound[q] < np.inf:
             if not abs(middle[q]) + most[q] <= s.free_bound[q]:
                 return False

@@ -1,9 +1,9 @@
 """Free motions and springs eliminated: :mod:`assembly.linear.reduction`, compiled.
 
-Arranged for speed: vectors lie as rows, one Householder triangulation with pivoting
-serves the free motions, the springs and the least motions, and springs that always act
-together (the same closures) are first turned into six.  Springs enter by the square
-roots of their compliances throughout.
+For speed vectors are stored as rows, one Householder triangulation with pivoting serves
+the free motions, the springs and the least motions, and springs that enter the same
+closures are first combined into six.  Springs enter by the square roots of their
+compliances throughout.
 
 ======  ============  ==============================================================
 symbol  shape         meaning
@@ -12,7 +12,7 @@ symbol  shape         meaning
                       platform in base axes, translations by the reference length
 ``F``   (nq, m)       columns of the free motions as rows; m = 6 closures
 ``Z``   (m - rank, m) orthonormal, orthogonal to all free motions; later the rows
-                      that give a spring's answer, L^-1 Z, and those that give none
+                      that springs enter, L^-1 Z, and those that none enters
 ``L``   (ng, 6, 6)    each group's springs as six, lower triangular but for pivoting
 ``Y``   (.., 6 ng)    Z times the springs' columns
 ======  ============  ==============================================================
@@ -23,17 +23,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.thresholds import NOISE
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
-from assembly.solvers.householder import triangulate, turn, turn_all, turn_back
-from assembly.solvers.interior import LANES
+from assembly.solvers.householder import CLEAR, triangulate, turn, turn_all, turn_back
+from assembly.solvers.layers import LANES
 from assembly.solvers.vectors import copy, divide, fill
-
-_NOISE = 1e-12  # as in assembly.linear.reduction
-_CLEAR = 10.0  # what is within this factor of a threshold decides nothing
 
 
 class Structure(NamedTuple):
-    """What a robot's postures share; n frames, closures, np patterns of closures.
+    """Data that a robot's postures share; n frames, closures, np patterns of closures.
 
     Attributes:
         size: [m] reference length.
@@ -122,7 +120,7 @@ def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
 
 @part
 def grouped_springs(s: Structure, P: Matrices) -> Matrices:
-    """Springs that act together, turned into six: the same sum of squares, no sum."""
+    """Springs that act together, combined into six with the same sum of squares."""
     count = len(s.groups) - 1
     L = np.zeros((count, 6, 6))
     turns, diagonal = np.empty(6), np.empty(6)
@@ -165,7 +163,7 @@ def largest_spring(s: Structure, P: Matrices) -> float:
 
 @kernel(fastmath={"contract", "reassoc"})
 def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
-    """What row i of Z reads of a screw that enters the closures with these signs."""
+    """Row i of Z, for a screw that enters the closures with these signs."""
     for a in range(6):
         part[a] = 0.0
     for k in range(len(pattern)):
@@ -192,7 +190,7 @@ def spring_rows(s: Structure, Z: Matrix, L: Matrices) -> Matrix:
 def eliminate_springs(
     Z: Matrix, Y: Matrix, diagonal: Vector, order: Indices, rank: int
 ) -> None:
-    """Order Z like Y's triangle, and divide by it: the springs' answer first."""
+    """Order Z like Y's triangle, and divide by it: rows that springs enter first."""
     rows = Z.copy()
     for i in range(len(Z)):
         copy(rows[order[i]], Z[i])
@@ -206,7 +204,7 @@ def eliminate_springs(
 
 @part
 def misfit_of(s: Structure, P: Matrices, errors: Matrix) -> Vector:
-    """(m,) what the errors leave open in the closures."""
+    """(m,) closure error that the geometric errors cause."""
     closures = s.patterns.shape[1]
     known = np.zeros(6 * closures)
     moved = np.empty(6)
@@ -228,7 +226,7 @@ def rigid_rows(
     s: Structure, P: Matrices, Z: Matrix, rank: int, known: Vector, errors: Matrix,
     tolerance: float,
 ) -> bool:  # fmt: skip
-    """Whether clearances or errors enter where no spring answers."""
+    """Whether clearances or errors enter rows that no spring enters."""
     count, cones = len(Z) - rank, len(s.cone_frame)
     parts, most = np.empty((len(s.patterns), count, 6)), np.zeros(len(s.patterns))
     entering = np.zeros(len(s.patterns))
@@ -248,14 +246,14 @@ def rigid_rows(
     for c in range(cones):
         j = s.cone_frame[c]
         g = s.pattern_of[j]
-        if 6.0 * sizes[c] * most[g] <= _NOISE * largest / _CLEAR:
+        if 6.0 * sizes[c] * most[g] <= NOISE * largest / CLEAR:
             continue  # as nearly all are
         for i in range(count):
             total = 0.0
             for a in range(6):
                 total += parts[g, i, a] * P[j, s.cone_axis[c], a]
             worst = max(worst, abs(total * s.cone_size[c]))
-    if worst > _NOISE * largest / _CLEAR:
+    if worst > NOISE * largest / CLEAR:
         return True
     size = 0.0
     for j in range(len(P)):
@@ -267,7 +265,7 @@ def rigid_rows(
         total = 0.0
         for a in range(len(known)):
             total += Z[i, a] * known[a]
-        if not abs(total) <= 1e-12 / _CLEAR + tolerance * size:
+        if not abs(total) <= 1e-12 / CLEAR + tolerance * size:
             return True
     return False
 
@@ -276,7 +274,7 @@ def rigid_rows(
 def small_problem(
     s: Structure, P: Matrices, Z: Matrix, rank: int, known: Vector
 ) -> tuple[Matrix, Vector]:
-    """G, its columns as rows, and h: springs' answer to clearances and to errors."""
+    """G, its columns as rows, and h: strains by clearances and by errors."""
     nu = len(s.cone_frame)
     Gt, h = np.zeros((nu, rank)), np.zeros(rank)
     parts = np.zeros((len(s.patterns), 6, rank))
@@ -304,7 +302,7 @@ def moved_by(
     s: Structure, P: Matrices, L: Matrices, u: Vector, spring: Vector, known: Vector,
     screw: Vector,
 ) -> Vector:  # fmt: skip
-    """(m,) what errors, clearances and springs leave open; their platform screw."""
+    """(m,) closure error of errors, clearances and springs; their platform screw."""
     closures = s.patterns.shape[1]
     moved = known.copy()
     for a in range(6):
@@ -332,17 +330,17 @@ def least_motions(
     F: Matrix, turns: Vector, diagonal: Vector, order: Indices, rank: int,
     moved: Vector, motions: Vector,
 ) -> None:  # fmt: skip
-    """Free motions of least size that close what the rest leaves open."""
+    """Free motions of least size that close the rest."""
     nq = len(F)
     right = divide(moved, -1.0)
     turn_back(F, turns, rank, right)
-    answer = np.zeros(nq)
+    least = np.zeros(nq)
     if rank == nq:
         for i in range(nq - 1, -1, -1):
             total = right[i]
             for l in range(i + 1, nq):
-                total -= F[l, i] * answer[l]
-            answer[i] = total / diagonal[i]
+                total -= F[l, i] * least[l]
+            least[i] = total / diagonal[i]
     else:
         # the triangle's columns, as rows, triangulated once more
         R = np.zeros((rank, nq))
@@ -352,12 +350,12 @@ def least_motions(
                 R[i, l] = F[l, i]
         own_turns, own_diagonal = np.empty(rank), np.empty(rank)
         own_order = np.empty(rank, np.int64)
-        found = triangulate(R, own_turns, own_diagonal, own_order, 0.0, 0.0, -1.0)
-        for i in range(found):
+        row_rank = triangulate(R, own_turns, own_diagonal, own_order, 0.0, 0.0, -1.0)
+        for i in range(row_rank):
             total = right[own_order[i]]
             for l in range(i):
-                total -= R[i, l] * answer[l]
-            answer[i] = total / own_diagonal[i]
-        turn(R, own_turns, found, answer)
+                total -= R[i, l] * least[l]
+            least[i] = total / own_diagonal[i]
+        turn(R, own_turns, row_rank, least)
     for i in range(nq):
-        motions[order[i]] = answer[i]
+        motions[order[i]] = least[i]

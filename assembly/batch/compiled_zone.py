@@ -2,8 +2,8 @@
 
 With every link and joint rigid, B u = w must hold, B's rows orthonormal, |u_k| <= t.
 The least t is |w| over the most that g.u can be with |u_k| <= 1 and the rest of B u
-zero, g = B^T w / |w|: a problem that u = 0 satisfies, so the interior point starts
-where nothing is violated.  Its multipliers n bound the margin from below,
+zero, g = B^T w / |w|.  In this problem u = 0 is feasible, and so is the start of the
+interior-point method.  Its multipliers n bound the margin from below,
 
     t >= |w| / sum_k |(g - B_rest^T n)_k|.
 """
@@ -21,21 +21,27 @@ from assembly.batch.compiled_reduction import (
     paths_of,
     small_problem,
 )
+from assembly.linear.thresholds import (
+    INFEASIBLE,
+    MARGIN_GAP,
+    MISMATCH_FACTOR,
+    NOISE,
+    RANK,
+    ROWS_RANK,
+)
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import divide, inner
 
-SOLVED, HANDED_BACK = range(2)
-_RANK, _ROWS_RANK, _NOISE = 1e-10, 1e-9, 1e-12  # as in assembly.linear.reduction
-_LEFT = 1e-13  # part of what may stay open, as in assembly.linear.reduction
-_STOP, _GAP = 1e-9, 1e-8  # of the margin: where to stop, what to accept
+SOLVED, FALLBACK = range(2)
+_STOP = 1e-9  # of the margin: gap at which the solver stops
 
 
 @kernel
 def all_margins(
     s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    margin: NDArray, bound: NDArray, road: NDArray,
+    margin: NDArray, bound: NDArray, outcome: NDArray,
 ) -> None:  # fmt: skip
     """Margins of all points, with their lower bounds.
 
@@ -46,11 +52,11 @@ def all_margins(
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         margin: (k,) to fill.
         bound: (k,) to fill.
-        road: (k,) to fill: SOLVED, or HANDED_BACK to the slower road.
+        outcome: (k,) to fill: SOLVED or FALLBACK.
     """
     for i in range(len(T)):
-        margin[i], bound[i], road[i] = np.nan, np.nan, HANDED_BACK
-        tolerance = _RANK + 30.0 * mismatch[i]
+        margin[i], bound[i], outcome[i] = np.nan, np.nan, FALLBACK
+        tolerance = RANK + MISMATCH_FACTOR * mismatch[i]
         P = paths_of(T[i], s)
         m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
         F = free_columns(s, P, m)
@@ -68,16 +74,16 @@ def all_margins(
         if not (decided and size > 0.0):
             continue
         turn_first(B, w, size)
-        u, pull = farthest(B, s.starts)
+        u, gradient = farthest(B, s.starts)
         reach, most = inner(B[0], u), 0.0
         for c in range(len(s.starts) - 1):
             part = 0.0
             for k in range(s.starts[c], s.starts[c + 1]):
-                part += pull[k] * pull[k]
+                part += gradient[k] * gradient[k]
             most += np.sqrt(part)
         if not reach > 0.0:
             continue
-        # what passive joints turn or slide must stay within their ranges
+        # motions of passive joints must stay within their ranges
         none, screw = np.zeros((0, 6, 6)), np.empty(6)
         for c in range(len(u)):
             u[c] *= size / reach
@@ -89,9 +95,9 @@ def all_margins(
             within = within and abs(motions[c]) <= s.free_bound[c]
         if within:
             margin[i], bound[i] = size / reach, size / most
-            # a bound that is not a number fails
-            if margin[i] - bound[i] <= _GAP * margin[i]:
-                road[i] = SOLVED
+            # a bound that is NaN fails
+            if margin[i] - bound[i] <= MARGIN_GAP * margin[i]:
+                outcome[i] = SOLVED
 
 
 @part
@@ -122,12 +128,12 @@ def orthonormal_rows(
         largest: entry of the columns that the rows were projected from.
 
     Returns:
-        Whether no rank hangs on rounding and nothing contradicts; B and w.
+        Whether ranks are unambiguous and nothing contradicts; B and w.
     """
     p, nu = rows.shape
     turns, diagonal = np.empty(p), np.empty(p)
     order = np.empty(p, np.int64)
-    rank = triangulate(rows, turns, diagonal, order, _ROWS_RANK, _NOISE * largest, -1.0)
+    rank = triangulate(rows, turns, diagonal, order, ROWS_RANK, NOISE * largest, -1.0)
     if rank < 0:
         return False, np.zeros((0, nu)), np.zeros(0)
     B, w = np.zeros((rank, nu)), np.zeros(rank)
@@ -137,7 +143,7 @@ def orthonormal_rows(
             total -= rows[i, l] * w[l]
         if i < rank:
             w[i] = total / diagonal[i]
-        elif not abs(total) <= _LEFT:
+        elif not abs(total) <= INFEASIBLE:
             return False, B, w
     for i in range(rank):
         B[i, i] = 1.0
@@ -163,26 +169,26 @@ def turn_first(B: Matrix, w: Vector, size: float) -> None:
 
 @part
 def farthest(B: Matrix, starts: Indices) -> tuple[Vector, Vector]:
-    """Find u within the cones with the most B[0].u and no B[1:] u; the pull on each."""
+    """U within the cones with the most B[0].u and no B[1:] u; the reduced gradient."""
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])
     u, n, _ = interior_point(
         np.zeros((0, nu)), np.zeros(0), B[0].copy(), rest, np.zeros(len(rest)), starts,
         _STOP, 0.0,
     )  # fmt: skip
-    pull = B[0].copy()
+    gradient = B[0].copy()
     for i in range(len(rest)):
         for c in range(nu):
-            pull[c] -= rest[i, c] * n[i]
-    # rounding may leave the rest: taken out, then back within the cones
+            gradient[c] -= rest[i, c] * n[i]
+    # the residual of the rest by rounding is removed, then u scaled into the cones
     for i in range(len(rest)):
-        left = inner(rest[i], u)
+        residual = inner(rest[i], u)
         for c in range(nu):
-            u[c] -= left * rest[i, c]
+            u[c] -= residual * rest[i, c]
     worst = 1.0
     for c in range(len(starts) - 1):
         size = 0.0
         for i in range(starts[c], starts[c + 1]):
             size += u[i] * u[i]
         worst = max(worst, np.sqrt(size))
-    return divide(u, worst), pull
+    return divide(u, worst), gradient

@@ -65,7 +65,7 @@ def prepare_energies(
         closures=A,
         misfit=misfit,
         closing=closing,
-        pulls=A_y.T @ closing,
+        on_springs=A_y.T @ closing,
         cones=np.ascontiguousarray(A_u.T @ closing),
         free=A_q.T @ closing,
         redundant=redundant,

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from assembly.batch.compiled_reach import Loads
+    from assembly.batch.compiled_reach import ClearanceLoads
     from assembly.batch.compiled_reduction import Structure
 
 
@@ -113,7 +113,7 @@ def bound_pose_errors(
     Raises:
         ValueError: the reading is unknown, or a shape does not fit the robot.
     """
-    from assembly.batch.compiled_reach import HANDED_BACK, SOLVED, Bounds, bound_all
+    from assembly.batch.compiled_reach import FALLBACK, SOLVED, Bounds, bound_all
 
     if reading not in READINGS:
         raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
@@ -134,16 +134,16 @@ def bound_pose_errors(
         rotation_screw=np.full((count, 6), np.nan),
         translation_screw=np.full((count, 6), np.nan),
         supports=np.zeros(count, np.int64),
-        road=np.full(count, SOLVED, np.int64),
+        outcome=np.full(count, SOLVED, np.int64),
     )
     solved = energies.status == "ok"
-    bounds.road[~np.isfinite(energies.clearances).all(axis=1)] = HANDED_BACK
-    bounds.road[~solved] = HANDED_BACK
+    bounds.outcome[~np.isfinite(energies.clearances).all(axis=1)] = FALLBACK
+    bounds.outcome[~solved] = FALLBACK
     if reading == "budget":
-        bounds.road[:] = HANDED_BACK
+        bounds.outcome[:] = FALLBACK
     else:
         structure, column_of, loads = _clearance_loads(
-            robot, T, reading, errors, off, energies, bounds.road
+            robot, T, reading, errors, off, energies, bounds.outcome
         )
         bound_all(
             structure, T, off, energies.platform_screw.copy(),
@@ -157,7 +157,7 @@ def bound_pose_errors(
         rotation_screw=bounds.rotation_screw,
         translation_screw=bounds.translation_screw,
         supports=bounds.supports,
-        fallback=(bounds.road == HANDED_BACK) & solved,
+        fallback=(bounds.outcome == FALLBACK) & solved,
         status=energies.status.copy(),
         reason=energies.reason.copy(),
     )
@@ -206,9 +206,9 @@ def _store(one: PoseError, bounds: PoseErrors, i: int) -> None:
 def _clearance_loads(
     robot: Robot, T: NDArray, reading: str, errors: ArrayLike | None, off: NDArray,
     energies: Energies, outcome: NDArray,
-) -> tuple["Structure", NDArray, "Loads"]:  # fmt: skip
+) -> tuple["Structure", NDArray, "ClearanceLoads"]:  # fmt: skip
     """What may move, its clearances' columns in (22), and the loads on them."""
-    from assembly.batch.compiled_reach import HANDED_BACK, Loads
+    from assembly.batch.compiled_reach import FALLBACK, ClearanceLoads
 
     _, moving = structure_of(robot, "free" if reading == "free" else "rigid")
     loaded, solution = structure_of(robot)[1], energies
@@ -217,16 +217,16 @@ def _clearance_loads(
         # stays loaded without those soft springs
         loaded = structure_of(robot, "hinged")[1]
         solution = minimise_energies(robot, T, errors, off, "hinged")
-        outcome[~np.isfinite(solution.clearances).all(axis=1)] = HANDED_BACK
+        outcome[~np.isfinite(solution.clearances).all(axis=1)] = FALLBACK
     column_of = _places(_cones(moving), _cones(structure_of(robot)[1]))
     places = _places(_cones(moving), _cones(loaded))
     cone_of = np.searchsorted(loaded.starts, places, side="right") - 1
-    loads = Loads(
+    loads = ClearanceLoads(
         structure=loaded,
         multipliers=solution.multipliers,
         clearances=solution.clearances,
         energy=solution.energy,
-        without_play=solution.energy_without_clearance,
+        without_clearance=solution.energy_without_clearance,
         cone_of=cone_of[moving.starts[:-1]].astype(np.int64),
     )
     return moving, column_of, loads

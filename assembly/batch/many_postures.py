@@ -31,7 +31,7 @@ from assembly.linear.rounding import (
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY, SolverFailed
+from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class Energies:
     def certified(self) -> NDArray:
         """(k,) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance."""
         allowed = GAP * self.energy
-        allowed = allowed + GAP_WITHOUT_PLAY * self.energy_without_clearance
+        allowed = allowed + GAP_WITHOUT_CLEARANCE * self.energy_without_clearance
         return (self.gap <= allowed) & (self.status == "ok")
 
     def fallbacks(self) -> dict[str, int]:
@@ -151,7 +151,7 @@ def minimise_energies(
     Raises:
         ValueError: a shape does not fit the robot, or a value is not finite.
     """
-    from assembly.batch.compiled_energy import Answers, assemble_all
+    from assembly.batch.compiled_energy import Solutions, assemble_all
 
     # writable and in C order, whatever comes: the kernels are compiled for one kind
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
@@ -171,37 +171,37 @@ def minimise_energies(
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
     joints, structure = structure_of(robot, compliant)
     nu, nq = joints.cones.shape[1], joints.free.shape[1]
-    out = Answers(
-        road=np.zeros(count, dtype=np.int64),
+    out = Solutions(
+        outcome=np.zeros(count, dtype=np.int64),
         energy=np.zeros(count),
         bound=np.zeros(count),
-        without_play=np.zeros(count),
+        without_clearance=np.zeros(count),
         platform_screw=np.zeros((count, 6)),
         clearances=np.zeros((count, nu)),
         motions=np.zeros((count, nq)),
         multipliers=np.zeros((count, 6 * len(robot.closures))),
-        open=np.zeros(count),
+        residual=np.zeros(count),
     )
     if stiffness_spread(joints, structure.size) > SPREAD:
-        out.road[:] = OUTCOMES.index("uncertified")  # left to the fallback
+        out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
     else:
         assemble_all(structure, T, all_errors, off, out)
     energies = Energies(
         energy=out.energy,
         bound=out.bound,
-        energy_without_clearance=out.without_play,
+        energy_without_clearance=out.without_clearance,
         platform_screw=out.platform_screw,
-        closure_residual=out.open,
+        closure_residual=out.residual,
         clearance_excess=_excess(out.clearances, structure.starts),
         clearances=out.clearances,
         motions=out.motions,
         multipliers=out.multipliers,
-        outcome=out.road,
+        outcome=out.outcome,
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
         joints=joints,
     )
-    for i in np.flatnonzero(out.road >= _COMPILED).tolist():
+    for i in np.flatnonzero(out.outcome >= _COMPILED).tolist():
         # one robot for all where the errors are its own: its columns are cached
         own = all_errors[i if len(all_errors) > 1 else 0]
         erring = robot if np.array_equal(own, robot.errors) else robot.with_errors(own)

@@ -24,7 +24,7 @@ from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN
 from assembly.solvers.conic import (
     GAP,
-    GAP_WITHOUT_PLAY,
+    GAP_WITHOUT_CLEARANCE,
     SolverFailed,
     minimise_energy,
 )
@@ -49,7 +49,8 @@ class OnePosture:
             errors; also the work of unit multipliers on the errors, before any
             elimination.
         closing: (m, r) closure multipliers of the springs'.
-        pulls: (ny, r) generalised forces of these on the springs, before elimination.
+        on_springs: (ny, r) generalised forces of these on the springs, before any
+            elimination.
         cones: (nu, r) on the clearances, likewise.
         free: (nq, r) on free motions: nothing but rounding.
         redundant: (m, m - ..) closure rows that neither free motions nor springs enter,
@@ -73,7 +74,7 @@ class OnePosture:
     closures: NDArray
     misfit: NDArray
     closing: NDArray
-    pulls: NDArray
+    on_springs: NDArray
     cones: NDArray
     free: NDArray
     redundant: NDArray
@@ -138,7 +139,7 @@ def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     least_energies(
         np.ascontiguousarray(one.G.T), one.starts,
         e @ one.misfit[:, erring].T, np.linalg.pinv(one.G), one.cones,
-        one.pulls.T @ one.pulls,
+        one.on_springs.T @ one.on_springs,
         float(np.linalg.norm(slip)), u, y, energy, bound, outcome,
     )  # fmt: skip
     parts = np.hstack([u, e])
@@ -207,7 +208,7 @@ def _solve_loaded(one: OnePosture, loads: PostureLoads, errors: NDArray) -> Draw
     residual = parts @ one.left.T + one.closures @ loads.screws
     residual = np.abs(residual).max(axis=1, initial=0.0)
     infeasible = np.abs(e @ one.infeasible.T).max(axis=1, initial=0.0)
-    allowed = GAP * energy + GAP_WITHOUT_PLAY * (h**2).sum(axis=1) / 2
+    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * (h**2).sum(axis=1) / 2
     # written so that NaN is not certified
     certified = (gap <= allowed) & (residual <= OPEN) & (infeasible <= INFEASIBLE)
     certified &= (np.abs(motions) <= one.ranges).all(axis=1)

@@ -1,4 +1,4 @@
-"""The compiled heart of ``nominal.py``: one target followed from home.
+"""Continuation from home to a target, compiled, for :mod:`assembly.kinematics.nominal`.
 
 Everything is plain arrays: ``kinds`` 0 fixed, 1 revolute, 2 prismatic; ``carries`` 1 in
 row i where joint j's motion moves frame i; ``pairs`` rows of each closure's frames.
@@ -102,7 +102,7 @@ def _follow(
             parents, kinds, fixed, carries, pairs, platform, q, part, part_held, size
         )
         for j in range(len(q)):
-            # a jump, or a coordinate that is no number: another assembly mode
+            # a jump, or a coordinate that is NaN: another assembly mode
             fine = fine and (steps == 1 or abs(tried[j] - q[j]) < farthest)
         if fine or steps == 1:
             for j in range(len(q)):
@@ -141,7 +141,7 @@ def _newton(
         x = _least_step(J, r)
         largest = _largest(x)
         still = largest < 1e-9
-        # at rest: solved, or as well as a rounded overconstrained file can be
+        # converged: solved, or as well as a rounded overconstrained file can be
         fine = worst < _SOLVED or (still and worst < _ROUNDED)
         limit = 0.5 / max(0.5, largest)
         for i in range(count):
@@ -149,7 +149,7 @@ def _newton(
         if worst < 1e-14 or still or not np.isfinite(worst):
             break
         if worst > _ROUNDED and worst > 0.7 * before:
-            break  # it does not converge: a smaller step will
+            break  # it does not converge: try a smaller step
         before = worst
     return q, fine
 
@@ -211,7 +211,7 @@ def _equations(
         _move(kinds[j], R[j], p[j], p[platform], factor, size, J, row, i)
     turn = rotation_log(R[platform])
     if whole:
-        # no trouble near half a turn when the whole rotation is given
+        # regular near half a turn when the whole rotation is given
         asked = _rotation_exp(pose[3], pose[4], pose[5])
         turn = rotation_log(_times_transposed(R[platform], asked))
     else:
@@ -251,7 +251,7 @@ def _move(
 
 @part
 def _largest(v: Vector) -> float:
-    """Largest absolute component; not a number if one is none."""
+    """Largest absolute component; NaN if one is NaN."""
     largest = 0.0
     for value in v:
         if not abs(value) <= largest:

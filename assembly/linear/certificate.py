@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from assembly.linear.assembled import Assembly
 from assembly.linear.rounding import SPREAD, stiffness_spread
 from assembly.linear.screw_bound import ScrewBound, bound_screw
-from assembly.solvers.conic import GAP, GAP_WITHOUT_PLAY
+from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 
 LARGEST_RESIDUAL = 1e-9  # [rad, reference lengths] accepted of a closure
 LARGEST_EXCESS = 1e-9  # [-] accepted of a clearance
@@ -32,7 +32,7 @@ def unproved(assembly: Assembly) -> str:
         assembly.duality_gap(),
     )  # fmt: skip
     allowed = GAP * (assembly.stored + abs(assembly.work))
-    allowed += GAP_WITHOUT_PLAY * assembly.energy_without_clearance
+    allowed += GAP_WITHOUT_CLEARANCE * assembly.energy_without_clearance
     sentences = []
     # written so that NaN is not proved
     if not gap <= allowed:

@@ -43,7 +43,7 @@ from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
 
 if TYPE_CHECKING:
-    from assembly.solvers.support import Body
+    from assembly.solvers.support import ConvexBody
 
 READINGS = ("frozen", "free", "budget")
 
@@ -161,16 +161,16 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     @property
-    def body(self) -> "Body":
+    def body(self) -> "ConvexBody":
         """The set as the compiled search reads it."""
-        from assembly.solvers.support import Body
+        from assembly.solvers.support import ConvexBody
 
         starts = np.searchsorted(self.group, np.arange(self.group.max(initial=-1) + 2))
         centre, X, H, start = (
             np.require(a, requirements=["C", "W"])
             for a in (self.centre, self.map, self.rows, self.start)
         )
-        return Body(centre, X, H, start, starts)
+        return ConvexBody(centre, X, H, start, starts)
 
 
 def reachable_screws(

@@ -8,47 +8,22 @@ solution; each further one reduces the error by a factor of the size of the moti
 chord method).  Rows that do not converge are left to
 :func:`assembly.exact.exact.solve_exact`.
 
-======  =============  ===========  ==================================================
-symbol  code           shape        meaning
-======  =============  ===========  ==================================================
-e b     ``screws``     (2, R, n, 6) deformation of bodies and of joints, logarithms
-q       ``motions``    (R, q)       free motions of passive joints
-lambda  multipliers    (R, 6K)      of the scaled closures
-d       deflections    (R, s)       of contacts
-======  =============  ===========  ==================================================
+The rows and their iterate are in :mod:`assembly.measurement.row_state`.
 
 Sources:
     Ortega, Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables,
     section 7.1 (chord methods).
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
-from assembly.exact.finite_robot import along_own
-from assembly.kinematics.nominal import size_of
-from assembly.kinematics.se3 import (
-    exponential,
-    inverse,
-    left_jacobian,
-    logarithm,
-    turn_jacobian,
-)
-from assembly.linear.closure import closure_signs
 from assembly.linear.without_clearance import (
-    Flexibility,
-    at_postures,
     flexibility,
     in_groups,
-    pseudo_inverse,
 )
 from assembly.measurement.conditions import Conditions
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from assembly.measurement.row_state import Rows, RowState
 
 _MOST_ITERATIONS = 60  # at most; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
@@ -57,7 +32,6 @@ _FREE_FORCE = 1e-5  # of the largest wrench: largest force along a free motion
 _ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: wrenches below are zero
 _CONTRACTION = 0.8  # largest ratio of two successive changes, after the first few
 _TRANSIENT = 3  # iterations in which changes may grow
-_LINEAR_BELOW = 1e-9  # [rad or m] deflections of a contact below which it is linear
 _BATCH = 100  # rows, so that memory stays small
 
 
@@ -89,291 +63,17 @@ def solve_rows(
     for begin in range(0, len(conditions), _BATCH):
         rows = slice(begin, begin + _BATCH)
         some = conditions.take(np.arange(len(conditions))[rows])
-        batch = _Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
+        batch = Rows(some, flexible, posture_of_row[rows], linear_deflections[rows])
         screws[rows], converged[rows] = _solve(batch)
     return screws, converged
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Rows to be solved, and what is constant during the iteration.
-
-    Attributes:
-        conditions: R rows.
-        flexible: the linear model at the distinct postures.
-        posture_of_row: (R,) index of each row's posture among these.
-        linear_deflections: (R, s) [rad or m] of contacts in the linear model.
-    """
-
-    conditions: Conditions
-    flexible: Flexibility
-    posture_of_row: NDArray
-    linear_deflections: NDArray
-
-    @cached_property
-    def loads(self) -> DeadLoads:
-        """Loads and weights."""
-        c = self.conditions
-        return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
-
-    @cached_property
-    def elastic_frames(self) -> tuple[NDArray, NDArray]:
-        """Frames whose bodies, and whose joints, are elastic."""
-        with_contact = [
-            self.conditions.robot.index(law.frame) for law in self.conditions.laws
-        ]
-        bodies = np.flatnonzero(self.flexible.body_compliances.any(axis=(1, 2)))
-        joints = np.flatnonzero(self.flexible.joint_compliances.any(axis=(1, 2)))
-        return bodies, np.union1d(joints, with_contact).astype(int)
-
-    @cached_property
-    def free_frames(self) -> NDArray:
-        """Frames whose joints have free motions."""
-        moved = self.flexible.free.any(axis=1).reshape(-1, 6)
-        return np.flatnonzero(moved.any(axis=1))
-
-    @cached_property
-    def contacts(self) -> NDArray:
-        """(6n, s) unit screws of the joints with a contact."""
-        columns = np.zeros((
-            6 * len(self.conditions.robot.frames),
-            len(self.conditions.laws),
-        ))
-        for k, law in enumerate(self.conditions.laws):
-            i = self.conditions.robot.index(law.frame)
-            columns[6 * i + self.conditions.robot.frames[i].own_axis, k] = 1.0
-        return columns
-
-    @cached_property
-    def law_constants(self) -> tuple[NDArray, NDArray]:
-        """(s,) coefficients and exponents of contacts."""
-        laws = self.conditions.laws
-        return (
-            np.array([law.coefficient for law in laws]),
-            np.array([law.exponent for law in laws]),
-        )
-
-    @cached_property
-    def contact_compliance(self) -> NDArray:
-        """(R, s) [rad/(N m), m/N] tangent compliance of contacts."""
-        c, n = self.law_constants
-        size = np.abs(self.linear_deflections)
-        return (
-            np.where(size > _LINEAR_BELOW, 1 / n, 1.0)
-            * np.maximum(size, _LINEAR_BELOW) ** (1 - n)
-            / c
-        )
-
-    def tangent_deflection(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] deflections under loads w, by the tangent of the law."""
-        c, n = self.law_constants
-        load = (
-            c
-            * np.maximum(np.abs(self.linear_deflections), _LINEAR_BELOW) ** (n - 1)
-            * self.linear_deflections
-        )
-        return self.linear_deflections + self.contact_compliance * (w - load)
-
-    def deflection(self, w: NDArray) -> NDArray:
-        """(R, s) [rad or m] of the contacts under loads w."""
-        c, n = self.law_constants
-        least = c * _LINEAR_BELOW**n
-        large = np.maximum(np.abs(w), least)
-        return (large / c) ** (1 / n) * w / large
-
-    @cached_property
-    def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Product of the postures' matrices and the rows' vectors."""
-        return at_postures(self.posture_of_row)
-
-    def corrected(self, right_side: NDArray) -> NDArray:
-        """(R, m) solution of the linear model for right sides (R, m)."""
-        if not self.conditions.laws:
-            return self.times(self.flexible.inverse, right_side)
-        return np.einsum("rij,rj->ri", self._with_contacts, right_side)
-
-    @cached_property
-    def _with_contacts(self) -> NDArray:
-        """(R, m, m) inverse of the scaled system, contacts as tangent springs."""
-        flexible = self.flexible
-        contact_rows = np.einsum("cki,is->cks", flexible.rows, self.contacts)[
-            self.posture_of_row
-        ]
-        M = flexible.system[self.posture_of_row].copy()
-        count = contact_rows.shape[1]
-        compliance = self.contact_compliance / flexible.softness
-        M[:, :count, :count] += np.einsum(
-            "rks,rs,rls->rkl", contact_rows, compliance, contact_rows
-        )
-        return pseudo_inverse(M)[0]
-
-    @cached_property
-    def bodies(self) -> NDArray:
-        """(R, n, 4, 4) bodies with their errors, seen from after the parent."""
-        errors = self.conditions.errors
-        error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
-        return self.conditions.robot.fixed_transforms @ error_motion
-
-    @cached_property
-    def commanded(self) -> NDArray:
-        """(R, n, 4, 4) motions of the joints as commanded."""
-        return along_own(self.conditions.robot, self.conditions.coordinates)
-
-    @cached_property
-    def scale(self) -> NDArray:
-        """(6,) factors on a screw: translations over the reference length."""
-        return np.array([1.0, 1.0, 1.0, *[1 / size_of(self.conditions.robot)] * 3])
-
-    @cached_property
-    def closure_frames(self) -> NDArray:
-        """(2, K) frames that closures join."""
-        robot = self.conditions.robot
-        pairs = [[robot.index(a), robot.index(b)] for a, b in robot.closures]
-        return np.array(pairs, dtype=int).reshape(-1, 2).T
-
-    @cached_property
-    def nominal_closures(self) -> NDArray:
-        """(R, K, 4, 4) a closure's second frame seen from its first, nominally."""
-        first, second = self.closure_frames
-        T = self.conditions.transforms
-        return inverse(T[:, first]) @ T[:, second]
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """The current iterate of R rows.
-
-    Attributes:
-        rows: their constants.
-        screws: (2, R, n, 6) deformations of bodies and of joints.
-        motions: (R, q) free motions.
-        multipliers: (R, 6K) of the scaled closures.
-    """
-
-    rows: _Rows
-    screws: NDArray
-    motions: NDArray
-    multipliers: NDArray
-
-    @cached_property
-    def passive_motion(self) -> NDArray:
-        """(R, n) [rad or m] motions of passive joints from their coordinates."""
-        moved = self.motions @ self.rows.flexible.free.T
-        return moved.reshape(*self.screws.shape[1:]).sum(axis=-1)
-
-    @cached_property
-    def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) before a body's deformation, after it, after joints', all."""
-        rows = self.rows
-        partial = [rows.bodies]
-        for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
-            T = partial[-1].copy()
-            T[:, frames] = T[:, frames] @ exponential(screws[:, frames])
-            partial.append(T)
-        partial.append(
-            partial[-1] @ along_own(rows.conditions.robot, self.passive_motion)
-        )
-        relative = partial[-1] @ rows.commanded
-        after = np.empty_like(relative)
-        before = np.broadcast_to(np.eye(4), relative.shape).copy()
-        for i, parent in enumerate(rows.conditions.robot.parents):
-            if parent >= 0:
-                before[:, i] = after[:, parent]
-            after[:, i] = before[:, i] @ relative[:, i]
-        return tuple(before @ T for T in partial)
-
-    @property
-    def platform(self) -> NDArray:
-        """(R, 4, 4) pose of the platform."""
-        robot = self.rows.conditions.robot
-        return self.poses[3][:, robot.index(robot.platform)]
-
-    @cached_property
-    def platform_screw(self) -> NDArray:
-        """(R, 6) rotation vector of R R_nominal^T and shift of the origin."""
-        nominal = self.rows.conditions.postures.platform
-        back = np.swapaxes(nominal[:, :3, :3], 1, 2)
-        turn = rotation_vector(self.platform[:, :3, :3] @ back)
-        return np.concatenate([turn, self.platform[:, :3, 3] - nominal[:, :3, 3]], 1)
-
-    @cached_property
-    def residual(self) -> NDArray:
-        """(R, 6K) closure residuals: [rad], translations per reference length."""
-        first, second = self.rows.closure_frames
-        T, origin = (
-            self.poses[3],
-            self.rows.conditions.postures.platform[:, None, :3, 3],
-        )
-        G = T[:, first] @ self.rows.nominal_closures @ inverse(T[:, second])
-        turn = G[..., :3, :3] - np.eye(3)
-        G[..., :3, 3] += (turn @ origin[..., None])[..., 0]
-        return (logarithm(G) * self.rows.scale).reshape(len(G), -1)
-
-    @cached_property
-    def total_wrenches(self) -> NDArray:
-        """(2, R, n, 6) wrenches through bodies and through joints, base axes.
-
-        Read at the platform's nominal origin.
-        """
-        conditions, loads = self.rows.conditions, self.rows.loads
-        posture, robot = conditions.postures, conditions.robot
-        last = robot.index(robot.platform)
-        closing = self.multipliers.reshape(len(conditions), -1, 6) * self.rows.scale
-        closing = np.einsum("kn,rkj->rnj", closure_signs(robot), closing)
-        J = turn_jacobian(self.platform_screw[:, :3])
-        moment = np.linalg.solve(np.swapaxes(J, 1, 2), loads.load[:, :3, None])[..., 0]
-        moment += np.cross(self.platform_screw[:, 3:], loads.load[:, 3:])
-        platform = np.concatenate([moment, loads.load[:, 3:]], axis=1)[:, None]
-        on_body = robot.on_path[last][:, None] * platform
-        on_joint = on_body.copy()
-        on_joint[:, last] = 0.0  # the load acts on the platform's body
-        total = np.stack([on_body, on_joint]) + closing
-        if loads.beyond_platform:
-            carried = self.poses[3] @ self.rows.commanded
-            total += resultants(posture, loads, self.poses[1], carried)[:2]
-        return total
-
-    def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
-        """(R, k, 6) wrenches at the platform's origin, read at some frames' poses."""
-        origin = self.rows.conditions.postures.platform[:, None, :3, 3]
-        T, w = poses[:, frames], total[:, frames]
-        moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])
-        parts = np.stack([moment, w[..., 3:]], axis=-2) @ T[..., :3, :3]
-        return parts.reshape(w.shape)
-
-    def imbalance(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Residuals of the constitutive laws and of the equilibrium.
-
-        Returns:
-            (2, R, n, 6) screws that compliances give less those of the iterate, (R, q)
-            forces along free motions, (R, s) loads of contacts.
-        """
-        rows, flexible = self.rows, self.rows.flexible
-        screw_residual = -self.screws
-        generalised = np.zeros_like(self.screws)
-        for k, frames in enumerate(rows.elastic_frames):
-            w = self.wrenches(self.total_wrenches[k], self.poses[k], frames)
-            J = left_jacobian(self.screws[k][:, frames])
-            w = (w[..., None, :] @ J)[..., 0, :]
-            generalised[k][:, frames] = w
-            C = (flexible.body_compliances, flexible.joint_compliances)[k][frames]
-            screw_residual[k][:, frames] += np.einsum("kij,rkj->rki", C, w)
-        joint_wrenches = np.zeros_like(self.screws[0])
-        frames = rows.free_frames
-        joint_wrenches[:, frames] = self.wrenches(
-            self.total_wrenches[1], self.poses[2], frames
-        )
-        free = joint_wrenches.reshape(len(joint_wrenches), -1) @ flexible.free
-        w = generalised[1].reshape(len(joint_wrenches), -1) @ rows.contacts
-        return screw_residual, free, w
-
-
-def _solve(rows: _Rows) -> tuple[NDArray, NDArray]:
+def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     """(R, 6) platform screws, and (R,) whether they converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
-    state = _State(
+    state = RowState(
         rows, np.zeros((2, count, n, 6)), np.zeros((count, q)), np.zeros((count, K))
     )
     size, active = np.full(count, np.inf), ~flexible.ambiguous[rows.posture_of_row]
@@ -392,7 +92,7 @@ def _solve(rows: _Rows) -> tuple[NDArray, NDArray]:
         inactive = ~active
         for part in (screws.swapaxes(0, 1), motions, multipliers):
             part[inactive] = 0.0
-        state = _State(
+        state = RowState(
             rows, state.screws + screws, state.motions + motions,
             state.multipliers + multipliers,
         )  # fmt: skip
@@ -411,13 +111,13 @@ def _solve(rows: _Rows) -> tuple[NDArray, NDArray]:
     return state.platform_screw, converged
 
 
-def _lever_arms(rows: _Rows) -> NDArray:
+def _lever_arms(rows: Rows) -> NDArray:
     """(q,) [1 or m] factors from forces along free motions to moments."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 
 
-def _correction(state: _State, first: bool) -> tuple[NDArray, NDArray, NDArray]:
+def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray]:
     """Changes of screws, motions and multipliers by the linear model's inverse."""
     rows, flexible = state.rows, state.rows.flexible
     screw_residual, free, w = state.imbalance()

@@ -76,7 +76,7 @@ def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:
     Args:
         robot: of n frames.
         wrenches: (..., n, 6) [N m, N] through every frame, at it in its axes, as
-            :attr:`assembly.linear.energy.Assembly.wrenches`.
+            :attr:`assembly.linear.assembled.Assembly.wrenches`.
 
     Returns:
         (..., links) [Pa] in the order of :func:`stressed_links`.

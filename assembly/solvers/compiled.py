@@ -10,7 +10,7 @@ expressions and sums bring numba's broadcasting along and take several times as 
 compile as loops (:mod:`assembly.solvers.vectors`), and so does a long tuple of arrays
 that is handed on where a few of them are needed.
 
-Whoever waits for the first compilation is told so, once, on stderr.
+The first compilation is announced, once, on stderr.
 """
 
 import inspect
@@ -124,9 +124,9 @@ class _Part:
             self.signature, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS,
             **self.options,
         )(function)  # fmt: skip
-        found = compiled.overloads[self.signature.args]
-        native = found.fndesc.llvm_func_name
-        add_symbol(name, found.library.get_pointer_to_function(native))
+        overload = compiled.overloads[self.signature.args]
+        native = overload.fndesc.llvm_func_name
+        add_symbol(name, overload.library.get_pointer_to_function(native))
         self.loaded = True
 
 
@@ -160,14 +160,14 @@ def _numba_type(hint: Any) -> types.Type:
 class _Announcement(event.Listener):
     """One line when the first function of this package has to be compiled."""
 
-    said = False
+    announced = False
 
     def on_start(self, event: Any) -> None:
         function = event.data["dispatcher"].py_func
         ours = function.__module__.startswith("assembly.")
-        first = multiprocessing.parent_process() is None and not self.said
+        first = multiprocessing.parent_process() is None and not self.announced
         if ours and first:
-            self.said = True
+            self.announced = True
             print(
                 "forcefit: compiling its solvers, once on this machine "
                 "(`forcefit warm-up` does it beforehand)",
@@ -175,7 +175,7 @@ class _Announcement(event.Listener):
             )
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """No message."""
 
 
 event.register("numba:compile", _Announcement())

@@ -20,9 +20,9 @@ def interior_point(
 @kernel
 def newton(
     Gt: NDArray, h: NDArray, d: NDArray, springs: int, starts: NDArray, relative: float,
-    absolute: float, steps: int, sharp: float, u: NDArray, y: NDArray,
+    absolute: float, steps: int, first_sigma: float, u: NDArray, y: NDArray,
 ) -> int:  # fmt: skip
     """See :func:`assembly.solvers.dual_newton.dual_newton`."""
     return _dual_newton(
-        Gt, h, d, springs, starts, relative, absolute, steps, sharp, u, y
+        Gt, h, d, springs, starts, relative, absolute, steps, first_sigma, u, y
     )

@@ -14,6 +14,7 @@ Sources:
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ _TOLERANCE = 1e-13
 # robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # gap that counts as proved: of the energy, and of the energy without clearance
-GAP, GAP_WITHOUT_PLAY = 1e-8, 1e-12
+GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _SHARE = 0.1  # of it that is asked here: the problem before elimination adds to it
 _STOP = 1e-2  # Newton's method stops at this fraction of it
 _STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
@@ -72,6 +73,17 @@ class LeastEnergy:
         return self.value - self.bound
 
 
+class ConeProgramme(NamedTuple):
+    """Arguments of :func:`minimise_energy`, scaled to size 1."""
+
+    G: NDArray
+    h: NDArray
+    d: NDArray
+    H: NDArray
+    k: NDArray
+    group: NDArray
+
+
 def minimise_energy(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> LeastEnergy:
@@ -100,7 +112,9 @@ def minimise_energy(
     size = max(np.linalg.norm(h), np.linalg.norm(G, axis=0).max(), 1e-150)
     size = max(size, float(np.sqrt(np.abs(d).max())))
     rows = np.linalg.norm(H, axis=1)
-    scaled = (G / size, h / size, d / size**2, H / rows[:, None], k / rows, group)
+    scaled = ConeProgramme(
+        G / size, h / size, d / size**2, H / rows[:, None], k / rows, group
+    )
     best, status = None, ""
     for solve in _SOLVERS:
         u, rigid, status = solve(*scaled)
@@ -115,12 +129,12 @@ def minimise_energy(
             )
         if u is None or rigid is None:
             continue
-        for candidate in _certified(*scaled, into_cones(u, group), rigid):
+        for candidate in _certified(scaled, into_cones(u, group), rigid):
             if best is None or candidate.gap < best.gap:
                 best = candidate
-            if _proved(best, scaled[1]):
+            if _proved(best, scaled.h):
                 break
-        if best is not None and _proved(best, scaled[1]):
+        if best is not None and _proved(best, scaled.h):
             break
     if best is None:
         raise SolverFailed("least energy", status)
@@ -136,7 +150,7 @@ def minimise_energy(
 
 def _proved(least: LeastEnergy, h: NDArray) -> bool:
     """Whether the certified gap of a scaled problem is small enough."""
-    allowed = GAP * abs(least.value) + GAP_WITHOUT_PLAY * float(h @ h) / 2
+    allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
 
@@ -179,7 +193,9 @@ def _by_clarabel(
     b = np.concatenate([-h, k, radii])
     P = block_diag([csc_matrix((nu, nu)), diags_array(np.ones(r))], format="csc")
     q = np.concatenate([-d, np.zeros(r)])
-    x, z, status = _clarabel(P, q, A, b, r + len(k), group, regularisation)
+    x, z, status = _clarabel(
+        P, q, A, b, _Cones(equal=r + len(k), group=group), regularisation
+    )
     rigid = -z[r : r + len(k)]
     if status == "PrimalInfeasible":
         if not _proves_no_point(rigid, H, k, group, np.ones(group[-1] + 1)):
@@ -195,14 +211,13 @@ _SOLVERS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] 
 
 
 def _certified(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
-    u: NDArray, rigid: NDArray,
-) -> Iterator[LeastEnergy]:  # fmt: skip
+    problem: ConeProgramme, u: NDArray, rigid: NDArray
+) -> Iterator[LeastEnergy]:
     """A solution with the bound of its own springs; the same refined by Newton."""
     from assembly.solvers.cone_solvers import newton
 
-    problem = (G, h, d, H, k, group)
-    yield _certify(*problem, u, G @ u + h, rigid)
+    G, h, d, H, k, group = problem
+    yield _certify(problem, u, G @ u + h, rigid)
     if group.max() >= 0 and np.bincount(group).max() > 2:
         return  # Newton's method knows discs and intervals only
     Gt = np.ascontiguousarray(np.vstack([G, H]).T)
@@ -210,55 +225,46 @@ def _certified(
     u, y = u.copy(), np.concatenate([h, -rigid])
     newton(
         Gt, right, d, len(h), _starts(group), _STOP * GAP,
-        _STOP * GAP_WITHOUT_PLAY * size, _STEPS, _FIRST_SIGMA, u, y,
+        _STOP * GAP_WITHOUT_CLEARANCE * size, _STEPS, _FIRST_SIGMA, u, y,
     )  # fmt: skip
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():
         if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:
-            yield _certify(*problem, u, y[: len(h)], -y[len(h) :])
+            yield _certify(problem, u, y[: len(h)], -y[len(h) :])
 
 
 def _certify(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
-    u: NDArray, springs: NDArray, rigid: NDArray,
-) -> LeastEnergy:  # fmt: skip
+    problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
+) -> LeastEnergy:
     """A solution with its value and the bound that its multipliers prove."""
-    strain = G @ u + h
-    value = float(strain @ strain) / 2 - float(d @ u)
-    problem = (G, h, d, H, k, group)
-    bound = energy_bound(*problem, springs, rigid)
-    if not d.any():
+    strain = problem.G @ u + problem.h
+    value = float(strain @ strain) / 2 - float(problem.d @ u)
+    bound = _energy_bound(problem, springs, rigid)
+    if not problem.d.any():
         # any multiple of the multipliers is as good a proof: f gain - f^2 cost / 2
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
-        better = energy_bound(*problem, factor * springs, factor * rigid)
+        better = _energy_bound(problem, factor * springs, factor * rigid)
         if better > bound:
             bound, springs, rigid = better, factor * springs, factor * rigid
     return LeastEnergy(u, springs, rigid, value, bound)
 
 
-def energy_bound(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
-    spring: NDArray, rigid: NDArray,
-) -> float:  # fmt: skip
+def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
     """Certified lower bound of problem (22) from any guess of its multipliers.
 
     For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu),
     and the least of the right side over the unit cones is known in closed form.
 
     Args:
-        G: as in :func:`minimise_energy`, like h, d, H, k and group.
-        h: see there.
-        d: see there.
-        H: see there.
-        k: see there.
-        group: see there.
-        spring: (r,) [sqrt(2 J)] the guess y, best G u + h at the minimum.
-        rigid: (p,) [J] the guess n.
+        problem: scaled.
+        spring: (r,) the guess y, best G u + h at the minimum.
+        rigid: (p,) the guess n.
 
     Returns:
-        [J] the bound; close to the minimum when the guess is close.
+        The bound; close to the minimum when the guess is close.
     """
+    G, h, d, H, k, group = problem
     gradient = G.T @ spring - d - H.T @ rigid
     gain = float(cone_sizes(gradient, group).sum())
     return float(spring @ h - spring @ spring / 2 + rigid @ k) - gain
@@ -301,7 +307,9 @@ def least_factor(
     q[-1] = 1.0
     P = csc_matrix((nu + 1, nu + 1))
     for regularisation in _REGULARISATIONS:
-        x, z, status = _clarabel(P, q, A, b, m, group, regularisation, positive=1)
+        x, z, status = _clarabel(
+            P, q, A, b, _Cones(equal=m, group=group, positive=1), regularisation
+        )
         if status == "PrimalInfeasible":
             radius = np.where(scaled, _LARGEST_FACTOR, 1.0)[_starts(group)[:-1]]
             n = -z[:m] / rows
@@ -332,9 +340,17 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
     return A, b
 
 
+class _Cones(NamedTuple):
+    """Rows of a programme: equations, inequalities, then cones of given columns."""
+
+    equal: int
+    group: NDArray
+    positive: int = 0
+
+
 def _clarabel(
-    P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, equal: int, group: NDArray,
-    regularisation: float, positive: int = 0,
+    P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, cones: _Cones,
+    regularisation: float,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
     """Minimise x.P.x/2 + q.x, A x + s = b: primal (None if unusable), dual, status."""
     import clarabel
@@ -345,10 +361,10 @@ def _clarabel(
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
     settings.static_regularization_enable = regularisation > 0
     settings.static_regularization_constant = regularisation
-    cones = [clarabel.ZeroConeT(equal)] if equal else []
-    cones += [clarabel.NonnegativeConeT(positive)] if positive else []
-    cones += [clarabel.SecondOrderConeT(int(n) + 1) for n in np.bincount(group)]
-    solution = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
+    sets = [clarabel.ZeroConeT(cones.equal)] if cones.equal else []
+    sets += [clarabel.NonnegativeConeT(cones.positive)] if cones.positive else []
+    sets += [clarabel.SecondOrderConeT(int(n) + 1) for n in np.bincount(cones.group)]
+    solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
     # a solution that is not accurate may still be good: its certificate decides

@@ -1,16 +1,16 @@
-"""A compiled Newton method for the dual of problem (22), made smooth by its own answer.
+"""A compiled Newton method for the dual of problem (22), smoothed at each solution.
 
     maximise  y.h - |y|^2 / 2 - sum_k |G_k^T y - d_k|   over the springs y
 
-is smooth wherever every clearance presses on its bound: a few Newton steps suffice.
-Where a clearance stays within its bound the dual has a kink, -|z|.  In its place goes
+is smooth wherever every cone constraint is active: a few Newton steps suffice.  Where
+one is inactive the dual has a kink, -|z|, which is replaced by
 
     min over |u| <= 1 of  u.z + |u - u_old|^2 / (2 sigma),
 
-the kink rounded where u_old says it is; each answer's u is the next u_old and sigma
-grows, which converges to the dual's own maximum for any sigma.  With u at hand the gap
-is known exactly at every step: |G u + h - y|^2 / 2 + sum_k (|z_k| + z_k.u_k).  Rows
-H u = k that no spring can take up are further rows of G, h = -k, with no |y|^2 / 2.
+the kink smoothed about u_old.  The u of each solution is the next u_old, and sigma
+grows; this converges to the maximum of the dual for any sigma.  With u the gap is known
+exactly at every step: |G u + h - y|^2 / 2 + sum_k (|z_k| + z_k.u_k).  Rows
+H u = k that no spring enters are further rows of G, h = -k, with no |y|^2 / 2.
 
 Sources:
     Rockafellar (1976), Augmented Lagrangians and applications of the proximal point
@@ -29,21 +29,22 @@ from assembly.solvers.compiled import (
     Vector,
     part,
 )
-from assembly.solvers.interior import LANES, add, dot, layers_of
+from assembly.solvers.layers import LANES, add, dot, layers_of
 
 FAST = {"contract", "reassoc"}
 _HALVINGS = 12
-_SHARPER = 10.0  # growth of sigma each time u_old moves
-_SETTLED = 0.1  # part of the gap that may be the inner problem's
-_OPEN = 1e-13  # most that a row without springs may stay open
+_SIGMA_GROWTH = 10.0  # each time u_old moves
+_INNER_SHARE = 0.1  # of the gap that may be the inner problem's
+_RESIDUAL = 1e-13  # accepted of a row that no spring enters
 
 
 @part(fastmath=FAST)
 def dual_newton(
     Gt: GivenMatrix, h: GivenVector, d: GivenVector, springs: int, starts: GivenIndices,
-    relative: float, absolute: float, steps: int, sharp: float, u: Vector, y: Vector,
+    relative: float, absolute: float, steps: int, first_sigma: float, u: Vector,
+    y: Vector,
 ) -> int:  # fmt: skip
-    """Maximise the dual; ``u`` and ``y`` leave holding the answer.
+    """Maximise the dual; ``u`` and ``y`` are overwritten with the solution.
 
     Args:
         Gt: (nu, r) columns of G, of order 1, and of H.
@@ -54,48 +55,48 @@ def dual_newton(
         relative: gap asked for, relative to the energy ..
         absolute: .. plus this.
         steps: most Newton steps.
-        sharp: first sigma, times the mean |G_k^T h|; the larger, the better u must be.
-            0 leaves the dual as it is, kinks and all, and gives up at the first one.
-        u: (nu,) first guess, such as 0, within the cones; leaves holding the answer.
-        y: (r,) leaves holding the multipliers; of H's rows also the first guess.
+        first_sigma: times the mean |G_k^T h|; the larger, the better u must be.  0
+            leaves the dual as it is, with its kinks, and stops at the first one.
+        u: (nu,) first guess within the cones, such as 0; overwritten with the solution.
+        y: (r,) overwritten with the multipliers; of H's rows also the first guess.
 
     Returns:
-        Steps taken; -1 if it did not settle.
+        Steps taken; -1 if it did not converge.
     """
     r, nu = len(h), len(u)
     order, layers = layers_of(starts)
-    # as in the interior point: rows of G, columns in layers, ending in zeros
+    # as in the interior-point method: rows of G, columns in layers, padded with zeros
     width = nu + -nu % LANES
     M, B, columns = np.zeros((r, width)), np.zeros((r, width)), np.zeros((4, width))
-    old, own, push, z = columns[0], columns[1], columns[2], columns[3]
+    old, own, linear, z = columns[0], columns[1], columns[2], columns[3]
     for j in range(nu):
-        old[j], push[j] = u[order[j]], -d[order[j]]
+        old[j], linear[j] = u[order[j]], -d[order[j]]
         for i in range(r):
             M[i, j] = Gt[order[j], i]
     g, S, step, start = np.empty(r), np.empty((r, r)), np.zeros(r), np.empty(r)
     for i in range(springs):
         y[i] = h[i] + dot(M[i], old)
     for j in range(width):
-        z[j] = push[j]
+        z[j] = linear[j]
     for i in range(springs):
         add(h[i], M[i], z)
     mean = 0.0
     for j in range(nu):
         mean += abs(z[j]) / nu
-    sigma = sharp / max(mean, 1e-12) if sharp > 0.0 else 1e30
+    sigma = first_sigma / max(mean, 1e-12) if first_sigma > 0.0 else 1e30
     before, halvings, taken = -np.inf, 0, 0
     while True:
         smooth, residual, kink, primal = _slopes(
-            M, h, push, springs, layers, old, sigma, own, y, g, z, B
+            M, h, linear, springs, layers, old, sigma, own, y, g, z, B
         )
         closed = True
         for i in range(springs, r):
-            closed = closed and abs(g[i]) <= _OPEN
+            closed = closed and abs(g[i]) <= _RESIDUAL
         if closed and residual + kink <= relative * primal + absolute:
             break
         if not smooth >= before - 1e-14:
             halvings += 1
-            if halvings > _HALVINGS or sharp == 0.0:
+            if halvings > _HALVINGS or first_sigma == 0.0:
                 taken = -1
                 break
             for i in range(r):
@@ -106,12 +107,12 @@ def dual_newton(
             taken = -1
             break
         before, halvings, taken = smooth, 0, taken + 1
-        if residual <= _SETTLED * (residual + kink):
+        if residual <= _INNER_SHARE * (residual + kink):
             for j in range(width):
                 old[j] = own[j]
-            sigma *= _SHARPER
+            sigma *= _SIGMA_GROWTH
             before = -np.inf
-            _slopes(M, h, push, springs, layers, old, sigma, own, y, g, z, B)
+            _slopes(M, h, linear, springs, layers, old, sigma, own, y, g, z, B)
         _curvature(B, springs, S)
         if not _solve(S, g, step):
             taken = -1
@@ -126,20 +127,22 @@ def dual_newton(
 
 @part(fastmath=FAST)
 def _slopes(
-    M: Matrix, h: GivenVector, push: Vector, springs: int, layers: Indices, old: Vector,
-    sigma: float, u: Vector, y: Vector, g: Vector, z: Vector, B: Matrix,
+    M: Matrix, h: GivenVector, linear: Vector, springs: int, layers: Indices,
+    old: Vector, sigma: float, u: Vector, y: Vector, g: Vector, z: Vector, B: Matrix,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """What the smooth dual is at y, and how it goes on.
+    """Value and derivatives of the smooth dual at y.
 
-    ``u`` leaves holding the clearances, ``g`` the slope, ``B`` a root of minus the
-    curvature but for the springs' own; ``old`` are the clearances that u is drawn to,
-    ``sigma`` says how loosely.  Columns are in layers, rows all those of M.
+    ``u`` is overwritten with the clearances, ``g`` with the gradient, ``B`` with a root
+    of minus the curvature but for the springs' own; ``old`` are the proximal
+    clearances, ``sigma`` the proximal parameter.  Columns are in layers, rows all those
+    of M.
 
     Returns:
-        The smooth dual, the gap from the slope and from the kinks, the springs' energy.
+        The smooth dual, the gap from the gradient and from the kinks, the springs'
+        energy.
     """
     for j in range(len(z)):
-        z[j] = push[j]
+        z[j] = linear[j]
     for i in range(len(y)):
         add(y[i], M[i], z)
     discs = layers[2] - layers[1] if len(layers) > 2 else 0

@@ -1,17 +1,17 @@
 """The farthest point of a convex body of platform screws, bracketed: problem (27).
 
-Asked for is the largest rotation, or translation, in the body of
-:mod:`assembly.solvers.support`.  Three numbers matter, so its projection is cut from
-outside in three dimensions:
+The largest rotation, or translation, in the body of :mod:`assembly.solvers.support` is
+sought.  It depends on three components: their projection is approximated from outside
+by planes in three dimensions:
 
 - a support function gives a cut on the upper side and a point on the lower; where the
-  body is symmetric, the same answer serves the opposite direction too;
-- first the search climbs: a point's own direction gains more than the one it came from;
-- then a box along the direction found, and ever the farthest corner of what is left;
-- :mod:`assembly.solvers.majorant` closes round bodies, which would take many cuts.
+  body is symmetric, the same support holds for the opposite direction;
+- first the search climbs: the direction of the supporting point gains more;
+- then a box along that direction, and always the farthest vertex of what remains;
+- :mod:`assembly.solvers.majorant` bounds round bodies, which would take many cuts.
 
-A direction in which the interior point's certificate falls short is handed back, with
-:data:`NEEDED`: the caller answers it by another solver and the search goes on.
+Where the certificate of the interior-point method falls short, :data:`NEEDED` is
+returned: the caller solves that direction by the fallback and the search continues.
 
 Sources:
     Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
@@ -38,7 +38,7 @@ from assembly.solvers.polytope import (
     farthest_corner,
     start_box,
 )
-from assembly.solvers.support import Body, screw_at, support, symmetric, within
+from assembly.solvers.support import ConvexBody, screw_at, support, symmetric, within
 from assembly.solvers.vectors import copy, divide, fill, inner
 
 DONE, NEEDED, GAVE_UP = range(3)
@@ -51,19 +51,19 @@ _POOR = 0.5  # .. and with which the search still goes on
 
 
 class Search(NamedTuple):
-    """How far a search has come.
+    """State of a search.
 
     Attributes:
         part: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] asked of upper minus lower bound.
         bounds: (2,) [rad or m] lower and upper.
         best: (6,) [rad, m] attains the lower bound.
-        direction: (3,) looked in next.
+        direction: (3,) of the next support.
         axes: (3, 3) rows of the box.
         heights: (2, 3) of the box, low and high, NaN where not known.
         cuts: (32, 4) planes found before there was a box.
         counts: (4,) stage, supports, planes kept, whether the last improved.
-        outer: what the planes leave.
+        outer: polytope of the planes.
     """
 
     part: int
@@ -79,25 +79,25 @@ class Search(NamedTuple):
 
 
 @kernel
-def begin_search(body: Body, part: int, tolerance: float) -> Search:
+def begin_search(body: ConvexBody, part: int, tolerance: float) -> Search:
     """:func:`begin` for callers that are not compiled themselves."""
     return begin(body, part, tolerance, empty_polytope())
 
 
 @kernel
 def search_on(
-    body: Body, search: Search, height: float, screw: Vector, pulls: Vector
+    body: ConvexBody, search: Search, height: float, screw: Vector, gradient: Vector
 ) -> int:
     """Take in what :func:`learn` is given, unless empty, and :func:`advance`."""
-    if len(pulls):
-        learn(body, search, height, screw, pulls)
+    if len(gradient):
+        learn(body, search, height, screw, gradient)
         choose(search)
     return advance(body, search)
 
 
 @part
-def begin(body: Body, part: int, tolerance: float, outer: Polytope) -> Search:
-    """A search that has not looked anywhere yet.
+def begin(body: ConvexBody, part: int, tolerance: float, outer: Polytope) -> Search:
+    """A search without supports yet.
 
     Args:
         body: what is searched.
@@ -128,8 +128,8 @@ def begin(body: Body, part: int, tolerance: float, outer: Polytope) -> Search:
 
 
 @part
-def _first_direction(body: Body, search: Search) -> None:
-    """Where the body would reach farthest if no closure held it."""
+def _first_direction(body: ConvexBody, search: Search) -> None:
+    """The direction of farthest reach if there were no closures."""
     p, nv = body.rows.shape
     free = body.map[search.part : search.part + 3].copy()
     for i in range(p):
@@ -157,12 +157,12 @@ def _first_direction(body: Body, search: Search) -> None:
         for a in range(3):
             middle += d[a] * body.centre[search.part + a]
         for c in range(len(body.starts) - 1):
-            pull = 0.0
+            length = 0.0
             for j in range(body.starts[c], body.starts[c + 1]):
                 own = d[0] * free[0, j] + d[1] * free[1, j] + d[2] * free[2, j]
-                pull += own * own
+                length += own * own
                 middle -= own * body.start[j]
-            height += np.sqrt(pull)
+            height += np.sqrt(length)
         sign = 1.0 if middle >= 0.0 else -1.0
         if height + abs(middle) > most:
             most = height + abs(middle)
@@ -171,50 +171,54 @@ def _first_direction(body: Body, search: Search) -> None:
 
 
 @part
-def advance(body: Body, search: Search) -> int:
-    """Look on until the bounds are as close as asked.
+def advance(body: ConvexBody, search: Search) -> int:
+    """Continue until the bounds are as close as asked.
 
     Args:
         body: what is searched.
-        search: leaves holding the bounds.
+        search: updated in place.
 
     Returns:
-        DONE; NEEDED where ``search.direction`` must be answered by :func:`learn`
-        first; GAVE_UP after as many supports as allowed.
+        DONE; NEEDED where a support in ``search.direction`` must be given to
+        :func:`learn` first; GAVE_UP after as many supports as allowed.
     """
     while True:
         if search.bounds[1] - search.bounds[0] <= search.tolerance:
             return DONE
         if search.counts[1] >= _MOST_SUPPORTS:
             return GAVE_UP
-        height, v, pulls, n = support(
+        height, v, gradient, n = support(
             body, search.part, search.direction, _SHARE * search.tolerance
         )
         screw = screw_at(body, v)
         reached = 0.0
         for a in range(3):
             reached += search.direction[a] * screw[search.part + a]
-        # written so that a height that is not a number fails
+        # written so that NaN fails
         if not height - reached <= _POOR * search.tolerance:
             return NEEDED
-        learn(body, search, max(height, reached), screw, pulls)
+        learn(body, search, max(height, reached), screw, gradient)
         if symmetric(body):
-            _learn_opposite(body, search, v, pulls)
+            _learn_opposite(body, search, v, gradient)
         choose(search)
 
 
 @part
 def learn(
-    body: Body, search: Search, height: float, screw: GivenVector, pulls: GivenVector
+    body: ConvexBody,
+    search: Search,
+    height: float,
+    screw: GivenVector,
+    gradient: GivenVector,
 ) -> None:
-    """Take in a support in ``search.direction``.
+    """Add a support in ``search.direction``.
 
     Args:
         body: what is searched.
-        search: leaves knowing more.
+        search: updated in place.
         height: [rad or m] certified upper bound along the direction.
         screw: (6,) of the body.
-        pulls: (nv,) X^T d - H^T n.
+        gradient: (nv,) X^T d - H^T n.
     """
     search.counts[1] += 1
     search.counts[3] = 0
@@ -222,7 +226,7 @@ def learn(
     part = search.part
     search.bounds[1] = min(search.bounds[1], majorant_bound(
         body.centre[part : part + 3], body.map[part : part + 3], body.rows, body.start,
-        body.starts, pulls,
+        body.starts, gradient,
     ))  # fmt: skip
     _add_plane(search, search.direction, height)
     search.bounds[1] = max(search.bounds[1], search.bounds[0])
@@ -244,7 +248,7 @@ def _improve(search: Search, screw: GivenVector) -> None:
 
 @part
 def _add_plane(search: Search, direction: Vector, height: float) -> None:
-    """A new plane: of the box, or kept for it, or cut at once."""
+    """Add a plane: to the box, to those kept for it, or to the polytope."""
     stage = search.counts[0]
     if stage == _CUTTING:
         cut(search.outer, direction, height)
@@ -274,8 +278,10 @@ def _set_side(search: Search, direction: Vector, height: float) -> None:
 
 
 @part
-def _learn_opposite(body: Body, search: Search, v: Vector, pulls: Vector) -> None:
-    """What a symmetric body's support says of the other side: v turned round."""
+def _learn_opposite(
+    body: ConvexBody, search: Search, v: Vector, gradient: Vector
+) -> None:
+    """Add the opposite support of a symmetric body."""
     start = body.start
     screw = screw_at(body, within(body, divide(v, -1.0)))
     _improve(search, screw)
@@ -285,8 +291,8 @@ def _learn_opposite(body: Body, search: Search, v: Vector, pulls: Vector) -> Non
     for c in range(len(body.starts) - 1):
         size = 0.0
         for j in range(body.starts[c], body.starts[c + 1]):
-            size += pulls[j] * pulls[j]
-            height += pulls[j] * start[j]
+            size += gradient[j] * gradient[j]
+            height += gradient[j] * start[j]
         height += np.sqrt(size)
     reached = 0.0
     for a in range(3):
@@ -296,7 +302,7 @@ def _learn_opposite(body: Body, search: Search, v: Vector, pulls: Vector) -> Non
 
 @part
 def choose(search: Search) -> None:
-    """The next direction, and the stage that looks in it."""
+    """Choose the next direction, and the stage."""
     counts, direction = search.counts, search.direction
     if counts[0] == _CLIMBING:
         if counts[3] and counts[1] < _CLIMBS:
@@ -317,8 +323,8 @@ def choose(search: Search) -> None:
     corner = farthest_corner(search.outer)
     size = np.sqrt(inner(corner, corner))
     search.bounds[1] = max(search.bounds[0], min(search.bounds[1], size))
-    # where the last step gained, its point's own direction gains more, and is where
-    # the second bound is sharpest; else wherever the cuts leave most room
+    # where the last support gained, the direction of its point gains more, and the
+    # second bound is tightest there; else the farthest vertex
     if counts[3]:
         _towards(search, search.best[search.part : search.part + 3])
     else:
@@ -327,7 +333,7 @@ def choose(search: Search) -> None:
 
 @part
 def _towards(search: Search, point: Vector) -> None:
-    """Look towards a point."""
+    """Take the direction of a point."""
     size = np.sqrt(inner(point, point))
     for a in range(3):
         search.direction[a] = point[a] / size

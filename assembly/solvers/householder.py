@@ -11,9 +11,9 @@ Sources:
 import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, part
-from assembly.solvers.interior import LANES
+from assembly.solvers.layers import LANES
 
-_CLEAR = 10.0  # a pivot within this factor of the threshold decides nothing
+CLEAR = 10.0  # within this factor of the threshold the rank is ambiguous
 
 
 @part(fastmath={"contract", "reassoc"})
@@ -24,21 +24,20 @@ def triangulate(
     """Turn the rows of F into a lower triangle, the largest remaining row first.
 
     Args:
-        F: (p, m); leaves with reflectors right of the diagonal, the triangle left.
-        turns: (p,) leaves with the reflectors' factors.
+        F: (p, m); on exit, reflectors above the diagonal, the triangle below it.
+        turns: (p,) on exit, factors of the reflectors.
         diagonal: (p,) of the triangle.
         order: (p,) original rows in their new order.
         relative: a row this small relative to the first adds nothing new.
         floor: nor does one this small.
-        clean: where some row adds nothing, the largest size relative to the first
-            that it may keep (the least motions are found with a threshold of their
-            own); any if negative.
+        clean: where some row adds nothing, its largest size relative to the first (the
+            least motions have a threshold of their own); any if negative.
 
     Returns:
-        The rank; -1 where it hangs on rounding.
+        The rank; -1 where it is numerically ambiguous.
     """
     p, m = F.shape
-    # what is left of the rows, zero where the triangle is and beyond m: see LANES
+    # the rows still to be reduced, zero in the triangle and beyond m: see LANES
     rest, sizes = np.zeros((p, m + -m % LANES)), np.empty(p)
     for i in range(p):
         order[i] = i
@@ -57,9 +56,9 @@ def triangulate(
         if step == 0:
             first = best
         limit = max(floor, relative * first)
-        if not best > limit * _CLEAR:
-            doubtful = best > limit / _CLEAR or (clean >= 0.0 and best > clean * first)
-            return -1 if doubtful or best != best else step
+        if not best > limit * CLEAR:
+            ambiguous = best > limit / CLEAR or (clean >= 0.0 and best > clean * first)
+            return -1 if ambiguous or best != best else step
         own = rest[step]
         if at != step:
             order[step], order[at] = order[at], order[step]
@@ -72,7 +71,7 @@ def triangulate(
         own[step] -= diagonal[step]
         turns[step] = -1.0 / (diagonal[step] * own[step])
         for i in range(step + 1, p):
-            # written out: as calls these loops take half as long again
+            # inline: as calls these loops take half as long again
             row, along, size = rest[i], 0.0, 0.0
             for a in range(len(own)):
                 along += own[a] * row[a]
@@ -90,7 +89,7 @@ def triangulate(
 
 @part(fastmath={"contract", "reassoc"})
 def turn_all(F: Matrix, turns: Vector, rank: int, X: Matrix) -> None:
-    """From the triangle's coordinates back: every column x of X becomes Q x."""
+    """Every column x of X becomes Q x."""
     m, count = X.shape
     dots = np.empty(count)
     for step in range(rank - 1, -1, -1):
@@ -111,7 +110,7 @@ def turn_all(F: Matrix, turns: Vector, rank: int, X: Matrix) -> None:
 
 @part(fastmath={"contract", "reassoc"})
 def turn(F: Matrix, turns: Vector, rank: int, x: Vector) -> None:
-    """From the triangle's coordinates back: x becomes Q x."""
+    """X becomes Q x."""
     for step in range(rank - 1, -1, -1):
         own = F[step]
         along = 0.0
@@ -124,7 +123,7 @@ def turn(F: Matrix, turns: Vector, rank: int, x: Vector) -> None:
 
 @part(fastmath={"contract", "reassoc"})
 def turn_back(F: Matrix, turns: Vector, rank: int, x: Vector) -> None:
-    """Into the triangle's coordinates: x becomes Q^T x."""
+    """X becomes Q^T x."""
     for step in range(rank):
         own = F[step]
         along = 0.0

@@ -21,7 +21,7 @@ import numpy as np
 
 from assembly.solvers.compiled import GivenVector, Indices, Matrix, Vector, part
 
-_LEAST_SIZE = 1e-9  # of a cone that does not pull, relative to the largest
+_LEAST_SIZE = 1e-9  # of a cone with zero gradient, relative to the largest
 _SWEEPS, _STEPS = 12, 60
 
 
@@ -37,10 +37,10 @@ def majorant_bound(
         H: (p, nv) orthonormal rows.
         start: (nv,).
         starts: (cones + 1,) first column of each cone, and nv.
-        w: (nv,) pulls X^T d - H^T n at some direction d.
+        w: (nv,) gradient X^T d - H^T n at some direction d.
 
     Returns:
-        The bound; infinite where nothing pulls, or where rounding spoils it.
+        The bound; infinite where the gradient is zero, or rounding dominates.
     """
     p, nv = H.shape
     sizes, largest, total = np.empty(nv), 0.0, 0.0
@@ -51,7 +51,7 @@ def majorant_bound(
         sizes[starts[c]] = np.sqrt(size)
         largest = max(largest, np.sqrt(size))
     if not largest > 1e-150:
-        return np.inf  # nothing pulls in this direction: it says nothing of others
+        return np.inf  # a zero gradient bounds no other direction
     for c in range(len(starts) - 1):
         size = max(sizes[starts[c]], _LEAST_SIZE * largest)
         total += size
@@ -66,10 +66,10 @@ def majorant_bound(
         return np.inf
     Q, linear, constant = np.zeros((3, 3)), centre.copy(), total / 2
     for j in range(nv):
-        pull = fixed[j] / sizes[j] - start[j]
+        slope = fixed[j] / sizes[j] - start[j]
         constant += fixed[j] * (fixed[j] / (2 * sizes[j]) - start[j])
         for a in range(3):
-            linear[a] += A[j, a] * pull
+            linear[a] += A[j, a] * slope
             for b in range(3):
                 Q[a, b] += A[j, a] * A[j, b] / sizes[j]
     return constant + largest_on_sphere(Q, linear)
@@ -79,7 +79,7 @@ def majorant_bound(
 def _follow_rows(
     H: Matrix, X: Matrix, start: Vector, sizes: Vector, A: Matrix, fixed: Vector
 ) -> bool:
-    """Subtract from A and fixed what the best n answers; whether that succeeded."""
+    """Subtract the terms of the best n from A and fixed; whether that succeeded."""
     p, nv = H.shape
     S, right = np.zeros((p, p)), np.zeros((p, 4))
     scaled = np.empty(nv)

@@ -1,4 +1,4 @@
-"""A convex body in three dimensions, cut plane by plane: its corners at all times.
+"""A convex polytope in three dimensions, cut plane by plane; its vertices are known.
 
 A cut drops the corners above the plane and puts new ones where it meets an edge; an
 edge is two corners with two planes in common.  Every corner has three planes: one that
@@ -31,7 +31,7 @@ class Polytope(NamedTuple):
 
 @part
 def empty_polytope() -> Polytope:
-    """Room for a body."""
+    """Memory for a polytope."""
     return Polytope(
         np.empty((_MOST, 3)), np.empty((_MOST, 3), np.int64), np.zeros(2, np.int64)
     )
@@ -42,7 +42,7 @@ def start_box(body: Polytope, axes: Matrix, low: Vector, high: Vector) -> None:
     """Make the body a box.
 
     Args:
-        body: leaves holding it.
+        body: overwritten with it.
         axes: (3, 3) orthonormal rows, the box's directions.
         low: (3,) least component along each.
         high: (3,) largest.
@@ -64,7 +64,7 @@ def cut(body: Polytope, normal: Vector, height: float) -> bool:
     """Keep the points x with normal . x <= height.
 
     Args:
-        body: leaves holding what is left.
+        body: cut in place.
         normal: (3,) unit vector.
         height: of the plane along it.
 

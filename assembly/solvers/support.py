@@ -6,7 +6,7 @@ are, prove an upper bound,
 
     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
 
-and its point is drawn into the body: height and point never depend on the solver.
+and its point is projected into the body: both hold whatever the solver returned.
 """
 
 from typing import NamedTuple
@@ -18,10 +18,10 @@ from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import divide, inner
 
 _SYMMETRIC = 1e-14  # H start counts as zero
-_ROUNDING = 1e-14  # by which a cone counts as left
+_ROUNDING = 1e-14  # by which a cone may be exceeded
 
 
-class Body(NamedTuple):
+class ConvexBody(NamedTuple):
     """Platform screws that remain possible; see the head of this module.
 
     Attributes:
@@ -40,46 +40,48 @@ class Body(NamedTuple):
 
 
 @kernel
-def pulls_along(body: Body, part: int, direction: Vector, tolerance: float) -> Vector:
-    """The pulls of :func:`support`, for callers that are not compiled themselves."""
+def gradient_along(
+    body: ConvexBody, part: int, direction: Vector, tolerance: float
+) -> Vector:
+    """The gradient of :func:`support`, for callers that are not compiled themselves."""
     return support(body, part, direction, tolerance)[2]
 
 
 @kernel
-def screw_near(body: Body, v: Vector) -> Vector:
+def screw_near(body: ConvexBody, v: Vector) -> Vector:
     """:func:`screw_at` of what is :func:`within`, for callers that are not compiled."""
     return screw_at(body, within(body, v))
 
 
 @part
 def support(
-    body: Body, part: int, direction: Vector, tolerance: float
+    body: ConvexBody, part: int, direction: Vector, tolerance: float
 ) -> tuple[float, Vector, Vector, Vector]:
     """Largest component of the body's screws along a direction.
 
     Args:
-        body: what is searched.
+        body: the convex body.
         part: first of the three components.
         direction: (3,) unit vector.
         tolerance: [rad or m] that may be left between height and point.
 
     Returns:
-        The certified height, v (nv,) of the body, the pulls X^T d - H^T n (nv,) and n;
-        height and point may be farther apart where the interior point broke down.
+        The certified height, v (nv,) of the body, the gradient X^T d - H^T n (nv,) and
+        n; height and point may be farther apart where the solver broke down.
     """
     p, nv = body.rows.shape
-    pulls, height, size = np.zeros(nv), 0.0, 0.0
+    gradient, height, size = np.zeros(nv), 0.0, 0.0
     n = np.zeros(p)
     for a in range(3):
         height += direction[a] * body.centre[part + a]
         for j in range(nv):
-            pulls[j] += direction[a] * body.map[part + a, j]
+            gradient[j] += direction[a] * body.map[part + a, j]
     for j in range(nv):
-        size += pulls[j] * pulls[j]
-        height -= pulls[j] * body.start[j]
+        size += gradient[j] * gradient[j]
+        height -= gradient[j] * body.start[j]
     size = np.sqrt(size)
     if not size > 0.0:
-        return height, body.start.copy(), pulls, n
+        return height, body.start.copy(), gradient, n
     v = body.start.copy()
     if p:
         right = np.zeros(p)
@@ -87,37 +89,37 @@ def support(
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
         v, n, _ = interior_point(
-            np.zeros((0, nv)), np.zeros(0), divide(pulls, size), body.rows, right,
+            np.zeros((0, nv)), np.zeros(0), divide(gradient, size), body.rows, right,
             body.starts, tolerance / size, 0.0,
         )  # fmt: skip
         for i in range(p):
             n[i] *= size
             height += n[i] * right[i]
             for j in range(nv):
-                pulls[j] -= n[i] * body.rows[i, j]
+                gradient[j] -= n[i] * body.rows[i, j]
     for c in range(len(body.starts) - 1):
-        pull = 0.0
+        length = 0.0
         for j in range(body.starts[c], body.starts[c + 1]):
-            pull += pulls[j] * pulls[j]
-        pull = np.sqrt(pull)
-        height += pull
-        if p == 0 and pull > 0.0:
+            length += gradient[j] * gradient[j]
+        length = np.sqrt(length)
+        height += length
+        if p == 0 and length > 0.0:
             for j in range(body.starts[c], body.starts[c + 1]):
-                v[j] = pulls[j] / pull
-    return height, within(body, v) if p else v, pulls, n
+                v[j] = gradient[j] / length
+    return height, within(body, v) if p else v, gradient, n
 
 
 @part
-def within(body: Body, v: Vector) -> Vector:
+def within(body: ConvexBody, v: Vector) -> Vector:
     """A nearby v that satisfies rows and cones to rounding."""
     step = np.empty(len(v))
     for j in range(len(v)):
         step[j] = v[j] - body.start[j]
     for i in range(len(body.rows)):
-        left = inner(body.rows[i], step)
+        residual = inner(body.rows[i], step)
         for j in range(len(step)):
-            step[j] -= left * body.rows[i, j]
-    # the longest part of the step, from a start that is inside, that leaves no cone
+            step[j] -= residual * body.rows[i, j]
+    # the longest part of the step, from a start inside, that stays in all cones
     share = 1.0
     for c in range(len(body.starts) - 1):
         aa, ab, bb = 0.0, 0.0, -1.0 - _ROUNDING
@@ -134,7 +136,7 @@ def within(body: Body, v: Vector) -> Vector:
 
 
 @part
-def screw_at(body: Body, v: Vector) -> Vector:
+def screw_at(body: ConvexBody, v: Vector) -> Vector:
     """(6,) platform screw at v."""
     screw = body.centre.copy()
     for j in range(len(v)):
@@ -145,7 +147,7 @@ def screw_at(body: Body, v: Vector) -> Vector:
 
 
 @part
-def symmetric(body: Body) -> bool:
+def symmetric(body: ConvexBody) -> bool:
     """Whether v -> -v leaves the rows satisfied."""
     for i in range(len(body.rows)):
         if not abs(inner(body.rows[i], body.start)) <= _SYMMETRIC:

@@ -12,7 +12,7 @@ from assembly.solvers.compiled import kernel
 
 @kernel
 def inner(a: NDArray, b: NDArray) -> float:
-    """a.b, summed in order; :func:`assembly.solvers.interior.dot` is the quick one."""
+    """a.b, summed in order; :func:`assembly.solvers.layers.dot` is the fast one."""
     total = 0.0
     for j in range(len(a)):
         total += a[j] * b[j]

@@ -9,13 +9,14 @@ draws, or the worst corners, just meet every limit, and fresh draws verify them.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.statistics.allocated_tolerances import Allocation
 from assembly.statistics.cutting_planes import cut_planes
 from assembly.statistics.least_cost import least_cost
 from assembly.statistics.replay import Replay
@@ -26,54 +27,12 @@ from assembly.statistics.scaling import (
     with_worst_corners,
 )
 from assembly.statistics.verification import prove_worst, verify
-from forcefit.inputs.display import html_table, short_repr
 
 if TYPE_CHECKING:
-    import xarray
+    pass
 
 
 _SCALING_DRAWS = 4  # times the training draws: only one factor is to be found
-
-
-@dataclass(frozen=True, eq=False)
-class Allocation:
-    """Tolerances, their cost, and proven bounds of both.
-
-    Attributes:
-        plan: costs and limits.
-        tolerances: (G,) [rad or m].
-        price: their cost.
-        uniformly_scaled: (G,) [rad or m] those with the proportions of the convex
-            programme, scaled uniformly to meet all limits.
-        price_uniformly_scaled: their cost; no less than ``price``.
-        price_bound: lower bound of the cost of tolerances that always meet the convex
-            limits; NaN for a yield below 1, or where a limit is not convex.
-        cuts: planes in the convex programme.
-        worst: by limit and for yield 1: the worst corner found and the proven upper
-            bound, over all postures; NaN where nothing is proven.
-        proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
-            meet the limits too; NaN where nothing is proven.
-        verification: by fresh draws: yields with their intervals.
-    """
-
-    plan: Plan
-    tolerances: NDArray
-    price: float
-    uniformly_scaled: NDArray
-    price_uniformly_scaled: float
-    price_bound: float
-    cuts: int
-    worst: dict[str, tuple[float, float]] = field(default_factory=dict)
-    proven_scale: float = float("nan")
-    verification: dict[str, Any] = field(default_factory=dict)
-
-    __repr__, _repr_html_ = short_repr, html_table
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Tolerances over ``class``, as ``--output`` writes them."""
-        from assembly.statistics.tolerances import tolerance_dataset
-
-        return tolerance_dataset(self)
 
 
 def allocate(

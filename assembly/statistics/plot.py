@@ -169,7 +169,7 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
     """Bar chart of the tolerances, angles and lengths apart, with their upper bounds.
 
     Args:
-        data: of :func:`assembly.statistics.tolerances.tolerance_dataset`.
+        data: of :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
         A figure: wide bars are of least cost; narrow ones, where different, those of

@@ -28,7 +28,7 @@ from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
 from assembly.model.clearance import Compliant
-from assembly.solvers.conic import GAP_WITHOUT_PLAY
+from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 
 _ACTIVE = 1e-7  # of the largest force on any cone: less is none
 _RANK = 1e-10  # of the equations: directions left undetermined do not move
@@ -134,7 +134,7 @@ def _active_clearances(
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
     # inside a zone multipliers y are rounding: energies y^2 / 2 beside forces G y
     some = np.flatnonzero(
-        draws.energy > GAP_WITHOUT_PLAY * np.abs(forces).sum(axis=1, initial=0.0)
+        draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(axis=1, initial=0.0)
     )
     largest = np.abs(forces).max(axis=1, initial=0.0)
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):

@@ -33,7 +33,7 @@ from assembly.statistics.clearance_positions import (
 from assembly.statistics.quantities import POSE_ERRORS
 
 if TYPE_CHECKING:
-    from assembly.solvers.support import Body
+    from assembly.solvers.support import ConvexBody
 
 READING = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
@@ -138,7 +138,7 @@ def worst_error_slopes(
         (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
         multipliers of the bounds of the clearances that carry no load.
     """
-    from assembly.solvers.support import pulls_along
+    from assembly.solvers.support import gradient_along
 
     part = 3 * POSE_ERRORS.index(key)
     size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
@@ -150,7 +150,7 @@ def worst_error_slopes(
         if free.any():
             body = _remaining_screws(prepared, draws, i, free)
             direction = by_screw[i, part : part + 3].copy()
-            by_clearance[i, free] = pulls_along(
+            by_clearance[i, free] = gradient_along(
                 body, part, direction, _SUPPORT_PRECISION
             )
     return by_screw, by_clearance
@@ -158,13 +158,13 @@ def worst_error_slopes(
 
 def _remaining_screws(
     prepared: OnePosture, draws: Draws, i: int, free: NDArray
-) -> "Body":
+) -> "ConvexBody":
     """The set of possible platform screws of draw i."""
-    from assembly.solvers.support import Body
+    from assembly.solvers.support import ConvexBody
 
     nu = len(free)
     rows = clearance_constraints(prepared, ~free)[:, free]
-    return Body(
+    return ConvexBody(
         draws.platform_screw[i].copy(),
         np.ascontiguousarray(prepared.screws[:, :nu][:, free]),
         np.ascontiguousarray(rows),

@@ -181,18 +181,20 @@ def tolerances(
     from dataclasses import replace
 
     from assembly.robots import load_robot
+    from assembly.statistics.allocated_tolerances import (
+        allocation_of,
+        allocation_text,
+        tolerance_dataset,
+    )
     from assembly.statistics.allocation import allocate
     from assembly.statistics.plot import allocation_figure
     from assembly.statistics.replay import journalled
     from assembly.statistics.tolerance_file import read_plan
     from assembly.statistics.tolerances import (
-        allocation_of,
-        allocation_text,
         grid_postures,
         identity_of,
         present_errors,
         present_text,
-        tolerance_dataset,
     )
     from assembly.sweeps.dataset import check_dataset, save_dataset
 

@@ -267,7 +267,7 @@ def test_the_certificate_refuses_a_spoilt_point(grid):
     assert not unknown.certified.any()
 
 
-def test_a_spoilt_solver_is_caught_and_the_slower_road_taken(grid, monkeypatch):
+def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
     """The kernel's own certificate: asked for more than is possible, it refuses."""
     robot, postures = grid
     from assembly.batch import compiled_energy as compiled_assembly
@@ -279,7 +279,7 @@ def test_a_spoilt_solver_is_caught_and_the_slower_road_taken(grid, monkeypatch):
         for i in range(len(T)):
             out.energy[i] *= 1 + 1e-6
             P = compiled_assembly.paths_of(T[i], s)
-            out.road[i] = compiled_assembly._certify(
+            out.outcome[i] = compiled_assembly._certify(
                 i, s, P, errors[0], np.zeros(out.multipliers.shape[1]), 0, out
             )
 

@@ -16,7 +16,8 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
-from tests.assembly.exact.test_exact import moved_unknowns, only
+from tests.assembly.exact.test_exact import only
+from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 from validation.multibody.simulation import simulate_assembly, without_clearance
 

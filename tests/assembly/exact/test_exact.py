@@ -1,40 +1,24 @@
-"""Finite motions: derivatives, closed forms at large turns, laws, the simulation."""
+"""Exact equilibria: closed forms at large turns, and the simulation."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from scipy.optimize import brentq, root
 
 import assembly.exact.exact as exact
 from assembly.exact.descent import NotConverged
 from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import FiniteRobot
-from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture, place_many, place_robot
-from assembly.kinematics.se3 import (
-    bracket,
-    bracket_form,
-    exponential,
-    inverse,
-    left_jacobian,
-    logarithm,
-    second_form,
-)
-from assembly.linear.closure import closure_signs, virtual_joints
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.links import joint_compliances, link_compliance, link_compliances
+from assembly.model.links import link_compliance
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.robots.delta import delta
-from assembly.robots.hexapod import hexapod
 from assembly.solvers.conic import SolverFailed
-from stiffness.screws import rotation_matrix, rotation_vector, transform
+from stiffness.screws import rotation_matrix, rotation_vector
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
     irsbot2_with,
-    random_robot,
     small_clearance,
 )
 from validation.multibody.simulation import without_clearance
@@ -82,123 +66,6 @@ def pendulum(stiffness, length):
     return home_posture(
         Robot("bar", "tip", (hinge, Frame("tip", "hinge", [length, 0, 0])))
     )
-
-
-def moved_unknowns(posture, rng, size):
-    """A finite robot with unknowns of a size in rad and reference lengths."""
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    per = np.sqrt(np.diag(model.metric))
-    return (
-        model,
-        rng.normal(size=len(per)) / per * size,
-        rng.normal(size=len(per)) / per,
-    )
-
-
-# Finite motions
-
-
-@pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
-def test_motions_are_exponentials_of_screws(rng, size):
-    """Against the matrix exponential; rounding only."""
-    s = size * rng.normal(size=6)
-    generator = np.zeros((4, 4))
-    x, y, z = s[:3]
-    generator[:3] = [[0, -z, y, s[3]], [z, 0, -x, s[4]], [-y, x, 0, s[5]]]
-    assert np.abs(exponential(s) - expm(generator)).max() < 1e-14
-    if np.linalg.norm(s[:3]) < np.pi:
-        assert np.abs(logarithm(exponential(s)) - s).max() < 1e-14 * max(1, 1 / size)
-    assert np.abs(exponential(s) @ inverse(exponential(s)) - np.eye(4)).max() < 1e-14
-
-
-@pytest.mark.parametrize("size", [1e-4, 0.1, 1.0])
-def test_the_jacobian_is_the_mean_of_the_motions_met_on_the_way(rng, size):
-    """J = integral of Ad(exp(t s)), the series of ad^n / (n + 1)!."""
-    s = size * rng.normal(size=6)
-    J, term = np.eye(6), np.eye(6)
-    for n in range(1, 40):
-        term = term @ bracket(s) / (n + 1)
-        J = J + term
-    assert np.abs(left_jacobian(s) - J).max() < 1e-14
-
-
-@pytest.mark.parametrize(("size", "tolerance"), [(0.02, 1e-10), (0.3, 1e-5)])
-def test_second_derivative_of_the_exponential(rng, size, tolerance):
-    """By the product's own expansion: its series leaves out size^6 and more.
-
-    log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
-    """
-    s = size * np.ones(6) / np.sqrt(3)
-    w, h = rng.normal(size=(2, 6))
-    step = 2e-4
-
-    def work(sign):
-        return w @ logarithm(exponential(s + sign * step * h) @ inverse(exponential(s)))
-
-    expected = (work(1) + work(-1)) / step**2
-    rounding = 1e-16 / step**2
-    form = second_form(s, w)
-    assert np.abs(form - form.T).max() == 0.0
-    scale = np.linalg.norm(w) * np.linalg.norm(h) ** 2
-    assert abs(h @ form @ h - expected) < (tolerance + 10 * rounding + 1e-8) * scale
-
-
-def test_the_bracket_form_is_the_work_on_a_bracket(rng):
-    a, b, w = rng.normal(size=(3, 6))
-    assert a @ bracket_form(w) @ b == pytest.approx(w @ (bracket(a) @ b), rel=1e-13)
-
-
-# Closures of a robot
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_without_motion_the_closures_are_the_linear_ones(seed):
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng, legs=3)
-    posture = home_posture(robot.with_errors(0 * robot.errors))
-    lin = solve_assembly(posture).linearisation
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    here = place(model, np.zeros(len(model.frame)))
-    columns = np.hstack([model.joints.elastic, model.joints.cones, model.joints.free])
-    assert here.largest_gap < 1e-15
-    assert np.abs(here.rows - lin.rows @ columns).max() < 1e-14
-    assert np.abs(here.platform_rows - lin.platform @ columns).max() < 1e-14
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_first_derivatives_of_closures_and_platform(seed):
-    """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
-    rng = np.random.default_rng(seed)
-    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
-    here, step = place(model, x), 1e-5
-    ahead, behind = place(model, x + step * h), place(model, x - step * h)
-    difference = (ahead.residual - behind.residual) / (2 * step)
-    assert np.abs(here.rows @ h - difference).max() < 1e-7
-    difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
-    assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
-
-
-@pytest.mark.parametrize("load", [[0] * 6, [0, 0, 0, 1, -2, 3]])
-@pytest.mark.parametrize("seed", range(4))
-def test_second_derivatives_of_closures_and_platform(seed, load):
-    """Where the closures hold, against differences of the first derivatives."""
-    rng = np.random.default_rng(seed)
-    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.02)
-    T, (first, second) = place(model, x).transforms, model.closed_frames.T
-    vars(model)["nominal_closures"] = (
-        inverse(T[first]) @ T[second]
-    )  # close it where it stands
-    here, step, load = place(model, x), 1e-5, np.array(load, dtype=float)
-    multipliers = rng.normal(size=len(here.residual))
-
-    def slope(place):
-        return multipliers @ place.rows + load @ place.platform_rows
-
-    difference = slope(place(model, x + step * h)) - slope(place(model, x - step * h))
-    expected = difference / (2 * step)
-    found = here.curvature(multipliers, load) @ h
-    assert here.largest_gap < 1e-14
-    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 # Closed forms at large turns
@@ -377,131 +244,6 @@ def test_an_unstable_equilibrium_is_recognised():
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 0, -30.0, 0, 0])
     assert answer.joint_screws[0, 2] == 0.0
     assert answer.least_curvature == pytest.approx(-5.0, rel=1e-12)
-
-
-# Laws
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_linear_model_is_the_limit_of_small_errors(case):
-    """Differences of the pose fall as s^2, of the relative energy as s: halves of s."""
-    robot = without_clearance(irsbot2_with(CASES[case]))
-    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
-    turns, shifts, energies = [], [], []
-    for s in (1 / 32, 1 / 64, 1 / 128):
-        scaled = replace(posture, robot=robot.with_errors(s * robot.errors))
-        error = solve_exact(scaled).linearisation_error
-        turns.append(np.linalg.norm(error.rotation))
-        shifts.append(np.linalg.norm(error.translation))
-        energies.append(abs(error.relative_energy))
-    for values, slope in ((turns, 2), (shifts, 2), (energies, 1)):
-        found = np.log2(np.array(values[:-1]) / values[1:])
-        assert np.abs(found - slope).max() < 0.05
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_turning_the_whole_robot_changes_nothing(seed):
-    """Energy the same, the platform's shift turned along; rounding of the solver."""
-    rng = np.random.default_rng(seed)
-    robot = random_robot(rng, legs=3)
-    X = transform([1.0, -2.0, 0.5], rotation_matrix([0.4, -0.9, 1.3]))
-    frames = []
-    for frame, T in zip(robot.frames, robot.fixed_transforms, strict=True):
-        if frame.parent == "base":
-            turned = rotation_vector((X @ T)[:3, :3])
-            frame = replace(frame, translation=(X @ T)[:3, 3], rotation=turned)
-        frames.append(frame)
-    here = solve_exact(home_posture(robot))
-    there = solve_exact(home_posture(replace(robot, frames=tuple(frames))))
-    scale = here.linear.energy_without_clearance
-    assert abs(there.energy - here.energy) < 1e-11 * scale
-    screws = here.platform_screw.reshape(2, 3) @ X[:3, :3].T
-    size = np.abs(screws).max(axis=1, keepdims=True)
-    assert np.abs((there.platform_screw.reshape(2, 3) - screws) / size).max() < 1e-6
-
-
-def test_springs_carry_what_the_closures_transmit():
-    """K s is the wrench that works on the screw itself: K s = J(-s)^T w.
-
-    w is read where the spring ends; the tests' beams are turned by 0.2 rad there, the
-    robot's hinges by 2e-2, so J is not 1.
-    """
-    gap = [0.3, -0.2, 0.1, 0.02, 0.03, -0.01]
-    beams = solve_exact(home_posture(coaxial_beams(gap, (1e3, 4e3))))
-    paper = solve_exact(place_robot(irsbot2_with(CASES["signed"]), pose={"tz": -0.5}))
-    for answer, screws, compliances in (
-        (beams, beams.link_screws, link_compliances),
-        (paper, paper.joint_screws, joint_compliances),
-    ):
-        C = compliances(answer.posture.robot)
-        sprung = C.any(axis=(1, 2))
-        s, size = screws[sprung], np.sqrt(np.einsum("nii->ni", C[sprung]))
-        w = np.einsum("nji,nj->ni", left_jacobian(-s), answer.wrenches[sprung])
-        strain = np.einsum("nij,nj->ni", C[sprung], w)
-        error = np.abs(strain - s) / (size + (size == 0))
-        assert error.max() < 1e-9 * np.sqrt(2 * answer.energy)
-        assert np.abs(w - answer.wrenches[sprung]).max() > 1e-4 * np.abs(w).max()
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_energy_falls_with_errors_as_the_wrenches_say(seed):
-    """dE / d(delta l) = -force: the first body longer, against solving anew."""
-    rng = np.random.default_rng(seed)
-    robot, step = random_robot(rng, legs=3), 1e-6
-    answer = solve_exact(home_posture(robot))
-    through = closure_signs(robot).T @ answer.closure_wrenches
-    expected = -through[0, 3:] @ robot.fixed_transforms[0, :3, :3]
-    energies = np.zeros((3, 2))
-    for k in range(3):
-        for side, sign in enumerate((1, -1)):
-            errors = robot.errors.copy()
-            errors[0, 3 + k] += sign * step
-            energies[k, side] = solve_exact(
-                home_posture(robot.with_errors(errors))
-            ).energy
-    found = (energies[:, 0] - energies[:, 1]) / (2 * step)
-    # a cone met or left on the way is the only kink; rounding is 1e-14 J / step
-    assert np.abs(found - expected).max() < 1e-5 * np.abs(through[:, 3:]).max() + 1e-7
-
-
-def test_a_given_start_gives_the_same_answer():
-    posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tx": 0.1, "tz": -0.5})
-    start = solve_assembly(posture)
-    given, own = solve_exact(posture, start=start), solve_exact(posture)
-    assert given.linear is start
-    assert np.array_equal(given.platform_screw, own.platform_screw)
-
-
-def test_motions_without_energy_do_not_drift(rng):
-    """A hexapod is not overconstrained: its closures cost nothing, nothing pulls.
-
-    Its pins differ from the linear answer by second-order terms only: 100 times less
-    at a tenth of the errors, to the third order.
-    """
-    robot = hexapod()
-    errors = rng.uniform(-1, 1, robot.errors.shape)
-    differences = []
-    for s in (1e-4, 1e-5):
-        answer = solve_exact(home_posture(robot.with_errors(s * errors)))
-        linear = answer.linear.clearance_screws
-        differences.append(np.abs(answer.clearance_screws - linear).max())
-        assert answer.closure_residual() < 1e-12
-        assert answer.energy < 1e-20
-        assert answer.iterations <= 6
-    assert differences[0] / differences[1] == pytest.approx(100, rel=0.1)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_slowly_curved_valleys_are_followed_to_their_end(seed):
-    """Rods of a Delta spin by radians under a load, for 1e-6 of the energy."""
-    rng = np.random.default_rng(seed)
-    robot = delta()
-    errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
-    posture = home_posture(robot.with_errors(errors))
-    answer = solve_exact(posture, [1, 2, 0, 20, -10, -30])
-    assert answer.stationarity < 1e-9
-    assert answer.least_curvature > 0
-    assert np.abs(answer.placement.own).max() > 0.1
 
 
 # What cannot be solved

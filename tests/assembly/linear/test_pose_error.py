@@ -1,4 +1,4 @@
-"""Bounds of (27): closed forms, the reference's brackets, and a second road."""
+"""Bounds of (27): closed forms, the reference's brackets, and a second method."""
 
 import itertools
 from dataclasses import replace
@@ -280,7 +280,7 @@ def test_clearances_alone_give_a_map_symmetric_in_x():
 
 
 def test_attaining_screws_are_in_the_set_and_no_random_screw_beats_the_bound():
-    """A second road from inside: random support directions stay below the upper."""
+    """A second method, from inside: random support directions stay below the upper."""
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
     found = bound_pose_error(answer, "frozen")
     reach = reachable_screws(answer, "frozen")

@@ -1,4 +1,4 @@
-"""Problem (27) by other roads: branch and bound, vertices, cvxpy, random screws."""
+"""Problem (27) by other methods: branch and bound, vertices, cvxpy, random screws."""
 
 import heapq
 import itertools

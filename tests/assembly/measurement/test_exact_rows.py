@@ -18,7 +18,7 @@ from assembly.robots import load_robot
 ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
 
 
-def situations(name, rng, laws=()):
+def loaded_rows(name, rng, laws=()):
     """A tight robot with errors under loads and weight, at configurations of its own.
 
     Errors of 0.2 mm and mrad, forces of some 100 N.
@@ -46,7 +46,7 @@ def situations(name, rng, laws=()):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_together_as_one_by_one(name, rng):
     """Both converge to 1e-12; nominal closures are rounded at 1e-12 at worst."""
-    here = situations(name, rng)
+    here = loaded_rows(name, rng)
     screws, found = solve_rows(here, np.zeros((len(here), 0)))
     assert found.all()
     for row in range(len(here)):
@@ -59,7 +59,7 @@ def test_together_as_one_by_one(name, rng):
 def test_a_contact_at_one_drive_settles_as_one_by_one(rng):
     """One by one the secant settles to 1e-5 of the finite part, some 1e-10 here."""
     first = drives(load_robot("arm6"))[0]
-    here = situations("arm6", rng, (ContactLaw(first, 2e6, 1.5),))
+    here = loaded_rows("arm6", rng, (ContactLaw(first, 2e6, 1.5),))
     together = predict(here).deviation
     for row in range(len(here)):
         alone = assemble_row(here, row).platform_screw
@@ -104,7 +104,7 @@ def test_a_contact_without_load_stays_where_it_is():
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
-def test_rows_that_do_not_come_to_rest_claim_nothing():
+def test_rows_that_do_not_converge_claim_nothing():
     """A spring so soft that the bar swings by radians is left to the exact solver."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])

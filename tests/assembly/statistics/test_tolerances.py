@@ -1,9 +1,7 @@
 """Worst cases and allocations against brute force and closed forms."""
 
 from dataclasses import replace
-from functools import cache
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,23 +12,15 @@ from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
-from assembly.model.error_distributions import tolerance_sources
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
-from assembly.statistics import verification
 from assembly.statistics.allocation import allocate
 from assembly.statistics.replay import journalled
 from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.responses import respond
-from assembly.statistics.tolerance_file import read_plan
 from assembly.statistics.tolerances import (
-    allocation_of,
-    allocation_text,
-    grid_postures,
     identity_of,
-    present_errors,
-    present_text,
 )
 from assembly.statistics.worst_case import (
     bound_energy,
@@ -40,9 +30,7 @@ from assembly.statistics.worst_case import (
 )
 from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
-from tests.robots_for_tests import NUMBERS, irsbot2_with
-
-PLAY = 1e-4
+from tests.tolerances_for_tests import PLAY, plan_for
 
 
 def two_bars(stiffness=None):
@@ -58,23 +46,6 @@ def two_bars(stiffness=None):
         Frame("end_two", "two"),
     )
     return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
-
-
-def plan_for(robot, places, costs, limits, **options):
-    """A class for each place ``(frame, component)``."""
-    some = tolerance_sources(robot, [1.0] * 6, tuple({f for f, _ in places}))
-    keys = [
-        (robot.frames[i].name, c)
-        for i, c in zip(some.frame, some.component, strict=True)
-    ]
-    kept = [keys.index(place) for place in places]
-    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
-              "signed")  # fmt: skip
-    sources = type(some)(robot, *(getattr(some, a)[kept] for a in arrays))
-    count = len(places)
-    return Plan(sources, np.arange(count), tuple(str(p) for p in places),
-                np.array(costs, dtype=float), np.zeros(count), np.full(count, 0.01),
-                limits, **options)  # fmt: skip
 
 
 def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
@@ -247,60 +218,6 @@ def test_a_force_is_shared_by_lagranges_multipliers(play):
     assert found.verification["verdict"] == "no draw failed"
 
 
-def parallel(k1, k2):
-    """A platform between two bars along x: errors share out by the stiffnesses."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
-        Frame("mount", translation=[1.0, 0, 0]),
-        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * k2)),
-    )
-    return Robot("parallel", "one", frames, (("one", "two"),))
-
-
-def test_a_pose_error_is_shared_by_lagranges_multipliers():
-    """Between springs k1, k2 the platform moves w1 t1 + w2 t2, w_i = k_i / (k1 + k2).
-
-    Minimise c1/t1 + c2/t2 with that sum D: t_i = D sqrt(c_i/w_i) / sum sqrt(c w).  The
-    energy depends on t1 + t2 alone, so its proportions are sqrt(c_i).
-    """
-    k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
-    robot = parallel(*k)
-    plan = plan_for(robot, [("one", 3), ("two", 3)], c, {"translation": D}, draws=100)
-    found = allocate([place_robot(robot)], plan, fresh=500)
-    w = k / k.sum()
-    best = D * np.sqrt(c / w) / np.sqrt(c * w).sum()
-    np.testing.assert_allclose(found.tolerances, best, rtol=5e-3)
-    alike = D * np.sqrt(c) / (w * np.sqrt(c)).sum()
-    np.testing.assert_allclose(found.uniformly_scaled, alike, rtol=5e-3)
-    assert found.price == pytest.approx((c / best).sum(), rel=2e-3)
-    assert found.price_uniformly_scaled == pytest.approx((c / alike).sum(), rel=2e-3)
-
-
-@pytest.mark.slow
-def test_with_a_yield_pose_errors_add_up_as_squares():
-    """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
-
-    Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Cutting the
-    normal at 3 deviations narrows it alike for both, by 0.9866.
-    """
-    k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
-    robot = parallel(*k)
-    plan = plan_for(robot, [("one", 3), ("two", 3)], c, {"translation": D},
-                    asked_yield=0.9, draws=10_000)  # fmt: skip
-    s = plan.sources
-    normal = type(s)(robot, s.frame, s.component, np.full(2, 2), s.centre, s.scale / 3,
-                     s.least, np.full(2, 3.0), s.signed)  # fmt: skip
-    found = allocate([place_robot(robot)], replace(plan, sources=normal), fresh=5000)
-    w = k / k.sum()
-    shape = (c / w**2) ** (1 / 3)
-    best = shape * 3 * D / (1.6449 * 0.9866 * np.linalg.norm(w * shape))
-    # 10000 draws know the quantile to 1 %, and its slopes' ratio to a few
-    assert found.price == pytest.approx((c / best).sum(), rel=0.03)
-    np.testing.assert_allclose(found.tolerances / best, 1.0, atol=0.12)
-    assert found.price < 0.97 * found.price_uniformly_scaled
-    assert found.verification["verdict"] != "contradicted"
-
-
 @pytest.fixture(scope="module")
 def several(paper):
     """The paper's robot: five limits of every kind at two postures, yield 0.9.
@@ -395,138 +312,3 @@ def test_with_the_worst_play_fresh_draws_stay_within_the_limit(paper):
     # a yield of 0.9: fewer than 124 of 150 happen once in 300 such tests
     assert fits >= 124
     assert largest > 0.8 * limit
-
-
-def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
-    """A serial arm: errors e and a disc of play r reach e + r, so e <= limit - r."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
-    plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
-    for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):
-        found = allocate(
-            [place_robot(robot)], replace(plan, clearance_model=play), fresh=100
-        )
-        assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
-        said = allocation_text(allocation_of(found))
-        assert f"pose errors: play {play}" in said
-
-
-class Coin:
-    """Robots of which a known share holds, for the verification alone."""
-
-    asked_yield, postures, cases = 0.9, (None,), (("force", 0),)
-
-    def __init__(self, holds, seed):
-        self.holds, self.seed, self.plan = holds, seed, self
-
-    def draws_of(self, stream, count):
-        return np.random.default_rng((self.seed, stream)).random((count, 1))
-
-    def spread(self, tolerances):
-        return tolerances
-
-    def utilisations(self, values):
-        share = np.where(values.T < self.holds, 0.5, 2.0)
-        return share, share
-
-
-def test_looking_several_times_is_wrong_no_more_often_than_said(monkeypatch):
-    """The last look's interval misses the truth in 5 % of all verifications, at most.
-
-    The yield is just so low that most looks contradict it and another follows; with
-    the whole error at every look 9 % missed.  A coin cannot be tightened.
-    """
-    monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2])
-    monkeypatch.setattr(verification, "bracketed", cache(verification.bracketed))
-    holds, trials, missed, looks = 0.85, 3000, 0, 0
-    for seed in range(trials):
-        check = verification.verify(
-            Coin(holds, seed), np.ones(1), 400, lambda *_: None
-        )[1]
-        missed += not check["yield"]["lower"] <= holds <= check["yield"]["upper"]
-        looks += check["look"]
-    assert looks > 2 * trials
-    # three deviations of so many trials
-    assert missed / trials <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / trials)
-    assert check["confidence"] == 0.95
-    assert check["confidence_of_a_look"] == pytest.approx(1 - 0.05 / 4)
-
-
-FILE = """
-yield = 0.95
-cost = "logarithm"
-[limits]
-margin_free = 1.0
-energy = 2.0
-[[tolerance]]
-name = "length"
-frames = ["link_a", "link_b"]
-components = ["TX"]
-cost = 2.0
-most = 1e-3
-[[tolerance]]
-frames = ["leg1.tip"]
-components = ["RX", "RY"]
-"""
-
-
-def test_a_tolerance_file_is_read(write_file):
-    plan = read_plan(write_file(FILE), load_robot("irsbot2"))
-    assert plan.names == ("length", "leg1.tip.RX")
-    assert plan.group.tolist() == [0] * 4 + [1] * 2
-    assert plan.costs.tolist() == [2.0, 1.0]
-    assert plan.most.tolist() == [1e-3, 0.1]
-    assert plan.limits == {"margin_free": 1.0, "energy": 2.0}
-    assert (plan.asked_yield, plan.cost) == (0.95, "logarithm")
-
-
-@pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
-def test_the_plans_of_the_example_are_read(name):
-    folder = Path(__file__).parents[3] / "examples" / "tolerance_allocation"
-    plan = read_plan(folder / f"{name}.toml", load_robot("irsbot2"))
-    assert len(plan.names) == 7
-    # the paper's section IV, 12 frames of 6, but for TY and TZ of the four links
-    assert len(plan.sources) == 64
-    assert plan.asked_yield == (1.0 if name == "always" else 0.99)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("yield = 0.95", "yield = 1.2"), "yield: found 1.2"),
-        (("energy = 2.0", "enrgy = 2.0"), "limits: unknown key"),
-        (('"TX"', '"TX", "RX"'), "angles only or lengths only"),
-        (('"leg1.tip"', '"leg1.tap"'), 'no frame "leg1.tap"'),
-        (('["RX", "RY"]', '["RX", "RQ"]'), 'components: found "RQ"'),
-        (("cost = 2.0", "cost = -2.0"), "cost: found -2.0"),
-        (('frames = ["leg1.tip"]', 'frames = ["link_a"]\nname = "b"'), None),
-        (('["RX", "RY"]', '["TX"]\nname = "length"'), "share a name"),
-        (('"logarithm"', '"log"'), 'cost: found "log"'),
-    ],
-)
-def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
-    path = write_file(FILE.replace(*change, 1))
-    if message is None:  # not a mistake: other components of the same frames
-        assert len(read_plan(path, load_robot("irsbot2")).names) == 2
-        return
-    with pytest.raises(BadInput) as error:
-        read_plan(path, load_robot("irsbot2"))
-    assert message in str(error.value)
-
-
-def test_present_errors_times_their_factor_just_fit():
-    """The margin is proportional: solved anew with the scaled errors it is 1."""
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
-    found = present_errors(postures)
-    assert found["postures"] == 3
-    scaled = robot.with_errors(found["factor_on_errors"] * robot.errors)
-    margins = [zone_margin(replace(p, robot=scaled), "free").margin for p in postures]
-    assert max(margins) == pytest.approx(1.0, rel=1e-7)
-    shares = [one["share_of_margin"] for one in found["slopes"]]
-    assert sum(shares) == pytest.approx(1.0, rel=1e-6)
-    assert shares == sorted(shares, reverse=True)
-    assert "everywhere with all errors times" in present_text(found)

@@ -1,0 +1,197 @@
+"""An allocation: tolerances, their cost, their proof; as plain values and data set."""
+
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.requirement import Plan
+from assembly.sweeps.identity import robot_hash
+from forcefit.inputs.display import html_table, short_repr
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True, eq=False)
+class Allocation:
+    """Tolerances, their cost, and proven bounds of both.
+
+    Attributes:
+        plan: costs and limits.
+        tolerances: (G,) [rad or m].
+        price: their cost.
+        uniformly_scaled: (G,) [rad or m] those with the proportions of the convex
+            programme, scaled uniformly to meet all limits.
+        price_uniformly_scaled: their cost; no less than ``price``.
+        price_bound: lower bound of the cost of tolerances that always meet the convex
+            limits; NaN for a yield below 1, or where a limit is not convex.
+        cuts: planes in the convex programme.
+        worst: by limit and for yield 1: the worst corner found and the proven upper
+            bound, over all postures; NaN where nothing is proven.
+        proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
+            meet the limits too; NaN where nothing is proven.
+        verification: by fresh draws: yields with their intervals.
+    """
+
+    plan: Plan
+    tolerances: NDArray
+    price: float
+    uniformly_scaled: NDArray
+    price_uniformly_scaled: float
+    price_bound: float
+    cuts: int
+    worst: dict[str, tuple[float, float]] = field(default_factory=dict)
+    proven_scale: float = float("nan")
+    verification: dict[str, Any] = field(default_factory=dict)
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Tolerances over ``class``, as ``--output`` writes them."""
+        return tolerance_dataset(self)
+
+
+def allocation_of(allocation: Allocation) -> dict[str, Any]:
+    """An allocation as plain values."""
+    plan = allocation.plan
+    classes = [
+        {
+            "name": name,
+            "tolerance": allocation.tolerances[g],
+            "unit": _unit(allocation, g),
+            "scaled_alike": allocation.uniformly_scaled[g],
+            "cost": plan.costs[g],
+            "loosest_allowed": plan.most[g],
+            "at_loosest": bool(allocation.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
+        }
+        for g, name in enumerate(plan.names)
+    ]
+    return {
+        "limits": dict(plan.limits),
+        "yield": plan.asked_yield,
+        "cost": plan.cost,
+        "tolerances": classes,
+        "price": allocation.price,
+        "price_alike": allocation.price_uniformly_scaled,
+        "price_bound": allocation.price_bound,
+        "cuts": allocation.cuts,
+        "worst": {
+            k: {"found": a, "proven": b} for k, (a, b) in allocation.worst.items()
+        },
+        "proven_scale": allocation.proven_scale,
+        "verification": allocation.verification,
+        "play": plan.clearance_model if plan.limits_pose else None,
+    }
+
+
+def _unit(allocation: Allocation, group: int) -> str:
+    """Unit of a class of tolerances."""
+    first = int(np.flatnonzero(allocation.plan.group == group)[0])
+    return "rad" if allocation.plan.sources.component[first] < 3 else "m"
+
+
+def allocation_text(results: dict[str, Any]) -> str:
+    """An allocation for people."""
+    scales = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}
+    lines = []
+    for one in results["tolerances"]:
+        scale, unit = scales[one["unit"]]
+        line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
+        lines.append(line + (" (the loosest allowed)" if one["at_loosest"] else ""))
+    if results["play"]:
+        lines.append(
+            f"pose errors: play {results['play']}: {CLEARANCE_MODELS[results['play']]}"
+        )
+    lines.append(_price_text(results))
+    for key, worst in results["worst"].items():
+        proven = (
+            f"at most {worst['proven']:.4g} proven" if np.isfinite(worst["proven"])
+            else "nothing proven"
+        )  # fmt: skip
+        lines.append(
+            f"worst {key}: {worst['found']:.4g} found, {proven}, "
+            f"limit {results['limits'][key]:g}"
+        )
+    if np.isfinite(results["proven_scale"]):
+        lines.append(f"proven when scaled by {results['proven_scale']:.4f}")
+    check = results["verification"]
+    if check:
+        one = check["yield"]
+        lines.append(
+            f"{check['draws']} fresh draws at all postures: yield "
+            f"{one['probability']:.4f} ({one['lower']:.4f} to {one['upper']:.4f}), "
+            f"asked {results['yield']:g}: {check['verdict']}{_looks_text(check)}"
+        )
+    return "\n".join(lines)
+
+
+def _looks_text(check: dict[str, Any]) -> str:
+    """Number of looks, and the confidence of each and of all."""
+    left = check["yield"]["undecided"]
+    undecided = f", {left} draws undecided" if left else ""
+    return (
+        f" (look {check['look']} of at most {check['most_looks']}, each at "
+        f"{check['confidence_of_a_look']:.2%}: {check['confidence']:.0%} for "
+        f"all{undecided})"
+    )
+
+
+def _price_text(results: dict[str, Any]) -> str:
+    """Cost of the tolerances, and its lower bound or its reduction."""
+    price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
+    text = f"price {price:.5g}"
+    if np.isfinite(bound):
+        return f"{text}, no tolerances cost less than {bound:.5g}"
+    if alike > price:
+        text += f", {alike:.5g} with those of the convex programme scaled alike"
+        if results["cost"] == "reciprocal":
+            text += f": {1 - price / alike:.1%} less"
+    return text
+
+
+def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
+    """An allocation as a data set over ``class``."""
+    import xarray
+
+    plan, results = allocation.plan, allocation_of(allocation)
+    text = allocation_text(results | {"tolerances": []}).replace("\n", "; ")
+    units = np.array([c["unit"] for c in results["tolerances"]])
+    data = {
+        "tolerance": ("class", allocation.tolerances, {"units": "rad or m, see unit"}),
+        "scaled_alike": (
+            "class",
+            allocation.uniformly_scaled,
+            {"units": "rad or m, see unit"},
+        ),
+        "loosest_allowed": ("class", plan.most, {"units": "rad or m, see unit"}),
+        "cost": ("class", plan.costs, {"units": "1"}),
+        "unit": ("class", units),
+    }
+    robot = plan.sources.robot
+    limits = {f"limit.{key}": value for key, value in plan.limits.items()}
+    verification = allocation.verification
+    return xarray.Dataset(
+        data,
+        {"class": list(plan.names)},
+        {
+            "robot": robot.name,
+            "robot_sha256": robot_hash(robot),
+            "program": f"forcefit {version('forcefit')}",
+            "seed": plan.seed,
+            "yield": plan.asked_yield,
+            "cost_law": plan.cost,
+            "price": allocation.price,
+            "price_alike": allocation.price_uniformly_scaled,
+            "price_bound": allocation.price_bound,
+            "said": text,
+            "play": results["play"] or "",
+            "verified_yield": verification["yield"]["probability"]
+            if verification
+            else float("nan"),
+            **limits,
+        },
+    )

@@ -1,0 +1,140 @@
+"""Finite motions: exponentials, closures, and their two derivatives."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from assembly.exact.finite_robot import FiniteRobot
+from assembly.exact.placement import place
+from assembly.kinematics.posture import home_posture
+from assembly.kinematics.se3 import (
+    bracket,
+    bracket_form,
+    exponential,
+    inverse,
+    left_jacobian,
+    logarithm,
+    second_form,
+)
+from assembly.linear.closure import virtual_joints
+from assembly.linear.energy import solve_assembly
+from tests.robots_for_tests import (
+    random_robot,
+)
+
+
+def moved_unknowns(posture, rng, size):
+    """A finite robot with unknowns of a size in rad and reference lengths."""
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    per = np.sqrt(np.diag(model.metric))
+    return (
+        model,
+        rng.normal(size=len(per)) / per * size,
+        rng.normal(size=len(per)) / per,
+    )
+
+
+# Finite motions
+
+
+@pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
+def test_motions_are_exponentials_of_screws(rng, size):
+    """Against the matrix exponential; rounding only."""
+    s = size * rng.normal(size=6)
+    generator = np.zeros((4, 4))
+    x, y, z = s[:3]
+    generator[:3] = [[0, -z, y, s[3]], [z, 0, -x, s[4]], [-y, x, 0, s[5]]]
+    assert np.abs(exponential(s) - expm(generator)).max() < 1e-14
+    if np.linalg.norm(s[:3]) < np.pi:
+        assert np.abs(logarithm(exponential(s)) - s).max() < 1e-14 * max(1, 1 / size)
+    assert np.abs(exponential(s) @ inverse(exponential(s)) - np.eye(4)).max() < 1e-14
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.1, 1.0])
+def test_the_jacobian_is_the_mean_of_the_motions_met_on_the_way(rng, size):
+    """J = integral of Ad(exp(t s)), the series of ad^n / (n + 1)!."""
+    s = size * rng.normal(size=6)
+    J, term = np.eye(6), np.eye(6)
+    for n in range(1, 40):
+        term = term @ bracket(s) / (n + 1)
+        J = J + term
+    assert np.abs(left_jacobian(s) - J).max() < 1e-14
+
+
+@pytest.mark.parametrize(("size", "tolerance"), [(0.02, 1e-10), (0.3, 1e-5)])
+def test_second_derivative_of_the_exponential(rng, size, tolerance):
+    """By the product's own expansion: its series leaves out size^6 and more.
+
+    log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
+    """
+    s = size * np.ones(6) / np.sqrt(3)
+    w, h = rng.normal(size=(2, 6))
+    step = 2e-4
+
+    def work(sign):
+        return w @ logarithm(exponential(s + sign * step * h) @ inverse(exponential(s)))
+
+    expected = (work(1) + work(-1)) / step**2
+    rounding = 1e-16 / step**2
+    form = second_form(s, w)
+    assert np.abs(form - form.T).max() == 0.0
+    scale = np.linalg.norm(w) * np.linalg.norm(h) ** 2
+    assert abs(h @ form @ h - expected) < (tolerance + 10 * rounding + 1e-8) * scale
+
+
+def test_the_bracket_form_is_the_work_on_a_bracket(rng):
+    a, b, w = rng.normal(size=(3, 6))
+    assert a @ bracket_form(w) @ b == pytest.approx(w @ (bracket(a) @ b), rel=1e-13)
+
+
+# Closures of a robot
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_motion_the_closures_are_the_linear_ones(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=3)
+    posture = home_posture(robot.with_errors(0 * robot.errors))
+    lin = solve_assembly(posture).linearisation
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    here = place(model, np.zeros(len(model.frame)))
+    columns = np.hstack([model.joints.elastic, model.joints.cones, model.joints.free])
+    assert here.largest_gap < 1e-15
+    assert np.abs(here.rows - lin.rows @ columns).max() < 1e-14
+    assert np.abs(here.platform_rows - lin.platform @ columns).max() < 1e-14
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_first_derivatives_of_closures_and_platform(seed):
+    """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
+    rng = np.random.default_rng(seed)
+    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
+    here, step = place(model, x), 1e-5
+    ahead, behind = place(model, x + step * h), place(model, x - step * h)
+    difference = (ahead.residual - behind.residual) / (2 * step)
+    assert np.abs(here.rows @ h - difference).max() < 1e-7
+    difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
+    assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
+
+
+@pytest.mark.parametrize("load", [[0] * 6, [0, 0, 0, 1, -2, 3]])
+@pytest.mark.parametrize("seed", range(4))
+def test_second_derivatives_of_closures_and_platform(seed, load):
+    """Where the closures hold, against differences of the first derivatives."""
+    rng = np.random.default_rng(seed)
+    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.02)
+    T, (first, second) = place(model, x).transforms, model.closed_frames.T
+    vars(model)["nominal_closures"] = (
+        inverse(T[first]) @ T[second]
+    )  # close it where it stands
+    here, step, load = place(model, x), 1e-5, np.array(load, dtype=float)
+    multipliers = rng.normal(size=len(here.residual))
+
+    def slope(place):
+        return multipliers @ place.rows + load @ place.platform_rows
+
+    difference = slope(place(model, x + step * h)) - slope(place(model, x - step * h))
+    expected = difference / (2 * step)
+    found = here.curvature(multipliers, load) @ h
+    assert here.largest_gap < 1e-14
+    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()

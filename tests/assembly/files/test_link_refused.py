@@ -1,0 +1,152 @@
+"""Links of robot files that break a rule: each refused with one message."""
+
+import math
+
+import pytest
+
+from tests.robot_files_for_tests import BEAM, LINK, assert_refused, mesh, rows
+
+REFUSED_LINKS = {
+    "an asymmetric link": (
+        LINK, f"link = {{ stiffness = {rows({(3, 6): 0.1})} }}",
+        'frame "coupler".link.stiffness: not symmetric: found [3, 6] = 1.000000e-01 '
+        "but [6, 3] = 0.000000e+00, expected them equal"),
+    "a link that is soft in one direction": (
+        LINK, f"link = {{ stiffness = {rows({(3, 3): -2.5})} }}",
+        'frame "coupler".link.stiffness: not positive definite: found -2.5 as term '
+        "[3, 3] of the diagonal, expected > 0"),
+    "a singular link": (
+        LINK, f"link = {{ stiffness = {rows({(1, 2): 1, (2, 1): 1})} }}",
+        'frame "coupler".link.stiffness: not positive definite'),
+    "an infinite link": (
+        LINK, f"link = {{ stiffness = {rows({(4, 4): math.inf})} }}",
+        'frame "coupler".link.stiffness: found inf as number 4 in row 4, expected 6 '
+        "rows of 6 finite numbers [N m/rad .. N/m]"),
+    "a link of 5 rows": (
+        LINK, "link = { stiffness = [[1], [2], [3], [4], [5]] }",
+        'frame "coupler".link.stiffness: found [[1], [2], [3], [4], [5]] of length 5, '
+        "expected 6 rows of 6 finite numbers [N m/rad .. N/m]"),
+    "a ragged link": (
+        LINK, f"link = {{ stiffness = {rows({}).replace(', 1.0]]', ']]')} }}",
+        'frame "coupler".link.stiffness: found [0.0, 0.0, 0.0, 0.0, 0.0] of length 5 '
+        "in row 6, expected 6 rows of 6 finite numbers [N m/rad .. N/m]"),
+    "a link of nothing": (
+        LINK, "link = {}",
+        'frame "coupler".link: found none of them, expected exactly one of "beam" | '
+        '"stiffness" | "mesh" | "library"'),
+    "a link of two kinds": (
+        BEAM, f'{BEAM}, library = "x#y"',
+        'frame "coupler".link: found "beam" and "library", expected exactly one of '
+        '"beam" | "stiffness" | "mesh" | "library"'),
+    "a misspelt kind of link": (
+        BEAM, "beem = { radius = 0.04 }",
+        'frame "coupler".link: unknown key "beem"; did you mean "beam"?'),
+    "no Young's modulus": (
+        "young = 6e10, ", "",
+        'frame "coupler".link.young: missing; expected a finite number > 0 [Pa]'),
+    "Young's modulus misspelt": (
+        "young", "youngs",
+        'frame "coupler".link.young: missing; expected a finite number > 0 [Pa]; found '
+        '"youngs" instead'),
+    "an incompressible link": (
+        "poisson = 0.3", "poisson = 0.5",
+        'frame "coupler".link.poisson: found 0.5, expected a finite number > -1 and < '
+        "0.5 [-]"),
+    "no section": (
+        BEAM, "beam = {}",
+        'frame "coupler".link.beam: found no section, expected one section: "radius" '
+        '[, "inner_radius"] or "width", "height" or "area", "I_y", "I_z", "J", '
+        '"shear_y", "shear_z"'),
+    "two sections": (
+        BEAM, "beam = { radius = 0.04, width = 0.1 }",
+        'frame "coupler".link.beam: found "radius" and "width", expected one section'),
+    "half a section": (
+        BEAM, "beam = { width = 0.1, hight = 0.2 }",
+        'frame "coupler".link.beam.height: missing; expected a finite number > 0 [m]; '
+        'found "hight" instead'),
+    "a tube with no wall": (
+        "inner_radius = 0.03", "inner_radius = 0.04",
+        'frame "coupler".link.beam.inner_radius: found 0.04, expected a finite number '
+        ">= 0 and < 0.04 [m]"),
+    "a bore without a radius": (
+        BEAM, "beam = { inner_radius = 0.03 }",
+        'frame "coupler".link.beam.radius: missing; expected a finite number > 0 [m]'),
+    "a radius below any machine": (
+        BEAM, "beam = { radius = 1e-30 }",
+        'frame "coupler".link.beam.radius: found 1e-30, expected at least 1e-12 [m]'),
+    "another beam theory": (
+        BEAM, 'beam = { radius = 0.04, theory = "timoschenko" }',
+        "frame \"coupler\".link.beam.theory: found 'timoschenko', expected "
+        '"timoshenko" | "euler"; did you mean "timoshenko"?'),
+    "a length without an axis": (
+        BEAM, "beam = { radius = 0.04, length = 0.5 }",
+        'frame "coupler".link.beam.axis: missing; expected "length" and "axis", or '
+        "neither"),
+    "an axis without a length": (
+        BEAM, "beam = { radius = 0.04, axis = [1, 0, 0] }",
+        'frame "coupler".link.beam.length: missing; expected "length" and "axis", or '
+        "neither"),
+    "an axis of zero": (
+        BEAM, "beam = { radius = 0.04, length = 1, axis = [0, 0, 0] }",
+        'frame "coupler".link.beam.axis: found [0.0, 0.0, 0.0], expected a direction'),
+    "up along the beam": (
+        BEAM, "beam = { width = 0.1, height = 0.2, up = [-2, 0, 0] }",
+        'frame "coupler".link.beam.up: up = '),
+    "a beam between two origins that are one": (
+        "mass = 1.2", f"[[frame]]\nname = 'x'\nparent = 'base'\n{LINK}",
+        'frame "x".link: found no distance from the parent; expected a '
+        'translation, or a beam with "length" and "axis"'),
+    "a mesh without a surface": (
+        BEAM, 'mesh = { base = "z=0", tip = "z=0.5" }',
+        'frame "coupler".link.mesh.surface: missing; expected a string'),
+    "an interface of another syntax": (
+        BEAM, mesh(tip='"z=half"'),
+        'frame "coupler".link.mesh.tip: found '),
+    "a number for an interface": (
+        BEAM, mesh(tip="0.5"),
+        'frame "coupler".link.mesh.tip: found 0.5'),
+    "no interface": (
+        BEAM, 'mesh = { surface = "x.stl", base = "z=0" }',
+        'frame "coupler".link.mesh.tip: missing; expected an interface such as '
+        '"z=0.452"'),
+    "a bore without an axis": (
+        BEAM, mesh(tip="{ bore = { point = [0, 0, 0], radius = 0.1 } }"),
+        'frame "coupler".link.mesh.tip.bore.axis: missing; expected 3 finite numbers'),
+    "an interface with an unknown key": (
+        BEAM,
+        mesh(tip="{ plane = { point = [0, 0, 0], normal = [0, 0, 1] }, raduis = 1 }"),
+        'frame "coupler".link.mesh.tip: unknown key "raduis"; did you mean "radius"?'),
+    "a bore with an unknown key": (
+        BEAM,
+        mesh(tip="{ bore = { point = [0,0,0], axis = [0,1,0], radius = 1, h = 2 } }"),
+        'frame "coupler".link.mesh.tip.bore: unknown key "h"; valid: axis, point, '
+        "radius"),
+    "a mesh with an unknown key": (
+        BEAM, mesh(more=", units = 1"),
+        'frame "coupler".link.mesh: unknown key "units"; did you mean "unit"?'),
+    "a stiffness beyond any machine": (
+        LINK, f"link = {{ stiffness = {rows({(2, 2): 1e50})} }}",
+        'frame "coupler".link.stiffness: found 1e+50 as term [2, 2], expected between '
+        "1e-40 and 1e+40"),
+    "a unit that is none": (
+        BEAM, mesh(more=', unit = "mmm"'),
+        "frame \"coupler\".link.mesh.unit: found 'mmm', expected \"m\" | "),
+    "a mesh that knows up where the frame does not": (
+        BEAM, mesh(more=", up = [1, 0, 0]"),
+        'frame "coupler".up: missing; expected the "up" of the mesh and of the frame, '
+        "or neither"),
+    "up for a beam in the frame": (
+        "mass = 1.2", "up = [0, 0, 1]",
+        'frame "coupler".up: found one without a mesh; it fixes the roll of a mesh'),
+    "a library without a key": (
+        BEAM, 'library = "links.nc"',
+        "frame \"coupler\".link.library: found 'links.nc', expected "
+        '"path/to/library#key"'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"), REFUSED_LINKS.values(), ids=REFUSED_LINKS
+)
+def test_a_link_is_refused_with_one_message(old, new, message, write_file):
+    assert_refused(write_file, old, new, message)

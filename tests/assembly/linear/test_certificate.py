@@ -1,0 +1,254 @@
+"""What the certificate of a least energy proves, and what rounding spoils."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_postures import minimise_energies
+from assembly.kinematics.posture import home_posture, place_many, place_robot
+from assembly.linear.certificate import unproved
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.reference import reference_energy
+from assembly.linear.screw_bound import bound_screw
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
+from tests.robots_for_tests import (
+    NUMBERS,
+    coaxial_beams,
+    irsbot2_with,
+    random_robot,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.parametrize("kappa", [0.05, 0.1])
+def test_the_energy_is_proved_near_the_edge_of_the_zone(kappa):
+    """Where hardly any energy is left; a part of the 25 mm grid."""
+    for posture in half_workspace(every=37):
+        assert_proved(solve_assembly(with_errors_times(kappa, posture)))
+
+
+@pytest.mark.slow
+def test_the_energy_is_proved_at_every_point_of_the_half_workspace():
+    postures = half_workspace(every=1)
+    assert len(postures) == 1113
+    for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
+        for posture in postures:
+            assert_proved(solve_assembly(with_errors_times(kappa, posture)))
+
+
+def half_workspace(every):
+    """Every so many postures of the 25 mm grid below the base."""
+    x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
+    poses = np.full((x.size, 6), np.nan)
+    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    placed = place_many(robot, poses[::every])[0]
+    return [posture for posture in placed if posture is not None]
+
+
+def with_errors_times(factor, posture):
+    """The posture of the robot with other errors."""
+    robot = posture.robot
+    return replace(posture, robot=robot.with_errors(factor * robot.errors))
+
+
+def assert_proved(answer):
+    """The promise of the batch, 1e-8 E + 1e-12 E(no play), not asking the answer."""
+    assert unproved(answer) == ""
+    gap = answer.potential - answer.bound
+    assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance
+
+
+def spoilt(solve):
+    """A solver whose clearances are 1e-4 off."""
+
+    def solver(G, h, d, H, k, group):
+        u, rigid, status = solve(G, h, d, H, k, group)
+        return 0.9999 * u, rigid, status
+
+    return solver
+
+
+def test_what_no_solver_proves_is_not_certified(monkeypatch):
+    """The edge of the zone with Newton's method taken away and the others spoilt."""
+    from assembly.batch import many_postures as batch
+    from assembly.report.results import solution_of, solution_text
+    from assembly.solvers import cone_solvers, conic
+
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
+    good = solve_assembly(posture)
+    assert_proved(good)
+    energies = minimise_energies(robot, posture.transforms[None])
+    monkeypatch.setattr(conic, "_SOLVERS", tuple(map(spoilt, conic._SOLVERS)))
+    monkeypatch.setattr(cone_solvers, "newton", lambda *_: -1)
+    answer = solve_assembly(posture)
+    # 1e-4 of some clearances more energy than the least: far above 1e-8
+    assert answer.energy > good.energy * (1 + 1e-8)
+    assert "the energy is proved least to" in unproved(answer)
+    found = solution_of(posture)
+    assert found["status"] == "not proved"
+    assert found["reason"] == unproved(answer)
+    assert found["energy"] == answer.energy
+    assert f"not proved: {unproved(answer)}" in solution_text(found)
+    assert "certificate" in solution_text(found)
+    batch._solve_fallback(posture, "elastic", energies, 0)
+    assert (energies.status[0], energies.reason[0]) == (
+        "solver failed", unproved(answer)
+    )  # fmt: skip
+
+
+def test_values_that_are_no_numbers_prove_nothing():
+    answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
+    for spoilt_answer in (
+        replace(answer, multipliers=answer.multipliers * np.nan),
+        replace(answer, elastic=answer.elastic * np.nan),
+        replace(answer, clearances=answer.clearances * np.nan),
+    ):
+        assert unproved(spoilt_answer)
+    assert "stays open" in unproved(replace(answer, elastic=1.1 * answer.elastic))
+    assert "exceeded by" in unproved(replace(answer, clearances=2 * answer.clearances))
+
+
+def arm_against_wall(young, soft=50.0):
+    """A bar of modulus ``young`` between a soft hinge and a wall that is off by 0.1 mm
+    along it and 0.2 mm across; asked for is how far the hinge turns.
+    """
+    K = np.diag([np.inf, np.inf, soft, np.inf, np.inf, np.inf])
+    bar = BeamLink({"radius": 0.01}, young, 0.3, theory="euler")
+    frames = (
+        Frame("hinge", joint="revolute", joint_stiffness=K),
+        Frame("side", "hinge"),
+        Frame("tip", "hinge", [0.5, 0, 0], link=bar, joint="revolute"),
+        Frame("end", "tip"),
+        Frame("wall", translation=[0.5, 0, 0],
+              geometric_error=[0, 0, 0, -1e-4, 2e-4, 0]),
+    )  # fmt: skip
+    return home_posture(Robot("arm", "side", frames, (("end", "wall"),)))
+
+
+@pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
+def test_a_hinges_turn_is_within_its_bound_or_refused_by_name(young):
+    """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
+    F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
+    """
+    if young >= 1e30:
+        with pytest.raises(CannotAssemble, match="stiffnesses differ 3e"):
+            solve_assembly(arm_against_wall(young))
+        return
+    answer = solve_assembly(arm_against_wall(young))
+    give = 0.5**2 / 50.0 + 0.5**3 / (3 * young * np.pi * 0.01**4 / 4)
+    turn = 2e-4 / give * 0.5 / 50.0
+    off, bound = abs(answer.platform_screw[2] - turn), bound_screw(answer)
+    assert off <= bound.rotation + 1e-15
+    assert bound.rotation_open == 0.0
+    assert unproved(answer) == ""
+    assert bound.rotation_error < 1e-8
+
+
+@pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
+@pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide"])
+def test_a_screw_that_rounding_spoils_is_never_certified(name, young):
+    """Against Young = 1e16: from there on the screws no longer change, to 1e-5 of them.
+
+    Beams of all links equally stiff, so that the answer is a limit of its own.
+    """
+
+    def stiff(young):
+        rng = np.random.default_rng(1)
+        robot = load_robot(name)
+        errors = 1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6))
+        frames = (
+            replace(f, link=replace(f.link, young=young) if f.link else None)
+            for f in robot.with_errors(errors).frames
+        )
+        return solve_assembly(home_posture(replace(robot, frames=tuple(frames))))
+
+    answer, limit = stiff(young), stiff(1e16)
+    bound, off = bound_screw(answer), answer.platform_screw - limit.platform_screw
+    other = bound_screw(limit)
+    if young >= 1e16:
+        assert np.linalg.norm(off[:3]) <= bound.rotation + other.rotation
+        assert np.linalg.norm(off[3:]) <= bound.translation + other.translation
+    if young != 1e18:  # in between its bound is what is told
+        assert bool(unproved(answer)) == (young >= 1e24)
+        posture = answer.posture
+        batch = minimise_energies(posture.robot, posture.transforms[None])
+        assert (batch.status[0] == "ok") == (unproved(answer) == "")
+
+
+def test_screws_of_least_energy_from_another_solver_are_within_the_bound():
+    """cvxpy's answers, of 1e-8 J at best, are themselves off by the root of that: told
+    apart by what their own energies are above the bound.
+    """
+    compared = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        posture = home_posture(random_robot(rng, 2, 3))
+        try:
+            answer = solve_assembly(posture)
+        except CannotAssemble:
+            continue
+        energy, screw = reference_energy(posture)
+        # any assembly this much above the least, not only the least: the same bound
+        worse = replace(answer, multipliers=answer.multipliers)
+        worse.__dict__["uncertainty"] = answer.uncertainty + max(
+            energy - answer.bound, 1e-9 * answer.energy_without_clearance
+        )
+        bound = bound_screw(worse)
+        off = screw - answer.platform_screw
+        assert np.linalg.norm(off[:3]) <= bound.rotation + 1e-9
+        assert np.linalg.norm(off[3:]) <= bound.translation + 1e-9
+        compared += answer.energy > 0
+    assert compared > 10
+
+
+def test_rounding_of_zero_is_zero():
+    """Errors of a loop that add up to nothing, but not in floating point: 0.1 + 0.2."""
+    parts = [1e-4, 2e-4, -3e-4]
+    frames = [Frame("f0", translation=[0.1, 0, 0], link=MatrixLink(1e6 * np.eye(6)))]
+    for i, error in enumerate(parts):
+        frames.append(Frame(f"f{i + 1}", f"f{i}", [0.1, 0, 0],
+                            geometric_error=[0, 0, 0, error, 0, 0]))  # fmt: skip
+    frames.append(Frame("wall", translation=[0.4, 0, 0]))
+    robot = Robot("loop", "f3", tuple(frames), (("f3", "wall"),))
+    posture = home_posture(robot)
+    assert sum(parts) != 0.0
+    answer = solve_assembly(posture)
+    assert answer.energy == 0.0
+    assert not answer.wrenches.any()
+    assert minimise_energies(robot, posture.transforms[None]).energy[0] == 0.0
+    drawn = prepare_energies(posture).solve(robot.errors[None])
+    assert drawn.energy[0] == 0.0
+    # what is small and not rounding stays: k g^2 / 2 of one spring, by hand
+    for gap in (1e-6, 1e-12, 1e-17):
+        frames[1] = replace(frames[1], geometric_error=[0, 0, 0, gap, 0, 0])
+        small = replace(robot, frames=(*frames[:2], Frame("f3", "f1", [0.2, 0, 0]),
+                                       frames[-1]))  # fmt: skip
+        here = home_posture(small)
+        for energy in (
+            solve_assembly(here).energy,
+            minimise_energies(small, here.transforms[None]).energy[0],
+            prepare_energies(here).solve(small.errors[None]).energy[0],
+        ):
+            assert energy == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
+
+
+def test_the_certificate_trusts_nothing_but_the_wrenches():
+    """Answers spoilt on purpose: a gap opens that the wrong part accounts for."""
+    robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
+    answer = solve_assembly(home_posture(robot))
+    assert answer.duality_gap() < 1e-12 * answer.energy
+    for wrong in (0.0, 0.9, 1.1, 2.0):
+        spoilt = replace(answer, multipliers=answer.multipliers * wrong)
+        # complementary energy: f g - f^2 C / 2, off by (wrong - 1)^2 of the energy
+        expected = (wrong - 1) ** 2 * answer.energy
+        assert spoilt.duality_gap() == pytest.approx(expected, rel=1e-9)
+    stiffer = replace(answer, elastic=answer.elastic * 1.01)
+    assert stiffer.duality_gap() == pytest.approx(0.0201 * answer.energy, rel=1e-6)
+    assert stiffer.closure_residual() > 1e-7

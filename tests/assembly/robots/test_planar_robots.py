@@ -1,0 +1,170 @@
+"""Planar robots: a published or closed-form fact each."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.model.robot import Clearance
+from assembly.robots import BUILT_IN
+from assembly.robots.five_bar import FiveBarParameters
+from assembly.robots.planar import arm_angle
+from forcefit.inputs.table import BadInput
+from stiffness.screws import rotation_matrix
+from tests.built_in_robots_for_tests import (
+    farthest_corner,
+    joints_of,
+    only_play,
+    random_pose,
+)
+
+
+def test_hoekens_crank_turns_fully_and_its_point_follows_the_law_of_cosines():
+    """Grashof: 1 + 2.5 < 2 + 2.5, and the shortest is the crank."""
+    robot = BUILT_IN["four_bar"]()
+    foot = np.array([0.2, 0.0])
+    for angle in np.linspace(0.0, 2 * math.pi, 13):
+        posture = place_robot(robot, joints={"crank": angle})
+        pin = 0.1 * np.array([math.cos(angle), math.sin(angle)])
+        ground = foot - pin
+        # between the line to the foot and the coupler, in the triangle of 2.5 and 2.5
+        reach = np.hypot(*ground)
+        beside = math.acos((reach**2 + 0.25**2 - 0.25**2) / (2 * reach * 0.25))
+        coupler = math.atan2(ground[1], ground[0]) + beside
+        point = pin + 0.5 * np.array([math.cos(coupler), math.sin(coupler)])
+        assert np.abs(posture.platform[:2, 3] - point).max() < 1e-12
+    ends = [place_robot(robot, joints={"crank": a}) for a in (0.0, 2 * math.pi)]
+    assert np.abs(ends[0].transforms - ends[1].transforms).max() < 1e-12
+
+
+@pytest.mark.parametrize(("degrees", "x"), [(90, 0.4), (180, 0.2), (270, 0.0)])
+def test_hoekens_point_is_on_its_line_three_times(degrees, x):
+    """At four cranks from the ground link, by Thales exactly."""
+    robot = BUILT_IN["four_bar"]()
+    posture = place_robot(robot, joints={"crank": math.radians(degrees)})
+    assert posture.platform[:2, 3] == pytest.approx([x, 0.4], abs=1e-12)
+
+
+def test_hoekens_point_stays_near_its_line_over_half_a_turn():
+    """From the closed form, 2 sqrt((5 + c) / (5 - 4c)) (2 - c) with c = cos t.
+
+    A fine grid of c in [-1, 0] finds its largest distance from 4.
+    """
+    robot = BUILT_IN["four_bar"]()
+    c = np.linspace(-1.0, 0.0, 100001)
+    largest = np.abs(2 * np.sqrt((5 + c) / (5 - 4 * c)) * (2 - c) - 4).max() * 0.1
+    angles = np.linspace(math.pi / 2, 3 * math.pi / 2, 41)
+    heights = [
+        place_robot(robot, joints={"crank": a}).platform[1, 3] for a in angles
+    ]  # fmt: skip
+    off = np.abs(np.array(heights) - 0.4).max()
+    assert 0.99 * largest < off <= largest + 1e-12
+    assert off < 0.01 * 0.4  # of a line 0.4 m long
+
+
+def test_five_bar_tip_is_where_two_circles_meet(rng):
+    P = FiveBarParameters()
+    robot = BUILT_IN["five_bar"]()
+    for _ in range(5):
+        posture = place_robot(robot, pose=random_pose("five_bar", rng))
+        elbows = [
+            np.array([x, 0.0]) + 0.09 * np.array([math.cos(q), math.sin(q)])
+            for x, q in zip((-P.base / 2, P.base / 2), joints_of(posture).values(),
+                            strict=True)
+        ]  # fmt: skip
+        apart = elbows[1] - elbows[0]
+        along = apart / np.hypot(*apart)
+        height = math.sqrt(0.09**2 - (apart @ apart) / 4)
+        tip = (elbows[0] + elbows[1]) / 2 + height * np.array([-along[1], along[0]])
+        assert np.abs(posture.platform[:2, 3] - tip).max() < 1e-11
+
+
+def half_angle_solutions(foot, tip, near, far):
+    """Both drive angles, by the tangent of the half angle (Gosselin, Angeles 1988)."""
+    x, y = tip - foot
+    # x^2 + y^2 + near^2 - far^2 = 2 near (x cos q + y sin q)
+    e = (x * x + y * y + near**2 - far**2) / (2 * near)
+    root = math.sqrt(x * x + y * y - e * e)
+    return [2 * math.atan2(y + s * root, x + e) for s in (1, -1)]
+
+
+def test_3rrr_drives_follow_gosselin_and_angeles(rng):
+    robot = BUILT_IN["3rrr"]()
+    angles = np.radians([90, 210, 330])
+    corners = np.column_stack([np.cos(angles), np.sin(angles)])
+    for _ in range(5):
+        pose = random_pose("3rrr", rng)
+        posture = place_robot(robot, pose=pose)
+        R = rotation_matrix([0, 0, pose["rz"]])[:2, :2]
+        tips = [pose["tx"], pose["ty"]] + 0.08 * corners @ R.T
+        found = joints_of(posture).values()
+        for q, foot, tip in zip(found, 0.3 * corners, tips, strict=True):
+            both = half_angle_solutions(foot, tip, 0.16, 0.16)
+            away = [abs(math.remainder(q - angle, 2 * math.pi)) for angle in both]
+            assert min(away) < 1e-10
+
+
+def only_radial(robot):
+    """The robot's play, its radial part alone: everything stays in the plane."""
+    bare = (
+        replace(f, clearance=f.clearance and Clearance(radial=f.clearance.radial))
+        for f in robot.frames
+    )
+    return replace(robot, frames=tuple(bare))
+
+
+def test_3rrr_pose_error_is_the_farthest_corner_of_a_prism(rng):
+    """(27) in closed form: 3 lines that give by 2c each, 8 corners."""
+    robot = only_radial(BUILT_IN["3rrr"]())
+    posture = place_robot(robot, pose=random_pose("3rrr", rng))
+    play = robot.frame("leg1.pin").clearance.radial
+    lines = arm_lines(posture)
+    found = bound_pose_error(
+        solve_assembly(posture), tolerance_rotation=1e-9, tolerance_translation=1e-9
+    )
+    turn, shift = farthest_corner(lines, np.full(3, 2 * play))
+    for (low, high), expected in (
+        (found.rotation_error, turn),
+        (found.translation_error, shift),
+    ):
+        assert low <= expected * (1 + 1e-8)
+        assert high >= expected * (1 - 1e-8)
+        assert high - low < 1e-8
+
+
+def arm_lines(posture):
+    """(3, 3) unit wrenches [MZ FX FY] of the second arms, at the platform's origin."""
+    T, index = posture.transforms, posture.robot.index
+    lines = []
+    for leg in ("leg1", "leg2", "leg3"):
+        elbow, end = (T[index(f"{leg}.{n}"), :2, 3] for n in ("elbow", "pin"))
+        u = (end - elbow) / np.hypot(*(end - elbow))
+        b = end - posture.platform[:2, 3]
+        lines.append([b[0] * u[1] - b[1] * u[0], *u])
+    return np.array(lines)
+
+
+def test_3rrr_reaches_as_far_as_its_pins_play(rng):
+    """The support of the reachable errors, w.x <= sum of |f| 2c over the legs.
+
+    A leg's second arm passes a force f along itself; its two pins give by c each.
+    The wrench on the platform is the sum of the arms' forces, f = J^-T w.
+    """
+    posture = place_robot(only_play(BUILT_IN["3rrr"]()), pose=random_pose("3rrr", rng))
+    play = posture.robot.frame("leg1.pin").clearance.radial
+    lines = arm_lines(posture)
+    for w in rng.normal(size=(4, 3)) * [0.1, 1.0, 1.0]:
+        forces = np.linalg.solve(lines.T, w)
+        answer = solve_assembly(posture, [0, 0, w[0], w[1], w[2], 0])
+        found = w @ answer.platform_screw[2:5]
+        assert found == pytest.approx(np.abs(forces).sum() * 2 * play, rel=1e-8)
+        assert answer.energy == 0.0
+
+
+def test_planar_legs_out_of_reach_are_refused_with_the_reach():
+    with pytest.raises(BadInput, match=r"5r: the home pose needs a reach of 3 m"):
+        arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

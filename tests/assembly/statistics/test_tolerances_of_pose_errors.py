@@ -1,0 +1,83 @@
+"""Tolerances within a limit of the pose error against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
+from assembly.statistics.allocation import allocate
+from tests.tolerances_for_tests import PLAY, plan_for
+
+
+def parallel(k1, k2):
+    """A platform between two bars along x: errors share out by the stiffnesses."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
+        Frame("mount", translation=[1.0, 0, 0]),
+        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * k2)),
+    )
+    return Robot("parallel", "one", frames, (("one", "two"),))
+
+
+def test_a_pose_error_is_shared_by_lagranges_multipliers():
+    """Between springs k1, k2 the platform moves w1 t1 + w2 t2, w_i = k_i / (k1 + k2).
+
+    Minimise c1/t1 + c2/t2 with that sum D: t_i = D sqrt(c_i/w_i) / sum sqrt(c w).  The
+    energy depends on t1 + t2 alone, so its proportions are sqrt(c_i).
+    """
+    k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
+    robot = parallel(*k)
+    plan = plan_for(robot, [("one", 3), ("two", 3)], c, {"translation": D}, draws=100)
+    found = allocate([place_robot(robot)], plan, fresh=500)
+    w = k / k.sum()
+    best = D * np.sqrt(c / w) / np.sqrt(c * w).sum()
+    np.testing.assert_allclose(found.tolerances, best, rtol=5e-3)
+    alike = D * np.sqrt(c) / (w * np.sqrt(c)).sum()
+    np.testing.assert_allclose(found.uniformly_scaled, alike, rtol=5e-3)
+    assert found.price == pytest.approx((c / best).sum(), rel=2e-3)
+    assert found.price_uniformly_scaled == pytest.approx((c / alike).sum(), rel=2e-3)
+
+
+@pytest.mark.slow
+def test_with_a_yield_pose_errors_add_up_as_squares():
+    """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
+
+    Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Cutting the
+    normal at 3 deviations narrows it alike for both, by 0.9866.
+    """
+    k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
+    robot = parallel(*k)
+    plan = plan_for(robot, [("one", 3), ("two", 3)], c, {"translation": D},
+                    asked_yield=0.9, draws=10_000)  # fmt: skip
+    s = plan.sources
+    normal = type(s)(robot, s.frame, s.component, np.full(2, 2), s.centre, s.scale / 3,
+                     s.least, np.full(2, 3.0), s.signed)  # fmt: skip
+    found = allocate([place_robot(robot)], replace(plan, sources=normal), fresh=5000)
+    w = k / k.sum()
+    shape = (c / w**2) ** (1 / 3)
+    best = shape * 3 * D / (1.6449 * 0.9866 * np.linalg.norm(w * shape))
+    # 10000 draws know the quantile to 1 %, and its slopes' ratio to a few
+    assert found.price == pytest.approx((c / best).sum(), rel=0.03)
+    np.testing.assert_allclose(found.tolerances / best, 1.0, atol=0.12)
+    assert found.price < 0.97 * found.price_uniformly_scaled
+    assert found.verification["verdict"] != "contradicted"
+
+
+def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
+    """A serial arm: errors e and a disc of play r reach e + r, so e <= limit - r."""
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
+    for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):
+        found = allocate(
+            [place_robot(robot)], replace(plan, clearance_model=play), fresh=100
+        )
+        assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
+        said = allocation_text(allocation_of(found))
+        assert f"pose errors: play {play}" in said

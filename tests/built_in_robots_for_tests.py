@@ -1,0 +1,94 @@
+"""What the tests of built-in robots share: workspaces, errors, compliances."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import solve_assembly
+
+# boxes of platform poses, about those the robots are used in
+WORKSPACE = {
+    "irsbot2": {"tx": (-0.3, 0.3), "tz": (-0.6, -0.35)},
+    "four_bar": {"tx": (0.02, 0.38)},
+    "five_bar": {"tx": (-0.03, 0.03), "ty": (0.13, 0.15)},
+    "3rrr": {"tx": (-0.05, 0.05), "ty": (-0.05, 0.05), "rz": (-0.3, 0.3)},
+    "hexapod": {
+        "tx": (-0.06, 0.06), "ty": (-0.06, 0.06), "tz": (0.5, 0.58),
+        "rx": (-0.15, 0.15), "ry": (-0.15, 0.15), "rz": (-0.15, 0.15),
+    },
+    "delta": {"tx": (-0.4, 0.4), "ty": (-0.4, 0.4), "tz": (-1.1, -0.8)},
+    "orthoglide": {"tx": (-0.08, 0.08), "ty": (-0.08, 0.08), "tz": (-0.08, 0.08)},
+    "arm6": {
+        "tx": (0.5, 0.65), "ty": (-0.25, -0.05), "tz": (-0.1, 0.1),
+        "rx": (-0.2, 0.2), "ry": (1.4, 1.7), "rz": (-0.2, 0.2),
+    },
+}  # fmt: skip
+
+
+LOAD = [3.0, -2.0, 1.0, 40.0, -30.0, 20.0]  # [N m, N]
+
+
+def random_pose(name, rng):
+    """A platform pose in the robot's workspace."""
+    return {key: rng.uniform(*box) for key, box in WORKSPACE[name].items()}
+
+
+def drives(robot):
+    """Names of the actuated joints."""
+    return [frame.name for frame in robot.frames if frame.actuated]
+
+
+def joints_of(posture):
+    """Coordinates of the actuated joints by name."""
+    robot = posture.robot
+    return {n: posture.coordinates[robot.index(n)] for n in drives(robot)}
+
+
+def only_drives_give(robot):
+    """The robot with rigid bodies and no play."""
+    bare = (replace(f, link=None, clearance=None) for f in robot.frames)
+    return replace(robot, frames=tuple(bare))
+
+
+def only_play(robot):
+    """The robot with nothing elastic at all."""
+    kept = {f.name: f.clearance for f in robot.frames}
+    frames = (
+        replace(f, link=None, joint_stiffness=None, clearance=kept[f.name])
+        for f in robot.frames
+    )
+    return replace(robot, frames=tuple(frames))
+
+
+def platform_compliance(posture):
+    """(6, 6) platform screws of unit loads: 1 N m and 1 N each."""
+    loaded = (solve_assembly(posture, load) for load in np.eye(6))
+    return np.column_stack([answer.platform_screw for answer in loaded])
+
+
+def drive_jacobian(posture, step=1e-4):
+    """(6, drives) platform screw per unit of each drive, by central differences."""
+    robot, here = posture.robot, joints_of(posture)
+    R = posture.platform[:3, :3]
+    columns = []
+    for key, value in here.items():
+        after, before = (
+            place_robot(robot, joints=here | {key: value + s}).platform
+            for s in (step, -step)
+        )
+        spin = (after - before)[:3, :3] @ R.T / (2 * step)
+        shift = (after - before)[:3, 3] / (2 * step)
+        columns.append([spin[2, 1], spin[0, 2], spin[1, 0], *shift])
+    return np.array(columns).T
+
+
+def farthest_corner(lines, plays):
+    """Largest turn and shift of the platform if each line gives by plus or minus."""
+    signs = np.array(list(itertools.product([-1, 1], repeat=len(plays))))
+    screws = np.linalg.solve(lines, (signs * plays).T).T
+    turns, shifts = np.split(
+        screws, [len(plays) // 2 if len(plays) == 6 else 1], axis=1
+    )
+    return [np.linalg.norm(part, axis=1).max() for part in (turns, shifts)]
