@@ -23,9 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.dead_load import dead_loads, slopes_of
+from assembly.exact.dead_load import dead_loads, work_gradient
 from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
 from assembly.exact.exact import solve_exact
+from assembly.exact.placement import place
 from assembly.kinematics.posture import Posture
 from assembly.platform_stiffness.deflection import DeflectionCurve, Event
 
@@ -77,14 +78,14 @@ class _Path:
         """The problem near a placement, under a load."""
         wrench = self.rest.copy()
         wrench[self.component] = load
-        here = model.here.model.place(x)
+        placement = place(model.placement.model, x)
         loads = dead_loads(self.posture, wrench, gravity=self.gravity)
-        return expand(here, loads, np.zeros(len(here.residual)))
+        return expand(placement, loads, np.zeros(len(placement.residual)))
 
     def pull(self, local: Expansion) -> NDArray:
         """(N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
-        return slopes_of(local.placement, unit)
+        return work_gradient(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
         """(N,) product with a motion, as lengths on the path count."""
@@ -168,7 +169,7 @@ def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, in
         local = path.expand(x, load, place.local)
         B = local.basis
         closing = np.zeros(len(x))
-        closing[local.loose] = -local.inverse @ local.placement.residual
+        closing[local.unbounded] = -local.inverse @ local.placement.residual
         left = B.T @ (local.gradient + local.hessian @ closing)
         long_of = normal_to @ (x + closing - x0) + rise * (load - place.load) - step
         change = _solve(path, local, normal_to, rise, np.append(left, long_of))
