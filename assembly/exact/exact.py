@@ -210,7 +210,7 @@ class ExactAssembly:
                 error[3:], rotation_matrix(error[:3])
             )
             rigid = base @ rigid if parent >= 0 else rigid
-            bent = inverse(rigid) @ self.placement.bodies[self.cut.last[i]]
+            bent = inverse(rigid) @ self.placement.body_ends[self.cut.last[i]]
             screws[i] = logarithm(bent)
         return screws
 

@@ -174,6 +174,8 @@ def _add_body(
     if inertial is not None:
         mass = inertial.number("mass", "kg")
         centre = inertial.numbers("pos", 3, "m", _ZERO)
+    elif node.child("geom") is not None:
+        reading.extra.setdefault("masses that MuJoCo makes of shapes", []).append(name)
     reading.bodies[name] = Body(name, mass, centre)
     freedoms = list(_freedoms(node, name, childclass, reading))
     if not freedoms:

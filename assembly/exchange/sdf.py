@@ -236,6 +236,9 @@ def _left_out(model: Node) -> Iterator[str]:
     for node in model.children():
         if node.tag not in (*_FRAMES, "pose", "static"):
             extra.setdefault(f"element {node.tag}", []).append(node.text("name", ""))
+        if node.tag == "link" and node.child("inertial") is None:
+            massless = "links without inertial, taken as massless"
+            extra.setdefault(massless, []).append(node.text("name"))
         for inner in node.children() if node.tag in _HELD else ():
             if inner.tag not in _HELD[node.tag]:
                 what = f"{node.tag} {inner.tag}"

@@ -167,7 +167,7 @@ def mass_matrix(answer: ExactAssembly) -> NDArray:
     here, robot = answer.placement, answer.cut.robot
     M = np.zeros((len(here.x), len(here.x)))
     for i, frame in enumerate(robot.frames):
-        T = here.bodies[i]
+        T = here.body_ends[i]
         tip = _body_motion(answer, i)
         if frame.mass:
             centre = T[:3, 3] + T[:3, :3] @ frame.centre_of_mass
@@ -197,7 +197,7 @@ def _beam_ends(answer: ExactAssembly, i: int, tip: NDArray) -> NDArray:
     above = robot.on_path[i].copy()
     above[i] = False
     base = here.moves * above[here.model.frame]
-    T = here.bodies[i]
+    T = here.body_ends[i]
     axes = T[:3, :3] @ section_axes(axis, frame.link.up)
     origin = answer.posture.platform[:3, 3]
     start = T[:3, 3] - length * axes[:, 0]

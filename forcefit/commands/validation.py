@@ -187,7 +187,7 @@ def crosscheck(
     write_json(failure if results is None else results.table(), json)
     if json != "-":
         print(failure["reason"] if results is None else results.text())
-    if figure is not None and results is not None:
+    if figure is not None and isinstance(results, Crosscheck):
         from validation.crosscheck.plot import slope_figure
 
         save_figure(slope_figure(results), figure)

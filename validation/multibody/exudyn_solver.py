@@ -28,7 +28,7 @@ _RELEASING_STEPS = 4  # of motions that nothing resists
 _NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
 _CLOSING_STEPS = 30
 _STAGES = (
-    "closures are closed and loads grow",
+    "closures are pulled shut and loads grow",
     "contacts harden and free motions are released",
     "the last gaps are closed",
 )

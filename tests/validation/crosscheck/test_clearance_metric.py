@@ -274,11 +274,13 @@ def test_weight_acts_beside_play(links):
 
 def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
     """Five per cent too heavy in the linear model."""
-    import assembly.linear.energy
+    import assembly.linear.assembled
 
-    right = assembly.linear.energy.weights
+    right = assembly.linear.assembled.weights
     monkeypatch.setattr(
-        assembly.linear.energy, "weights", lambda at, g: right(at, 1.05 * np.asarray(g))
+        assembly.linear.assembled,
+        "weights",
+        lambda at, g: right(at, 1.05 * np.asarray(g)),
     )
     check = crosscheck(heavy(), (1.0, 0.5), gravity=[0, 300.0, -900.0], clearances=True)
     assert not check.passed

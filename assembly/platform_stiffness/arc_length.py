@@ -1,0 +1,248 @@
+r"""The load-deflection path of a tight robot past its limit points, by arc length.
+
+Where a load has a largest value the path of equilibria turns back, and no larger load
+has one near by.  The load is then an unknown too: the path (x, lambda) is followed in
+steps of given length, each predicted along the tangent and corrected by Newton's
+method across it,
+
+    [ Z'HZ   -Z'q ] [ t       ]     [ what is out of balance ]
+    [ tau_x   tau ] [ dlambda ] = - [ what the step is long of ],
+
+with Z the motions that keep the closures, H the true second derivative of the
+potential, q the work of a unit load, tau the direction of the step.  Stable or not,
+every equilibrium of the path is met.  Clearances are held at zero.
+
+Sources:
+    Riks (1979), An incremental approach to the solution of snapping and buckling
+    problems; Crisfield (1991), Non-linear Finite Element Analysis of Solids and
+    Structures, chapter 9.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.dead_load import dead_loads, work_gradient
+from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
+from assembly.exact.exact import solve_exact
+from assembly.exact.placement import place
+from assembly.kinematics.posture import Posture
+from assembly.platform_stiffness.deflection import DeflectionCurve, Event
+
+_STEPS = 400  # of the path at most
+_CORRECTIONS = 8  # of a step
+_CLOSED = 1e-10  # [-] size of a last correction, of a step
+_SMALLEST = 1e-6  # of the first step
+_PARTS = 20  # of the range of loads is the first step
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """An equilibrium of the path.
+
+    Attributes:
+        load: [N or N m].
+        local: the expansion there.
+        motion: (N,) along the path, per unit of arc.
+        rise: [N or N m] of the load per unit of arc.
+    """
+
+    load: float
+    local: Expansion
+    motion: NDArray
+    rise: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """What is followed, and what length means on it.
+
+    Attributes:
+        posture: of the tight robot, its beams cut.
+        component: of the load.
+        rest: (6,) [N m, N] the rest of the load.
+        gravity: (3,) [m/s^2] or None.
+        weight: of squared motions, in squared parts of the largest load.
+        range: [N or N m] the largest load.
+    """
+
+    posture: Posture
+    component: int
+    rest: NDArray
+    gravity: ArrayLike | None
+    weight: float
+    range: float
+
+    def expand(self, x: NDArray, load: float, model: Expansion) -> Expansion:
+        """The problem near a placement, under a load."""
+        wrench = self.rest.copy()
+        wrench[self.component] = load
+        placement = place(model.placement.model, x)
+        loads = dead_loads(self.posture, wrench, gravity=self.gravity)
+        return expand(placement, loads, np.zeros(len(placement.residual)))
+
+    def pull(self, local: Expansion) -> NDArray:
+        """(N,) work of a unit load per unit of each unknown."""
+        unit = dead_loads(self.posture, np.eye(6)[self.component])
+        return work_gradient(local.placement, unit)
+
+    def covector(self, local: Expansion, motion: NDArray) -> NDArray:
+        """(N,) product with a motion, as lengths on the path count."""
+        return self.weight * motion / local.placement.model.units**2
+
+
+def follow_load(
+    posture: Posture,
+    component: int,
+    first: float,
+    last: float,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> DeflectionCurve:
+    """Follow the path of equilibria until the load leaves a range.
+
+    Args:
+        posture: where the robot stands; its errors count, its clearances are held.
+        component: of the load that changes, 0 to 5.
+        first: [N m or N] load at which the path begins.
+        last: [N m or N] load beyond which it ends, on its own side.
+        load: (6,) [N m, N] the rest of the load.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        The curve; limit points are its events, ``"critical"``.
+
+    Raises:
+        CannotAssemble: the errors cannot be closed.
+        FreeMotion: a load drives a motion that nothing resists.
+        NotConverged: no equilibrium was found at the first load, or the path is lost;
+            a :class:`SolverFailed`.
+    """
+    frames = (replace(f, clearance=None) for f in posture.robot.frames)
+    tight = replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+    rest = np.zeros(6) if load is None else np.array(load, dtype=float)
+    rest[component] = first
+    start = solve_exact(tight, rest, gravity=gravity)
+    span = abs(last - first)
+    path = _Path(start.cut.cut(tight), component, rest, gravity, 1.0, span)
+    place, path = _begin(path, start.expansion, first, last)
+    places, step, longest = [place], 1.0 / _PARTS, 2.0 / _PARTS
+    while len(places) < _STEPS and abs(places[-1].load - first) <= span:
+        there, count = _advance(path, places[-1], step)
+        if there is None:
+            step /= 2
+            if step < _SMALLEST / _PARTS:
+                raise NotConverged(
+                    f"path of {posture.robot.name}",
+                    f"no equilibrium follows that at {places[-1].load:.6g}",
+                )
+            continue
+        places.append(there)
+        step = min(longest, step * (1.5 if count <= 3 else 0.7 if count > 5 else 1.0))
+    return _curve(path, tight, places)
+
+
+def _begin(
+    path: _Path, local: Expansion, first: float, last: float
+) -> tuple[_Place, _Path]:
+    """The first equilibrium, its tangent, and the weight that balances both lengths."""
+    B, q = local.basis, path.pull(local)
+    motion = B @ np.linalg.solve(B.T @ local.hessian @ B, B.T @ q)
+    size = np.linalg.norm(motion / local.placement.model.units)
+    weight = 1.0 / (size * path.range) ** 2
+    # half of the length is the load's
+    rise = path.range / np.sqrt(2.0) * np.sign(last - first)
+    return _Place(first, local, motion * rise, float(rise)), replace(
+        path, weight=float(weight)
+    )
+
+
+def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
+    """The next equilibrium, and the corrections taken; None if they do not settle."""
+    x0, load = place.local.placement.x, place.load
+    x = x0 + step * place.motion
+    load = load + step * place.rise
+    normal_to = path.covector(place.local, place.motion)
+    rise = place.rise / path.range**2
+    for count in range(1, _CORRECTIONS + 1):
+        local = path.expand(x, load, place.local)
+        B = local.basis
+        closing = np.zeros(len(x))
+        closing[local.unbounded] = -local.inverse @ local.placement.residual
+        left = B.T @ (local.gradient + local.hessian @ closing)
+        long_of = normal_to @ (x + closing - x0) + rise * (load - place.load) - step
+        change = _solve(path, local, normal_to, rise, np.append(left, long_of))
+        if change is None:
+            return None, count
+        moved = closing + B @ change[:-1]
+        x, load = x + moved, load + change[-1]
+        size = np.sqrt(
+            path.covector(local, moved) @ moved + (change[-1] / path.range) ** 2
+        )
+        if not size < 1.0:
+            return None, count
+        if size <= _CLOSED:
+            local = path.expand(x, load, place.local)
+            return _oriented(path, local, float(load), normal_to, rise), count
+    return None, _CORRECTIONS
+
+
+def _solve(
+    path: _Path, local: Expansion, normal_to: NDArray, rise: float, left: NDArray
+) -> NDArray | None:
+    """Motion and load that put right what is left."""
+    B = local.basis
+    M = np.zeros((B.shape[1] + 1, B.shape[1] + 1))
+    M[:-1, :-1] = B.T @ local.hessian @ B
+    M[:-1, -1] = -(B.T @ path.pull(local))
+    M[-1, :-1], M[-1, -1] = normal_to @ B, rise
+    try:
+        return np.linalg.solve(M, -left)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _oriented(
+    path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
+) -> _Place | None:
+    """An equilibrium with its tangent, of unit length, the way the path went."""
+    left = np.zeros(local.basis.shape[1] + 1)
+    left[-1] = -1.0
+    way = _solve(path, local, normal_to, rise, left)
+    if way is None:
+        return None
+    motion = local.basis @ way[:-1]
+    length = np.sqrt(
+        path.covector(local, motion) @ motion + (way[-1] / path.range) ** 2
+    )
+    return _Place(load, local, motion / length, float(way[-1] / length))
+
+
+def _curve(path: _Path, posture: Posture, places: list[_Place]) -> DeflectionCurve:
+    """What was met, with its limit points."""
+    screws = np.array([p.local.placement.platform_screw for p in places])
+    moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
+    with np.errstate(divide="ignore"):
+        slopes = np.array([p.rise for p in places]) / np.array(moved)
+    return DeflectionCurve(
+        posture, path.component, np.array([p.load for p in places]), screws,
+        np.array([energy_of(p.local.placement) for p in places]), slopes,
+        (frozenset(),) * len(places), np.zeros(len(places), dtype=bool),
+        tuple(_limits(places)),
+    )  # fmt: skip
+
+
+def _limits(places: list[_Place]) -> list[Event]:
+    """Where the load turns, by the cubic through both sides."""
+    events = []
+    for one, other in zip(places, places[1:], strict=False):
+        if one.rise * other.rise < 0:
+            share = one.rise / (one.rise - other.rise)
+            # the load's slope falls linearly over the step: a parabola's top
+            step = 2 * (other.load - one.load) / (one.rise + other.rise)
+            top = one.load + one.rise * share * step / 2
+            if not np.isfinite(top) or step <= 0:
+                top = max((one.load, other.load), key=abs)
+            events.append(Event(float(top), "critical", "limit point: the load turns"))
+    return events
