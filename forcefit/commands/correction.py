@@ -38,7 +38,7 @@ def predict(
     ],
     json: JsonOption = None,
 ) -> None:
-    """Foretell the readings of a campaign, or of a table of commands.
+    """Foretell the readings of a campaign or a table.
 
     With the geometric errors, effects and functions of the robot's file.  Where rows
     are measured, the error of the foretelling is printed.  Exit status 1 if a row has
@@ -95,7 +95,7 @@ def compensate(
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """Find the commands that bring the robot where it would stand without errors.
+    """Find the commands that cancel the robot's errors.
 
     ROBOT is the corrected robot.  TARGETS command the poses wanted, as if nothing were
     wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
@@ -154,7 +154,7 @@ def carry(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Carry a saved robot over to a new session, by a few set-up rows.
+    """Carry a saved robot over to a new session.
 
     Where the device stands (and what --fit names) is fitted to the set-up rows of each
     session; the error is that of its other rows, beside the declared robot's.  Exit
@@ -200,9 +200,9 @@ def explain(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Show the functions of a robot's file as curves, with their bands.
+    """Show the functions of a robot's file as curves.
 
-    A function that remembers is shown as its answer to a step of one unit.
+    With their bands.  A function that remembers is shown as its answer to a step of one unit.
     """
     from assembly.robots import load_robot
     from validation.correction import curves

@@ -50,7 +50,10 @@ def deflection(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Load against deflection: free play, contacts, elastic, critical loads."""
+    """Load against deflection, up to critical loads.
+
+    Free motion in clearances, contacts, elastic deformation, jumps.
+    """
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.deflection import (
         deflection_of,

@@ -39,7 +39,7 @@ def import_(
 
 
 def iso(campaign: CampaignArgument, json: JsonOption = None) -> None:
-    """Figures of ISO 9283 and ISO 230-2, from the repeats of a campaign.
+    """Figures of ISO 9283 and ISO 230-2, from repeats.
 
     Pose accuracy and repeatability, distance accuracy, drift; reversal, repeatability
     and accuracy of each reading that was approached from both sides.

@@ -37,7 +37,10 @@ def frequencies(
     count: Annotated[int, typer.Option(help="Modes.", min=1, max=1000)] = 6,
     json: JsonOption = None,
 ) -> None:
-    """Natural frequencies and modes, drives held; masses must be declared."""
+    """Natural frequencies and modes, the drives held.
+
+    Masses must be declared.
+    """
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.vibration import vibration_of, vibration_text
 

@@ -36,7 +36,10 @@ def import_(
     ] = "translations-first",
     json: JsonOption = None,
 ) -> None:
-    """K_E from another program's matrix, condensed on two interfaces."""
+    """K_E from another program's matrix.
+
+    Condensed on two interfaces.
+    """
     from stiffness.exchange.import_link import import_link
     from stiffness.report.results import link_results, link_text
 
@@ -62,7 +65,10 @@ def export(
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
     unit: Length = "m",
 ) -> None:
-    """Write a link's K_E for another program, as a matrix of two nodes."""
+    """Write a link's K_E as another program's matrix.
+
+    A matrix of two nodes.
+    """
     from stiffness.exchange.export_link import link_file, read_link_results
 
     stiffness, offset = read_link_results(file)

@@ -60,7 +60,7 @@ def stiffness(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """How stiff the platform is, in which direction, and which part gives way."""
+    """How stiff the platform is, and which part gives way."""
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.platform_stiffness import (
         draw_shares,

@@ -57,7 +57,7 @@ def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
     """A log file shows it before the work ends, not only the bars after it."""
     import forcefit.commands.progress
 
-    monkeypatch.setattr(forcefit.commands.progress, "_MOMENT", 0.0)
+    monkeypatch.setattr(forcefit.commands.progress, "_DELAY", 0.0)
     with forcefit.commands.progress.progress_bars() as update:
         update("points", 3, 12)
         said = ""
