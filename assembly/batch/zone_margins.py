@@ -86,10 +86,10 @@ def zone_margins(
     joints, structure = structure_of(robot, compliant)
     margin, bound = np.full(count, np.nan), np.full(count, np.nan)
     outcome, reason = np.ones(count, dtype=np.int64), np.full(count, "", dtype=object)
-    own = None if errors is None else np.array(errors, dtype=float)
+    own = None if errors is None else np.array(errors, dtype=float, order="C")
     if joints.scaled.all() and len(joints.scaled):
         if own is None:
-            errors_of_all = robot.errors.copy()
+            errors_of_all = robot.errors.copy(order="C")
             all_margins(structure, T, errors_of_all, off, margin, bound, outcome)
         else:
             for i in range(count):
