@@ -202,7 +202,7 @@ def explain(
 ) -> None:
     """Show the functions of a robot's file as curves.
 
-    With their bands.  A function that remembers is shown as its answer to a step of one unit.
+    With their bands; one that remembers as its answer to a step of one unit.
     """
     from assembly.robots import load_robot
     from validation.correction import curves
