@@ -57,7 +57,7 @@ class Effect:
         needs: covariates without which it can be neither applied nor identified.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
-        by_row: whether it changes situations one by one, so that it can act in some of
+        by_row: whether it changes rows one by one, so that it can act in some of
             them alone; otherwise it changes the robot.
         finite: whether it asks for finite motions.
         clearance: whether it gives joints clearance.

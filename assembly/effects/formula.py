@@ -123,7 +123,7 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
             return _OPERATIONS[type(op)](_value(left, known), _value(right, known))
         case ast.Call(func=ast.Name(id=name), args=[inner]):
             return FUNCTIONS[name](_value(inner, known))
-    raise AssertionError(ast.dump(node))
+    raise AssertionError(type(node).__name__)
 
 
 def parameter_units(

@@ -202,7 +202,7 @@ def apply_functions(
         Conditions with all of them.
 
     Raises:
-        BadInput: a function has no finite value in some situation.
+        BadInput: a function has no finite value in some row.
     """
     recorded = conditions if recorded is None else recorded
     for function in functions:

@@ -95,7 +95,7 @@ def _numbers(
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Refuse a variable that a situation does not have."""
+    """Refuse a variable that conditions do not have."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":

@@ -233,16 +233,16 @@ def _fitted(
     campaign: Campaign, setup: NDArray, names: list[tuple[str, str]], prior: NDArray
 ) -> _Fit:
     """Gauss-Newton's method on the set-up rows."""
-    here = finite_conditions(campaign)
+    conditions = finite_conditions(campaign)
     x = np.zeros(len(names))
     registered = any(name in BASE for _, name in names)
     if registered:
-        start = coarse_frame(campaign.take(setup), here.take(setup))
+        start = coarse_frame(campaign.take(setup), conditions.take(setup))
         x = np.array([start.get(name, 0.0) for _, name in names])
     cells = campaign.cells & setup[:, None]
     sigma = campaign.sigma
     for _ in range(_STEPS):
-        deviation, slopes = _tangent(here, names, x)
+        deviation, slopes = _tangent(conditions, names, x)
         A = (slopes / sigma[:, :, None])[cells]
         b = ((campaign.measured - deviation) / sigma)[cells]
         size = np.linalg.norm(A, axis=0)
@@ -254,7 +254,7 @@ def _fitted(
         x = x + step
         if np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))):
             break
-    deviation, slopes = _tangent(here, names, x)
+    deviation, slopes = _tangent(conditions, names, x)
     b = ((campaign.measured - deviation) / sigma)[cells]
     excess = max(1.0, float(b @ b) / max(len(b) - len(x), 1))
     distinct = len(np.unique(campaign.configuration[setup]))
@@ -263,7 +263,7 @@ def _fitted(
 
 
 def _tangent(
-    here: Conditions, names: list[tuple[str, str]], x: NDArray
+    conditions: Conditions, names: list[tuple[str, str]], x: NDArray
 ) -> tuple[NDArray, NDArray]:
     """(R, 6) readings foretold with values, and their (R, 6, k) slopes."""
 
@@ -271,7 +271,7 @@ def _tangent(
         effects: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(names, values.tolist(), strict=True):
             effects.setdefault(effect, {})[name] = value
-        return predict(apply_effects(here, effects)).deviation
+        return predict(apply_effects(conditions, effects)).deviation
 
     middle = read(x)
     slopes = np.empty((*middle.shape, len(x)))

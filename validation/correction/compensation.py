@@ -204,11 +204,11 @@ class _Machine:
 
     def conditions(self, campaign: Campaign) -> Conditions:
         """What acts at commands, read at the reference point."""
-        here = replace(finite_conditions(campaign), target=None)
+        conditions = replace(finite_conditions(campaign), target=None)
         if self.as_read:
-            return here
+            return conditions
         still = np.zeros(6)
-        return replace(here, base=still, tool=still[:3], reading=0.0)
+        return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray, last: Campaign) -> tuple[_Standing, NDArray]:
         """Where it stands, and (R,) why it cannot.
@@ -221,11 +221,13 @@ class _Machine:
             Both.
         """
         campaign, reason = _commanded(last, q)
-        here = self.conditions(campaign)
-        answer = predict(here)
+        conditions = self.conditions(campaign)
+        answer = predict(conditions)
         reason = np.where(reason == "", answer.reason, reason)
-        error = _between(here, answer.deviation, self.goal)
-        return _Standing(campaign, here, error, _jacobian(here, q.shape[1])), reason
+        error = _between(conditions, answer.deviation, self.goal)
+        return _Standing(
+            campaign, conditions, error, _jacobian(conditions, q.shape[1])
+        ), reason
 
 
 def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
@@ -250,27 +252,27 @@ def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
     ), reason
 
 
-def _between(here: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
+def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
     """(R, 6) from where the reference point stands to where it should, base axes."""
-    nominal = here.postures.platform
-    arm = nominal[:, :3, :3] @ here.point
+    nominal = conditions.postures.platform
+    arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
     p = nominal[:, :3, 3] + arm + deviation[:, 3:]
     turn = rotation_vector(goal[:, :3, :3] @ np.swapaxes(R, 1, 2))
-    shift = goal[:, :3, 3] + goal[:, :3, :3] @ here.point - p
+    shift = goal[:, :3, 3] + goal[:, :3, :3] @ conditions.point - p
     return np.concatenate([turn, shift], axis=1)
 
 
-def _jacobian(here: Conditions, drives: int) -> NDArray:
+def _jacobian(conditions: Conditions, drives: int) -> NDArray:
     """(R, 6, d) how the reference point follows the drives, base axes."""
-    robot = without_joint_clearances(here.robot)
+    robot = without_joint_clearances(conditions.robot)
     columns = np.zeros((6 * len(robot.frames), drives))
     for k, i in enumerate(_driven(robot)):
         columns[6 * i : 6 * i + 6, k] = own_screw(robot.frames[i])
-    distinct, which = in_groups(replace(here.postures, robot=robot))
+    distinct, which = in_groups(replace(conditions.postures, robot=robot))
     J = flexibility(distinct).platform_of(columns)[which]
-    J[:, 3:] += np.cross(J[:, :3], here.measured_arms[:, :, None], axisa=1, axisb=1,
-                         axisc=1)  # fmt: skip
+    arms = conditions.measured_arms[:, :, None]
+    J[:, 3:] += np.cross(J[:, :3], arms, axisa=1, axisb=1, axisc=1)
     return J
 
 

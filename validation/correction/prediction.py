@@ -66,11 +66,11 @@ def foretell(commands: Campaign) -> Foretold:
     Raises:
         BadInput: the registration is unknown, and the rows do not tell it.
     """
-    here = finite_conditions(commands)
+    conditions = finite_conditions(commands)
     measured = commands.cells.any(axis=1)
     if commands.registration == "unknown" and measured.any():
-        here = register(commands.take(measured), here)
-    prediction = predict(here)
+        conditions = register(commands.take(measured), conditions)
+    prediction = predict(conditions)
     return Foretold(commands, prediction, error_of(commands, prediction.deviation))
 
 
@@ -84,10 +84,10 @@ def finite_conditions(campaign: Campaign) -> Conditions:
         R conditions; of a robot with clearance the linear model's, since where it
         rests without a load is open.
     """
-    here = conditions_of(campaign)
-    if here.exact or virtual_joints(here.robot).cones.shape[1]:
-        return here
-    return with_finite_motions(here)
+    conditions = conditions_of(campaign)
+    if conditions.exact or virtual_joints(conditions.robot).cones.shape[1]:
+        return conditions
+    return with_finite_motions(conditions)
 
 
 def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:

@@ -105,7 +105,7 @@ class Answers:
         """Keep what candidates are made of.
 
         Args:
-            conditions: R situations as declared.
+            conditions: R rows as declared.
             robot: the campaign's.
             answers: of the readings there.
         """
@@ -201,7 +201,7 @@ def variables_of(conditions: Conditions) -> list[str]:
     """Public names of what was varied, and is known in every row.
 
     Args:
-        conditions: R situations.
+        conditions: R rows.
 
     Returns:
         Coordinates of drives, loads and their size, positions, covariates.

@@ -77,8 +77,8 @@ class Diagnosis:
         split: which rows were kept aside.
         outliers: (R,) bool, rows left out of everything.
         conditions: the campaign's, as declared and registered.
-        open: (R,) bool, rows where play leaves the pose free, in the declared model or
-            with the effects found; see
+        open: (R,) bool, rows where clearances leave the pose free, in the declared
+            model or with the effects found; see
             :class:`assembly.measurement.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
         residual_after: (R, 6) [rad, m] reading minus the best set's model.

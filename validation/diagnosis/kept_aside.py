@@ -24,7 +24,7 @@ from validation.diagnosis.evidence import (
 )
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.learning import Learned, term_name
-from validation.diagnosis.refit import Fit, refit, with_play_held
+from validation.diagnosis.refit import Fit, refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import Responses
 from validation.diagnosis.signatures import whiten
@@ -132,7 +132,7 @@ def ladder(
         One rung a step; a step that nothing asked for repeats the one before.
     """
     fitting = campaign.take(used)
-    conditions = with_play_held(model.conditions, model.fit)
+    conditions = with_clearance_held(model.conditions, model.fit)
     some = conditions.take(used)
     names = [term.name for term in model.behind.terms]
     first = [name for name in (GEOMETRY, SPRINGS) if name in names]

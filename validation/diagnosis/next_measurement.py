@@ -134,7 +134,7 @@ def _situations(conditions: Conditions) -> Conditions:
 
 def _between(there: Conditions, rng: np.random.Generator) -> Conditions:
     """Half of the configurations moved towards others, where the robot can follow."""
-    if there.rest is not None:  # where play rests is known for measured ones only
+    if there.rest is not None:  # where clearances rest is known for measured ones only
         return there
     actuated = np.array([frame.actuated for frame in there.robot.frames])
     q = np.where(actuated, there.coordinates, np.nan)

@@ -112,8 +112,8 @@ def _public(
     return fitted
 
 
-def adds_play(conditions: Conditions, members: Sequence[Hypothesis]) -> bool:
-    """Whether a set puts play into closed chains, where it is found row by row."""
+def adds_clearance(conditions: Conditions, members: Sequence[Hypothesis]) -> bool:
+    """Whether a set puts clearances into closed chains, whose rest is found by row."""
     added = any(LIBRARY[h.effect].clearance for h in members)
     return added and bool(conditions.robot.closures) and conditions.rest is None
 
@@ -121,7 +121,7 @@ def adds_play(conditions: Conditions, members: Sequence[Hypothesis]) -> bool:
 def resting(
     conditions: Conditions, members: Sequence[Hypothesis], x: NDArray
 ) -> NDArray:
-    """Where play rests by the least energy with hypotheses at some values.
+    """Where clearances rest by the least energy with hypotheses at some values.
 
     Args:
         conditions: conditions without the effects.
@@ -138,17 +138,17 @@ def resting(
     return there.rest[:, -len(conditions.robot.frames) :]
 
 
-def with_play_held(conditions: Conditions, fit: Fit) -> Conditions:
-    """Conditions in which play that a fit adds to closed chains rests where it does.
+def with_clearance_held(conditions: Conditions, fit: Fit) -> Conditions:
+    """Conditions in which clearances that a fit adds to closed chains are held at rest.
 
     Args:
         conditions: without the fit's effects.
         fit: any.
 
     Returns:
-        The same where the fit adds no such play.
+        The same where the fit adds no such clearances.
     """
-    if not adds_play(conditions, fit.hypotheses):
+    if not adds_clearance(conditions, fit.hypotheses):
         return conditions
     return replace(conditions, rest=resting(conditions, fit.hypotheses, fit.values))
 
@@ -156,12 +156,12 @@ def with_play_held(conditions: Conditions, fit: Fit) -> Conditions:
 def in_full(
     campaign: Campaign, conditions: Conditions, fit: Fit, behind: Background = NOTHING
 ) -> Fit:
-    """A fit whose residual has play where the least energy puts it now.
+    """A fit whose residual has clearances where the least energy puts them now.
 
     Args:
         campaign: what was measured.
         conditions: its conditions without the effects.
-        fit: made with play held.
+        fit: made with clearances held.
         behind: small terms that are there too.
 
     Returns:
@@ -182,7 +182,7 @@ def refit(
 
     Args:
         campaign: what was measured.
-        conditions: without the effects; with ``rest``, play is held there.
+        conditions: without the effects; with ``rest``, clearances are held there.
         members: hypotheses of different effects.
         start: where to begin, one unknown after the other.
         defect: (N,) whitened, what finite motions add about there, where it is known.

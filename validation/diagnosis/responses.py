@@ -51,10 +51,10 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Answers to small screws at all frames, play where it rests.
+    """Answers to small screws at all frames, clearances where they rest.
 
     Args:
-        conditions: R situations of a robot.
+        conditions: R rows of a robot.
 
     Returns:
         The answers; rows that do not close have zeros.
@@ -84,7 +84,7 @@ def responses(conditions: Conditions) -> Responses:
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """The same situations with play where it rests."""
+    """The same rows with clearances where they rest."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:

@@ -19,7 +19,7 @@ from assembly.measurement.predict import with_rest_positions
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import Background, Evidence, Prior, background
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
-from validation.diagnosis.refit import Fit, adds_play, in_full, refit, resting
+from validation.diagnosis.refit import Fit, adds_clearance, in_full, refit, resting
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
 from validation.diagnosis.scoring import FINITE, Scored, Screen
@@ -71,7 +71,8 @@ def select(
 ) -> Selection:
     """Score all small sets, refit the best, and again about it until it stays.
 
-    Declared play in closed chains is held where it rests: as declared, then as found.
+    Declared clearances in closed chains are held where they rest: as declared, then as
+    found.
 
     Args:
         campaign: rows to be fitted.
@@ -96,9 +97,11 @@ def _select_settled(
     campaign: Campaign, conditions: Conditions, update: Update
 ) -> Selection:
     """The selection with motions to first order beside what ``conditions`` carries."""
-    # where play rests in closed chains is found row by row, too slowly for every trial
-    play = conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]
-    if not play:
+    # where clearances rest in closed chains is found row by row, too slowly to repeat
+    clearance = (
+        conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]
+    )
+    if not clearance:
         return _select(campaign, conditions, update)
     selected = _select(campaign, with_rest_positions(conditions), update)
     there = with_rest_positions(apply_effects(conditions, selected.fit.effects))
@@ -129,7 +132,9 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
     )
     prior = screens.first(signatures)
     best: tuple[Hypothesis, ...] = ()
-    rest: NDArray | None = None  # where play would rest in closed chains; slow to find
+    rest: NDArray | None = (
+        None  # where clearances would rest in closed chains; slow to find
+    )
     known: dict[object, Fit] = {}
     for turn in range(_ROUNDS):
         behind = background(screens.terms, prior)
@@ -144,7 +149,7 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
             members = [screen.signatures[i].hypothesis for i in one.members]
             start = np.concatenate([*(h.start for h in nuisance), _start(one, members)])
             every = [*nuisance, *members]
-            if adds_play(conditions, every):
+            if adds_clearance(conditions, every):
                 rest = resting(conditions, every, start) if rest is None else rest
                 held = replace(conditions, rest=rest)
                 fits[one.members] = refit(campaign, held, every, start, behind=behind)
@@ -174,10 +179,10 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
         if not settled:
             prior = again
             known = {}
-        if adds_play(conditions, best):
+        if adds_clearance(conditions, best):
             rest = resting(conditions, best, chosen.values)
         signatures = _about(tangents, signatures, chosen, len(nuisance))
-    if adds_play(conditions, chosen.hypotheses):
+    if adds_clearance(conditions, chosen.hypotheses):
         chosen = in_full(campaign, conditions, chosen, behind)
     unknowns = sets[0].rank + 6 * len(nuisance)
     rivals = _rivals(screen, sets, fits)

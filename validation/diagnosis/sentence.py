@@ -86,7 +86,7 @@ def noise_text(factor: NDArray) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """In which rows play leaves the pose free, and what is then predicted.
+    """In which rows clearances leave the pose undetermined, and what is then predicted.
 
     Args:
         open_: (R,) bool, by row.
@@ -95,9 +95,9 @@ def open_text(open_: NDArray) -> str:
         One line.
     """
     return (
-        f"play leaves the pose free in {int(open_.sum())} of {len(open_)} rows "
+        f"clearances leave the pose free in {int(open_.sum())} of {len(open_)} rows "
         "(marked open): of the poses of least energy one is predicted there, in a "
-        "closed chain the nearest to nominal, in an open one that of play in the middle"
+        "closed chain the nearest to nominal, in an open one that of centred clearances"
     )
 
 

@@ -48,7 +48,7 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """The situations of a campaign, as its robot's file declares the machine.
+    """The conditions of a campaign, as its robot's file declares the machine.
 
     Args:
         campaign: of R rows.
@@ -120,7 +120,7 @@ class Tangents:
         self._columns: dict[object, NDArray] = {}
 
     def model(self, effects: Mapping[str, Values]) -> NDArray:
-        """What is read with effects, to first order in play.
+        """What is read with effects, to first order in clearances.
 
         Args:
             effects: parameters by their public names, by effect.

@@ -18,7 +18,7 @@ from validation.diagnosis.evidence import background
 from validation.diagnosis.kept_aside import Model
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
 from validation.diagnosis.learning import Learned, learn, term_name
-from validation.diagnosis.refit import refit, with_play_held
+from validation.diagnosis.refit import refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
 from validation.diagnosis.selection import Selection, Update
@@ -80,13 +80,17 @@ def taught(
         return selection, ()
     behind = background(lesson.terms, lesson.prior)
     fit = refit(
-        fitting, with_play_held(some, fit), fit.hypotheses, fit.values, behind=behind
+        fitting,
+        with_clearance_held(some, fit),
+        fit.hypotheses,
+        fit.values,
+        behind=behind,
     )
     story = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
     if best == 0:
         nothing = selection.screen.fit(())
         story = replace(story, sets=[nothing, *selection.sets], unknowns=len(begin))
-    held = with_play_held(conditions, selection.fit)
+    held = with_clearance_held(conditions, selection.fit)
     before = Model(held, answers, selection.fit, selection.behind)
     after = Model(conditions, answers, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):

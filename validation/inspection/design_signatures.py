@@ -24,8 +24,8 @@ class DesignSignatures:
     """Changes of the readings over sigma, each unknown at a plausible size.
 
     Attributes:
-        columns: (N, k) by effect; every frame has unknowns of its own, but play is the
-            same in all joints (in each it takes another branch with the load).
+        columns: (N, k) by effect; every frame has unknowns of its own, but clearance is
+            the same in all joints (in each it takes another branch with the load).
         nuisance: (N, p) what an unknown registration does.
         untestable: why an effect has no columns, by effect.
         unregistered: why an unknown registration cannot be found; empty if it can.

@@ -39,7 +39,7 @@ class Inspection:
         signatures: of the library's effects.
         separability: their angles.
         remarks: sentences, those on what is lost first.
-        open: (R,) bool, rows where the robot's declared play leaves its pose free.
+        open: (R,) bool, rows where the robot's declared clearances leave its pose free.
     """
 
     campaign: Campaign

@@ -204,20 +204,10 @@ def assert_same_robot(robot, expected):
 
 # numbers of machines, with all their digits
 lengths = st.floats(-10, 10).filter(lambda x: x == 0 or abs(x) > 1e-6)
-
-
 positive = st.floats(1e-6, 1e12)
-
-
 vectors = st.tuples(lengths, lengths, lengths)
-
-
 sixes = st.lists(lengths, min_size=6, max_size=6)
-
-
 names = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=9)
-
-
 material = {
     "young": positive,
     "poisson": st.floats(-0.9, 0.49),
