@@ -260,6 +260,6 @@ def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
     target = tmp_path / "found.json"
     status, said, err = run("validation", command, rattling, "--json", target)
     assert status == 0, err
-    assert "play leaves the pose free in 24 of 24 rows" in said
+    assert "clearances leave the pose free in 24 of 24 rows" in said
     assert "in a closed chain the nearest to nominal" in said
     assert json.loads(target.read_text())["open"] == [f"r{k}" for k in range(24)]
