@@ -113,10 +113,6 @@ def leaves(value: Any, place: str = "") -> dict[str, Any]:
     if isinstance(value, dict):
         left_out = (*PASSING, *CERTIFICATES)
         kept = {k: v for k, v in value.items() if not any(p in k for p in left_out)}
-            k: v
-            for k, v in value.items()
-            if not any(p in k for p in (*PASSING, *CERTIFICATES))
-        }
         return {
             k: v
             for key, one in kept.items()
