@@ -243,7 +243,8 @@ def _improve(search: Search, screw: GivenVector) -> None:
         if size > search.bounds[0] + _GAIN * search.tolerance:
             search.counts[3] = 1
         search.bounds[0] = size
-        copy(screw, search.best)
+        for j in range(len(screw)):  # not copy: it would need a signature for this
+            search.best[j] = screw[j]
 
 
 @part
