@@ -17,10 +17,8 @@ from forcefit.commands.options import (
     PoseOption,
     RobotArgument,
     UnderOption,
-    declared_posture,
-    parse_covariates,
+    declared_under,
     parse_direction,
-    parse_gravity,
     parse_load,
     parse_vector,
     posture_of,
@@ -51,13 +49,9 @@ def solve(
     json: JsonOption = None,
 ) -> None:
     """Close at least energy: pose error, energy, wrenches, margin."""
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import solution_of, solution_text
 
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under),
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under)
     with one_thread():
         results = solution_of(applied.posture, applied.load, applied.gravity)
     if results["status"] == "ok" and applied.conditions.reads_otherwise:
@@ -98,13 +92,9 @@ def exact(
     json: JsonOption = None,
 ) -> None:
     """Close the robot with finite motions: closures hold exactly."""
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.results import exact_of, exact_text
 
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=True,
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under, finite=True)
     with one_thread():
         results = exact_of(applied.posture, applied.load, applied.gravity)
     write_json(results, json)
@@ -148,7 +138,6 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.linear.reach import READINGS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.report.pose_errors import pose_error_of, pose_error_text
@@ -167,10 +156,7 @@ def error(
             option = "--" + key.replace("_", "-")
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under),
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under)
     with one_thread():
         results = pose_error_of(
             applied.posture, reading or None,

@@ -14,10 +14,7 @@ from forcefit.commands.options import (
     PoseOption,
     RobotArgument,
     UnderOption,
-    declared_posture,
-    parse_covariates,
-    parse_gravity,
-    parse_load,
+    declared_under,
 )
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.errors import BadInput, describe, nearest
@@ -54,7 +51,6 @@ def deflection(
 
     Free motion in clearances, contacts, elastic deformation, jumps.
     """
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.deflection import (
         deflection_of,
         deflection_text,
@@ -65,10 +61,7 @@ def deflection(
         check_writable(output, PICTURE)
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=exact,
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
     with one_thread():
         results = deflection_of(
             applied.posture, component, loads, applied.load, applied.gravity, exact

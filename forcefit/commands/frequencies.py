@@ -12,10 +12,7 @@ from forcefit.commands.options import (
     PoseOption,
     RobotArgument,
     UnderOption,
-    declared_posture,
-    parse_covariates,
-    parse_gravity,
-    parse_load,
+    declared_under,
 )
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.writing import write_json
@@ -41,13 +38,9 @@ def frequencies(
 
     Masses must be declared.
     """
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.vibration import vibration_of, vibration_text
 
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=exact,
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
     with one_thread():
         results = vibration_of(
             applied.posture, count, applied.load, applied.gravity, exact

@@ -236,6 +236,38 @@ def declared_posture(
     )
 
 
+def declared_under(
+    robot: str,
+    pose: list[str] | None,
+    joint: list[str] | None,
+    load: list[str] | None,
+    gravity: list[str] | None,
+    under: list[str] | None,
+    *,
+    finite: bool = False,
+) -> Any:
+    """The robot under the loads and covariates asked for, its file's effects applied.
+
+    Args:
+        robot: name or file.
+        pose: of the platform.
+        joint: coordinates.
+        load: on the platform.
+        gravity: in base axes.
+        under: covariates of the effects.
+        finite: whether the exact model is used.
+
+    Returns:
+        The posture, loads and conditions with the effects applied.
+    """
+    from assembly.effects.robot_effects import apply_robot_effects
+
+    return apply_robot_effects(
+        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
+        parse_covariates(under), finite=finite,
+    )  # fmt: skip
+
+
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
     """Covariates from ``--under``.
 

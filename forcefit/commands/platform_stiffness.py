@@ -13,11 +13,8 @@ from forcefit.commands.options import (
     PoseOption,
     RobotArgument,
     UnderOption,
-    declared_posture,
+    declared_under,
     parse_assignments,
-    parse_covariates,
-    parse_gravity,
-    parse_load,
     parse_point,
 )
 from forcefit.commands.progress import one_thread
@@ -61,7 +58,6 @@ def stiffness(
     json: JsonOption = None,
 ) -> None:
     """How stiff the platform is, and which part gives way."""
-    from assembly.effects.robot_effects import apply_robot_effects
     from assembly.report.platform_stiffness import (
         draw_shares,
         stiffness_of,
@@ -73,10 +69,7 @@ def stiffness(
     if length is not None:
         checked("--length", length, "m", above=0)
     point = parse_point(at, "--at")
-    applied = apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=exact,
-    )  # fmt: skip
+    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
     with one_thread():
         results = stiffness_of(
             applied.posture, applied.load, applied.gravity, point, exact, length
