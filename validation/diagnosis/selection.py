@@ -104,9 +104,11 @@ def _select_settled(
     if not clearance:
         return _select(campaign, conditions, update)
     selected = _select(campaign, with_rest_positions(conditions), update)
-    there = with_rest_positions(apply_effects(conditions, selected.fit.effects))
-    assert there.rest is not None
-    rest = there.rest[:, -len(conditions.robot.frames) :]
+    loose = with_rest_positions(apply_effects(conditions, selected.fit.effects))
+    assert loose.rest is not None
+    # effects may add frames, as the foundation's
+    own = [loose.robot.index(frame.name) for frame in conditions.robot.frames]
+    rest = loose.rest[:, own]
     return _select(campaign, replace(conditions, rest=rest), update)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import LISTED, effects, learned, small, steps
 from validation.diagnosis.sentence import (
