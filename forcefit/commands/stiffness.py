@@ -169,7 +169,7 @@ def fea(
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.parts import parse_mass, parse_part
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import Budget, solve_link
+    from stiffness.fem.fea import Budget, FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.report.results import link_results, link_text
     from stiffness.surface.surface import read_surface
@@ -178,14 +178,14 @@ def fea(
     held, moved = _interfaces(base, tip)
     density = checked("--density", density, "kg/m^3", least=0)
     budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
-    accuracy = _accuracy(accuracy)
+    options = FemOptions(_accuracy(accuracy), interface, budget)
     materials = [Material(E, nu, density)]
     materials += [parse_part("--part", text) for text in part or ()]
     masses = [parse_mass("--mass", text) for text in mass or ()]
     _tell_progress()
     link = solve_link(
         read_surface(surface, unit), held, moved, materials,
-        accuracy=accuracy, interface=interface, point_masses=masses, budget=budget,
+        options=options, point_masses=masses,
     ).link  # fmt: skip
     write_json(link_results(link), json)
     if json != "-":
@@ -218,7 +218,8 @@ def compare(
     The beam is straight, of the section given, or along a curve.
     """
     from forcefit.commands.beam_options import BeamOptions
-    from stiffness.fem.fea import mesh_link
+    from stiffness.fem.fea import FemOptions, mesh_link
+    from stiffness.fem.material import Material
     from stiffness.report.compare import compare_link
     from stiffness.report.results import comparison_results, comparison_text
 
@@ -238,8 +239,9 @@ def compare(
         check_writable(figure, PICTURE)
     _tell_progress()
     meshed = mesh_link(
-        surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
-    )
+        surface, held, moved, Material(E, nu), unit=unit,
+        options=FemOptions(accuracy, interface),
+    )  # fmt: skip
     if bent is None:
         straight = options.link(meshed.base, meshed.tip, roll)
         comparison = compare_link(straight, meshed, size)
@@ -337,7 +339,7 @@ def stress(
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_load
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.fem.stress import peak_stress, stress_influence
     from stiffness.report.results import stress_results, stress_text
@@ -362,7 +364,7 @@ def stress(
     _tell_progress()
     solved = solve_link(
         read_surface(surface, unit), held, moved, [Material(E, nu)],
-        accuracy=accuracy, interface=interface,
+        options=FemOptions(accuracy, interface),
     )  # fmt: skip
     peak = peak_stress(solved, load, section=declared, up=roll, away=away)
     if figure is not None:

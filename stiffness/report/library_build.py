@@ -243,7 +243,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
     if spec.method == "beam":
         C = curve_compliance(shape_beam(spec.shape, lengths, nu), E, nu)
         return LinkStiffness("Timoshenko beam", C, tip=tip, base=np.zeros(3)), ""
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
 
@@ -253,7 +253,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
         parse_interface("z=0"),
         parse_interface(f"z={lengths['length']!r}"),
         [Material(E, nu, point.get("density", 0.0))],
-        accuracy=spec.accuracy,
+        options=FemOptions(spec.accuracy),
     )
     return solved.link, surface.digest()
 
