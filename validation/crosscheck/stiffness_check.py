@@ -163,15 +163,15 @@ def check_stiffness(
     if answer.free.shape[1]:
         screw = numbers(answer.free[:, 0])
         raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
-    models = link_models(robot, links)
+    model = link_models(robot, links)
     scale = np.repeat([1.0, 1.0 / answer.length], 3)
     columns, turns = [], []
     for row, moved in enumerate(answer.compliance):
         step = STEP / np.abs(moved * scale).max() * np.eye(6)[row]
         ahead, back = (
             simulate_assembly(
-                posture, 1.0, models.links, models.stiffness, wrench + sign * step,
-                gravity, meshes=models.meshes, time_limit=time_limit,
+                posture, model=model, load=wrench + sign * step, gravity=gravity,
+                time_limit=time_limit,
             ).platform_screw
             for sign in (1, -1)
         )  # fmt: skip
