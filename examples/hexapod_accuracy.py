@@ -20,7 +20,7 @@ from pathlib import Path
 
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import run_sweep
 
 HERE = Path(__file__).parent
@@ -37,11 +37,13 @@ def main():
     square = ",".join(f"{axis}=-0.05:0.05:{options.step}" for axis in ("tx", "ty"))
     asked = ask_sweep(
         "hexapod",
-        grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
-        vary=[f"{PLAY}=8e-6,4e-6"],
-        errors=HERE / "hexapod_errors.toml",
-        draws=options.draws,
-        play_alone=True,
+        SweepOptions(
+            grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
+            vary=[f"{PLAY}=8e-6,4e-6"],
+            errors=HERE / "hexapod_errors.toml",
+            draws=options.draws,
+            play_alone=True,
+        ),
     )
     run_sweep(asked, options.output)
     data = open_dataset(options.output).squeeze()

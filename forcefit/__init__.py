@@ -45,7 +45,7 @@ _OWNERS = {
     "assembly.statistics.summary": ("summarise",),
     "assembly.sweeps.dataset": ("open_dataset",),
     "assembly.sweeps.maps": ("figure_of",),
-    "assembly.sweeps.request": ("ask_sweep",),
+    "assembly.sweeps.request": ("SweepOptions", "ask_sweep"),
     "assembly.sweeps.sweep": ("run_sweep", "sweep_in_memory"),
     "validation.assumptions.assumptions": ("assumption_costs",),
     "validation.campaign.campaign_file": ("read_campaign", "read_commands"),

@@ -94,7 +94,12 @@ def sweep(
     """
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
-    from assembly.sweeps.request import ask_sweep, summary_of, summary_text
+    from assembly.sweeps.request import (
+        SweepOptions,
+        ask_sweep,
+        summary_of,
+        summary_text,
+    )
     from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
 
     if workers is not None and scheduler is not None:
@@ -107,11 +112,14 @@ def sweep(
     with progress_bars() as update:
         update("robot", 0, 1)  # where it is placed, code may be compiled
         asked = ask_sweep(
-            robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
-            linearisation=linearisation, near=near, yield_strength=yield_strength,
-            load=wrench or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
-            stiffness=stiffness,
+            robot,
+            SweepOptions(
+                grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+                seed=seed, reading=reading, play_alone=play_alone,
+                wrench=wrench_of or (), linearisation=linearisation, near=near,
+                yield_strength=yield_strength, load=wrench or (0.0,) * 6,
+                gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
+            ),
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
