@@ -66,7 +66,7 @@ def print_table(signs, data, column):
     reached = data["status"] == "ok"
     inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
     print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % go "
-          "together by play with compliant joints free")  # fmt: skip
+          "together by clearances with compliant joints free")  # fmt: skip
     for name, factor, unit, *reference in ROWS:
         values = data[name]
         if "bound" in values.dims:

@@ -148,8 +148,8 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
         below[joint.parent].append(joint)
     roots = [name for name in bodies if name not in carried]
     if len(roots) != 1:
-        found = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
-        raise BadInput(f"{file}: found as root {found}, expected exactly one link")
+        names = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
+        raise BadInput(f"{file}: found as root {names}, expected exactly one link")
     order, waiting = [], list(reversed(below[roots[0]]))
     while waiting:
         joint = waiting.pop()

@@ -266,7 +266,7 @@ def _at_key(
 
 def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...]]:
     """Joints that follow another become drives of their own, which must be said."""
-    joints, said = list(reading.joints), []
+    joints, remarks = list(reading.joints), []
     for group in root.children("equality"):
         for node in group.children("joint"):
             name = node.text("joint1")
@@ -276,11 +276,11 @@ def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...
             joints = [
                 replace(j, actuated=True) if j.name == name else j for j in joints
             ]
-            said.append(
+            remarks.append(
                 f"mimic: {name} follows {node.text('joint2', 'a constant')}: it is a "
                 "drive of its own, command it so"
             )
-    return joints, tuple(said)
+    return joints, tuple(remarks)
 
 
 def _loops(root: Node, reading: _Reading, poses: dict[str, NDArray]) -> Iterator[Loop]:

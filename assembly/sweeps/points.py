@@ -276,16 +276,16 @@ def _record_stiffness(
     """K_C once a posture; errors do not change it, draws of a posture share it."""
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
-    answer = platform_stiffnesses(robot, T[starts], mismatch[starts])
-    along = np.stack([answer.along(axis) for axis in np.eye(6)], axis=1)
-    by_axis = [list(answer.shares(axis).values()) for axis in np.eye(6)]
+    stiffnesses = platform_stiffnesses(robot, T[starts], mismatch[starts])
+    along = np.stack([stiffnesses.along(axis) for axis in np.eye(6)], axis=1)
+    by_axis = [list(stiffnesses.shares(axis).values()) for axis in np.eye(6)]
     shares = np.array(by_axis).transpose(2, 1, 0)
     out = solved.records
     for i, run in enumerate(runs):
-        out["compliance"][rows[run]] = answer.compliance[i]
+        out["compliance"][rows[run]] = stiffnesses.compliance[i]
         out["stiffness"][rows[run]] = along[i]
-        out["eigen_stiffness"][rows[run]] = answer.eigen_stiffnesses[i]
-        out["stiffness_condition"][rows[run]] = answer.condition[i]
+        out["eigen_stiffness"][rows[run]] = stiffnesses.eigen_stiffnesses[i]
+        out["stiffness_condition"][rows[run]] = stiffnesses.condition[i]
         out["share"][rows[run]] = shares[i]
 
 
@@ -325,7 +325,7 @@ def _bound_clearance_only(
         ]
         if bounds.status[i] != "ok":
             for row in rows[run].tolist():
-                reason = f"play alone: {bounds.reason[i]}"
+                reason = f"clearances alone: {bounds.reason[i]}"
                 solved.texts["reason"].setdefault(row, reason)
 
 

@@ -65,7 +65,7 @@ def statistics(
         Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw histograms, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -167,7 +167,7 @@ def tolerances(
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw the tolerances, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:

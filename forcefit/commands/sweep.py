@@ -83,7 +83,7 @@ def sweep(
         str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw it, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot it, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -170,7 +170,7 @@ def plot(
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
 ) -> None:
-    """Draw a saved file: maps, lines, histograms, tolerances."""
+    """Plot a saved file: maps, lines, histograms, tolerances."""
     from assembly.statistics.plot import KINDS, figure_of_draws
     from assembly.sweeps.dataset import open_dataset
     from assembly.sweeps.maps import figure_of

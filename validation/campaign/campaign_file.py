@@ -267,8 +267,10 @@ def _read_robot(root: Table, name: str) -> Robot:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
     if not os.path.isfile(path):
-        found = f"found {quoted(name)}, neither a built-in robot nor a file beside this"
-        raise root.bad("robot", f"{found}{nearest(name, BUILT_IN)}")
+        message = (
+            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+        )
+        raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
     return read_robot(path)
 
 
@@ -310,12 +312,12 @@ def _place(table: MeasurementTable, robot: Robot, commanded: str,
     """The posture of each of these rows, or an error that names the first missed."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
-    found = []
+    placed = []
     for row, posture, reason in zip(rows, postures, reasons, strict=True):
         if posture is None:
             raise table.bad(int(row), "", reason)
         if not posture.mismatch < _CLOSED:
             message = f"the closures stay open by {posture.mismatch:.3g} rad or m"
             raise table.bad(int(row), "", f"{message}, expected < {_CLOSED:g}")
-        found.append(posture)
-    return found
+        placed.append(posture)
+    return placed

@@ -284,12 +284,12 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
-        said = f'decimal = "{other}" in campaign.toml'
+        setting = f'decimal = "{other}" in campaign.toml'
         if other == dialect.delimiter:  # in quotes: the comma cannot part cells too
-            said = f'delimiter = ";", {said} and part cells by ";"'
+            setting = f'delimiter = ";", {setting} and part cells by ";"'
         return (
             f'; a decimal "{other}" is not read here: write {written}, or say [table] '
-            f"{said}"
+            f"{setting}"
         )
     if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:
         taken = name.startswith(("meas.", "sigma."))

@@ -69,7 +69,7 @@ def diagnose(
         conditions = register(campaign.take(rows.fitted), conditions)
     impossible = impossible_rows(campaign)
     outliers = impossible.copy()
-    factor, slack = np.ones(6), 1.0
+    factor, inflation = np.ones(6), 1.0
     for _ in range(_PASSES):
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
@@ -94,10 +94,10 @@ def diagnose(
         )
         if np.any(larger > 1.0):
             factor = factor * larger
-        elif slack == 1.0 and lack.significant and lack.rms > _LOOSE:
+        elif inflation == 1.0 and lack.significant and lack.rms > _LOOSE:
             # what nothing explains must not be fitted as if it were known to a sigma
-            slack = lack.rms
-            larger = np.full(6, slack)
+            inflation = lack.rms
+            larger = np.full(6, inflation)
         else:
             break
         campaign = replace(campaign, sigma=campaign.sigma * larger)
@@ -109,7 +109,7 @@ def diagnose(
             split=rows,
             outliers=outliers,
             noise_factor=factor,
-            slack=slack,
+            inflation=inflation,
             selection=selection,
             learned=learned,
             finite=finite,

@@ -12,7 +12,13 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.holdout import Split
 from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.kept_aside import FittedModel, Rows, Rung, errors_of, ladder
+from validation.diagnosis.kept_aside import (
+    FittedModel,
+    RowSets,
+    Rung,
+    errors_of,
+    ladder,
+)
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
@@ -40,7 +46,7 @@ class Settled:
         split: rows fitted and rows kept aside.
         outliers: (R,) bool, rows left out of everything.
         noise_factor: (6,) by which repeats scatter more than the sigma stated.
-        slack: [-] by which sigma was made larger for what nothing explains.
+        inflation: [-] by which sigma was made larger for what nothing explains.
         selection: sets of effects, the best one fitted.
         learned: functions behind it.
         finite: whether motions of the declared model are finite.
@@ -52,7 +58,7 @@ class Settled:
     split: Split
     outliers: NDArray
     noise_factor: NDArray
-    slack: float
+    inflation: float
     selection: Selection
     learned: tuple[Learned, ...]
     finite: bool
@@ -106,7 +112,7 @@ def judge(settled: Settled) -> Diagnosis:
     before = campaign.measured - declared_model.deviation
     ranking = _ranked(settled, before)
     selection = ranking.selection
-    slack = settled.slack
+    inflation = settled.inflation
     lack = _lack_of_fit(settled, selection)
     ranking, decision, claimed = _decided(settled, ranking, lack)
     remarks = implausible(campaign, selection.fit, selection.behind)
@@ -125,10 +131,10 @@ def judge(settled: Settled) -> Diagnosis:
     outliers = settled.outliers | _outlying_held_out(settled, after)
     shown = before if decision == "none_needed" else after
     rungs = ladder(
-        campaign, settled.unregistered, model, selection.terms, Rows(used, held_out),
+        campaign, settled.unregistered, model, selection.terms, RowSets(used, held_out),
         selection.sets[0].rank, after,
     )  # fmt: skip
-    stated = replace(campaign, sigma=campaign.sigma / slack)
+    stated = replace(campaign, sigma=campaign.sigma / inflation)
     kept = held_out & ~outliers
     return Diagnosis(
         campaign=stated,
@@ -139,13 +145,15 @@ def judge(settled: Settled) -> Diagnosis:
         alternatives=ranking.sets,
         best_by_score=ranking.best,
         lack=lack,
-        declared=lack_of_fit(settled.fitting, slack * selection.tangents.residual, 0),
+        declared=lack_of_fit(
+            settled.fitting, inflation * selection.tangents.residual, 0
+        ),
         before=errors_of(stated, before, held_out),
         after=errors_of(stated, shown, held_out),
         noise=errors_of(stated, stated.sigma, held_out),
         trimmed=(errors_of(stated, before, kept), errors_of(stated, shown, kept)),
         noise_factor=settled.noise_factor,
-        ladder=tuple(_in_sigmas(rung, slack) for rung in rungs),
+        ladder=tuple(_in_sigmas(rung, inflation) for rung in rungs),
         split=settled.split,
         outliers=outliers,
         conditions=conditions,
@@ -183,7 +191,7 @@ def _lack_of_fit(settled: Settled, selection: Selection) -> LackOfFit:
     """Is what the best set leaves noise?"""
     left = selection.behind.left(selection.fit.residual)
     unknowns = selection.unknowns + round(selection.behind.unknowns)
-    return lack_of_fit(settled.fitting, settled.slack * left, unknowns)
+    return lack_of_fit(settled.fitting, settled.inflation * left, unknowns)
 
 
 def _decided(
@@ -233,7 +241,7 @@ def _outlying_held_out(settled: Settled, residual: NDArray) -> NDArray:
     return outliers
 
 
-def _in_sigmas(rung: Rung, slack: float) -> Rung:
+def _in_sigmas(rung: Rung, inflation: float) -> Rung:
     """A rung whose error is in sigmas that were not made larger."""
-    error = replace(rung.error, normalised=slack * rung.error.normalised)
+    error = replace(rung.error, normalised=inflation * rung.error.normalised)
     return replace(rung, error=error)

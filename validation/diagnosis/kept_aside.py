@@ -84,7 +84,7 @@ def errors_of(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class RowSets:
     """Which rows were fitted, and which are scored.
 
     Attributes:
@@ -127,7 +127,7 @@ class FittedModel:
 
 def ladder(
     campaign: Campaign, declared: Conditions, model: FittedModel,
-    terms: Sequence[SmallTerm], rows: Rows, rank: int, residual: NDArray,
+    terms: Sequence[SmallTerm], rows: RowSets, rank: int, residual: NDArray,
 ) -> list[Rung]:  # fmt: skip
     """The steps up to a model.
 

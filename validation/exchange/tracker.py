@@ -107,16 +107,16 @@ def import_readings(
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, told, declared.places, declared.window)
-    answer = _campaign(declared, told, joined, folder, len(readings))
+    imported = _campaign(declared, told, joined, folder, len(readings))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
         raise BadInput(f"{folder}: cannot be made: {reason}") from None
-    rows = [",".join(row) for row in (answer.header, *answer.cells)]
+    rows = [",".join(row) for row in (imported.header, *imported.cells)]
     write_text("\n".join(rows) + "\n", folder / "measurements.csv")
-    write_text(answer.declaration, folder / "campaign.toml")
-    return answer
+    write_text(imported.declaration, folder / "campaign.toml")
+    return imported
 
 
 def _nominal(declared: TargetsFile, told: Commands, command: int, target: str
@@ -203,10 +203,10 @@ def _frame(
     )
     if order is not None:
         wrong = [k for k in range(len(names)) if order[k] != k]
-        said = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
+        order_text = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
         raise BadInput(
             f"{declared.file}: targets: they fit far better exchanged, in every row: "
-            f"{said}"
+            f"{order_text}"
         )
     return robust_frame(measured[read], nominal[read])
 

@@ -23,7 +23,7 @@ from validation.multibody.exudyn_solids import add_mesh
 from validation.multibody.motion import inverse, matrix, placement, shifted
 
 
-class Placed(Protocol):
+class PlacedRobot(Protocol):
     """The part of a posture that the simulation uses."""
 
     @property
@@ -52,7 +52,7 @@ class Case:
         couple: (3,) [N m] on the platform besides, base axes, by dead forces.
     """
 
-    posture: Placed
+    posture: PlacedRobot
     scale: float
     springs: Mapping[str, NDArray]
     meshes: Mapping[str, MeshBody]
@@ -198,7 +198,7 @@ def build(model: Model, case: Case) -> Tree:
     return tree
 
 
-def _nominal(posture: Placed) -> dict[str, NDArray]:
+def _nominal(posture: PlacedRobot) -> dict[str, NDArray]:
     """(4, 4) of every frame without imperfections, before its own motion."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}

@@ -230,7 +230,7 @@ def test_figures_need_only_the_data_set(tmp_path):
     figure = figure_of(data)
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == 6
-    assert titles[-1] == "position error by play alone [mm]"
+    assert titles[-1] == "position error by clearances alone [mm]"
     assert "median of 3 draws" in {t.get_text() for t in figure.texts}
     assert "parallel: " in figure.get_suptitle()
     panel = next(a for a in figure.axes if "energy" in a.get_title())
