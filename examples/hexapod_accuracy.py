@@ -2,10 +2,10 @@
 
 Run ``python examples/hexapod_accuracy.py``; it takes some minutes.  Over a square of
 100 mm at working height the sweep draws the errors of ``hexapod_errors.toml`` at every
-posture, for ball joints with 8 and with 4 micrometres of clearance, and bounds the pose
-error (27) that errors and clearances can add up to.  Printed is, for each clearance, the
-error that 90 % of the machines stay below, at the middle of the square and at its worst
-posture, beside the error by clearances alone; and how near the square is to a
+posture, for ball joints with 8 and with 4 micrometres of clearance.  It bounds the pose
+error (27) that errors and clearances can add up to.  Printed is, for each clearance,
+the error that 90 % of the machines stay below, at the middle of the square and at its
+worst posture, beside the error by clearances alone; and how near the square is to a
 singularity.
 
 The same sweep on the command line, on two processes:

@@ -192,7 +192,15 @@ def _from_others(
             "chain (an overlay's platform says another)"
         )
     after = home_posture(robot).mismatch
-    conversion = Conversion(robot, (), before, after, held, 0.0, tuple(left_out))
+    conversion = Conversion(
+        robot=robot,
+        files=(),
+        open_before=before,
+        open_after=after,
+        drives_held=held,
+        difference=0.0,
+        left_out=tuple(left_out),
+    )
     return conversion, placed
 
 
@@ -203,7 +211,15 @@ def _declared(source: Path, overlay: Path | str | None) -> Conversion:
         content = robot_table(robot, Path(overlay).parent)
         robot = robot_of(lay_over(content, overlay), robot.name)
     mismatch = home_posture(robot).mismatch
-    return Conversion(robot, (), mismatch, mismatch, True, 0.0, ())
+    return Conversion(
+        robot=robot,
+        files=(),
+        open_before=mismatch,
+        open_after=mismatch,
+        drives_held=True,
+        difference=0.0,
+        left_out=(),
+    )
 
 
 def _written(

@@ -69,21 +69,29 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     frame, component = np.array(list(rows)).T
     count = len(rows)
     sources = ErrorSources(
-        robot,
-        frame,
-        component,
-        np.full(count, KINDS.index(distribution)),
-        np.zeros(count),
-        np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
-        np.zeros(count),
-        np.full(count, deviations),
-        np.ones(count, dtype=bool),
+        robot=robot,
+        frame=frame,
+        component=component,
+        kind=np.full(count, KINDS.index(distribution)),
+        centre=np.zeros(count),
+        scale=np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
+        least=np.zeros(count),
+        limit=np.full(count, deviations),
+        signed=np.ones(count, dtype=bool),
     )
     return Plan(
-        sources, np.array(list(rows.values())), tuple(names), np.array(costs),
-        np.array(least), np.array(most), limits or {"margin_free": 1.0}, cost,
-        float(asked_yield), int(draws), int(seed),
-    )  # fmt: skip
+        sources=sources,
+        group=np.array(list(rows.values())),
+        names=tuple(names),
+        costs=np.array(costs),
+        least=np.array(least),
+        most=np.array(most),
+        limits=limits or {"margin_free": 1.0},
+        cost=cost,
+        asked_yield=float(asked_yield),
+        draws=int(draws),
+        seed=int(seed),
+    )
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:

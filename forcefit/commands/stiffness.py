@@ -121,7 +121,14 @@ def beam(
     from stiffness.report.results import link_results, link_text
 
     options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, theory, section
+        young=young,
+        poisson=poisson,
+        radius=radius,
+        inner_radius=inner_radius,
+        width=width,
+        height=height,
+        theory=theory,
+        section_text=section,
     )
     along = parse_axis("--axis", axis)
     tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
@@ -224,7 +231,14 @@ def compare(
     from stiffness.report.results import comparison_results, comparison_text
 
     options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, theory, section
+        young=young,
+        poisson=poisson,
+        radius=radius,
+        inner_radius=inner_radius,
+        width=width,
+        height=height,
+        theory=theory,
+        section_text=section,
     )
     (E, nu), roll = options.material(), _up(up)
     if curve is not None:

@@ -104,14 +104,14 @@ def _declared(root: Table) -> _Declared:
     """All of ``campaign.toml`` but its robot."""
     folder = Path(root.file).parent
     declared = _Declared(
-        root,
-        folder.resolve().name,
-        tuple(folder / name for name in _table_names(root)),
-        root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4),
-        _read_points(root),
-        root.choice("registration", ("known", "unknown"), "known"),
-        _read_noise(root),
-        read_dialect(root),
+        root=root,
+        name=folder.resolve().name,
+        files=tuple(folder / name for name in _table_names(root)),
+        point=root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4),
+        points=_read_points(root),
+        registration=root.choice("registration", ("known", "unknown"), "known"),
+        noise=_read_noise(root),
+        dialect=read_dialect(root),
     )
     root.finish()
     return declared

@@ -189,11 +189,17 @@ def _carried(
         worst = np.flatnonzero(blame > 0.1 * blame.max())
         open_ = tuple(names[k][1] for k in worst)
     return Carried(
-        session, tuple(names), fit.values, np.sqrt(np.diag(fit.covariance)),
-        (int(setup.sum()), int((~setup).sum())), error_of(rest, fit.deviation[~setup]),
-        error_of(declared.take(~setup), other.deviation[~setup]), uncertainty, left,
-        open_,
-    )  # fmt: skip
+        session=session,
+        names=tuple(names),
+        values=fit.values,
+        std=np.sqrt(np.diag(fit.covariance)),
+        rows=(int(setup.sum()), int((~setup).sum())),
+        error=error_of(rest, fit.deviation[~setup]),
+        declared=error_of(declared.take(~setup), other.deviation[~setup]),
+        uncertainty=uncertainty,
+        left=left,
+        open_=open_,
+    )
 
 
 def _names(

@@ -130,10 +130,17 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     )
     at_limit = np.asarray((q <= limits[0]) | (q >= limits[1]))
     return Compensation(
-        targets, tuple(robot.frames[i].name for i in driven), q,
-        there.conditions.transforms, last.coordinates, before, there.error, spread,
-        np.asarray(at_limit.any(axis=1)), reason,
-    )  # fmt: skip
+        targets=targets,
+        drives=tuple(robot.frames[i].name for i in driven),
+        commands=q,
+        transforms=there.conditions.transforms,
+        coordinates=last.coordinates,
+        before=before,
+        after=there.error,
+        spread=spread,
+        limited=np.asarray(at_limit.any(axis=1)),
+        reason=reason,
+    )
 
 
 def _each_once(targets: Campaign) -> Campaign:

@@ -114,9 +114,15 @@ def _curve(
     value_unit = f"rad{given.removeprefix('1')}" if turns else given
     x_unit = "s" if along == "time" else whole_unit(variable_unit(robot, along))
     return Curve(
-        function, component, along, fixed, x, values, np.sqrt(variance),
-        (x_unit, value_unit),
-    )  # fmt: skip
+        function=function,
+        component=component,
+        variable=along,
+        beside=fixed,
+        x=x,
+        values=values,
+        std=np.sqrt(variance),
+        units=(x_unit, value_unit),
+    )
 
 
 def _values(

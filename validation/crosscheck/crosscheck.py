@@ -222,7 +222,15 @@ def crosscheck(
             if clearances
             else PoseMetric(robot, pairs, springs, bool(g.any()))
         )
-        return Crosscheck(compared, wrench, links, g, pairs, asked, metric)
+        return Crosscheck(
+            posture=compared,
+            load=wrench,
+            links=links,
+            gravity=g,
+            pairs=pairs,
+            asked=asked,
+            metric=metric,
+        )
 
     return compare_scales(scales, solve, judge)
 

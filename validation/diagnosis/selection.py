@@ -193,7 +193,15 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
     columns = np.hstack([np.zeros((len(tangents.residual), 0)),
                          *(s.columns for s in tangent)])  # fmt: skip
     return Selection(
-        screen, sets, chosen, rivals, unknowns, tangents, behind, screens.terms, columns
+        screen=screen,
+        sets=sets,
+        fit=chosen,
+        rivals=rivals,
+        unknowns=unknowns,
+        tangents=tangents,
+        behind=behind,
+        terms=screens.terms,
+        columns=columns,
     )
 
 

@@ -118,9 +118,14 @@ def _term(
     shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
     frame = np.repeat(np.arange(count), 6)
     return SmallTerm(
-        name, frame[shown], axis[shown], columns[:, shown], known[shown], lower,
-        bool(np.isfinite(known[shown]).any()),
-    )  # fmt: skip
+        name=name,
+        frame=frame[shown],
+        axis=axis[shown],
+        columns=columns[:, shown],
+        given=known[shown],
+        lower=lower,
+        sure=bool(np.isfinite(known[shown]).any()),
+    )
 
 
 def added(

@@ -180,8 +180,17 @@ def _campaign(
     labels = _labels(told, rows)
     cells = tuple((a, *map(_cell, row)) for a, row in zip(labels, values, strict=True))
     text = _declaration(declared, folder, np.array(spread)[read[kept]])
-    return Import(declared.robot.name, joined.how, header, cells, text, frame, scatter,
-                  int(read.sum()), tuple(left_out))  # fmt: skip
+    return Import(
+        robot=declared.robot.name,
+        how=joined.how,
+        header=header,
+        cells=cells,
+        declaration=text,
+        frame=frame,
+        scatter=scatter,
+        readings=int(read.sum()),
+        left_out=tuple(left_out),
+    )
 
 
 def _frame(
