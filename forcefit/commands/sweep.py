@@ -3,7 +3,7 @@
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from forcefit.commands.options import (
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from assembly.sweeps.sweep import Solver
 
 
 def sweep(
@@ -100,7 +103,7 @@ def sweep(
         summary_of,
         summary_text,
     )
-    from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
+    from assembly.sweeps.sweep import journal_path, run_sweep
 
     if workers is not None and scheduler is not None:
         raise BadInput("sweep: found --workers and --scheduler, expected one of them")
@@ -125,11 +128,7 @@ def sweep(
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
     done = [0]
-    solver: Solver = solve_here
-    if workers is not None or scheduler is not None:
-        from assembly.sweeps.cluster import cluster_solver
-
-        solver = cluster_solver(workers, scheduler)
+    solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written
     try:
         with progress_bars() as update:
@@ -154,6 +153,17 @@ def sweep(
     held.close()
     if json != "-":
         print(summary_text(summary, data))
+
+
+def _solver(workers: int | None, scheduler: str | None) -> "Solver":
+    """What solves blocks of points: this process, others beside it, or a cluster."""
+    if workers is None and scheduler is None:
+        from assembly.sweeps.sweep import solve_here
+
+        return solve_here
+    from assembly.sweeps.cluster import cluster_solver
+
+    return cluster_solver(workers, scheduler)
 
 
 def plot(

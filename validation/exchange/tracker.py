@@ -146,20 +146,10 @@ def _campaign(
     )
     left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
     for i, (command, readings) in enumerate(joined.rows):
-        ks = np.flatnonzero(read[i])
-        order = exchanged_here(base[i, ks], nominal[i, ks], scatter)
-        for place, k in enumerate(ks.tolist()):
-            gap = float(np.linalg.norm(base[i, k] - nominal[i, k]))
-            reason = ""
-            if order is not None and order[place] != place:
-                reason = f"it is {quoted(names[ks[order[place]]])}, exchanged"
-            elif is_gross(gap, scatter):
-                reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
-            if reason:
-                label = told.ids[command]
-                place_of = readings[names[k]].place
-                left_out.append(f"{place_of}: command {quoted(label)}: {reason}")
-                read[i, k] = False
+        for k, reason in _suspects(base[i], nominal[i], read[i], scatter, names):
+            label, place = told.ids[command], readings[names[k]].place
+            left_out.append(f"{place}: command {quoted(label)}: {reason}")
+            read[i, k] = False
     total -= len(joined.strangers)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
@@ -191,6 +181,24 @@ def _campaign(
         readings=int(read.sum()),
         left_out=tuple(left_out),
     )
+
+
+def _suspects(
+    base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
+) -> list[tuple[int, str]]:
+    """Targets of one command, read where they cannot stand, and why."""
+    suspects = []
+    ks = np.flatnonzero(read)
+    order = exchanged_here(base[ks], nominal[ks], scatter)
+    for place, k in enumerate(ks.tolist()):
+        gap = float(np.linalg.norm(base[k] - nominal[k]))
+        if order is not None and order[place] != place:
+            other = quoted(names[ks[order[place]]])
+            suspects.append((k, f"it is {other}, exchanged"))
+        elif is_gross(gap, scatter):
+            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
+            suspects.append((k, reason))
+    return suspects
 
 
 def _frame(
