@@ -1,6 +1,7 @@
 """The commands ``forcefit stiffness ...``: parse, call, print or save."""
 
 import logging
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ import typer
 from forcefit.commands.library import library
 from forcefit.commands.link_exchange import export, import_
 from forcefit.commands.options import JsonOption
+from forcefit.commands.progress import progress_bars
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
@@ -289,9 +291,6 @@ def slenderness(
 
     r is twice the section's larger radius of gyration, a round bar's radius.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_sizes
     from stiffness.report.results import sweep_results, sweep_text
@@ -305,11 +304,11 @@ def slenderness(
     accuracy = _accuracy(accuracy)
     if figure is not None:
         check_writable(figure, PICTURE)
-    with Progress(console=Console(stderr=True)) as bars:
-        task = bars.add_task("lengths", total=len(wanted))
+    with progress_bars() as update:
+        update("lengths", 0, len(wanted))
         sweep = sweep_slenderness(
             declared, E, nu, wanted, accuracy=accuracy, interface=interface,
-            update=lambda done, total: bars.update(task, completed=done, total=total),
+            update=partial(update, "lengths"),
         )  # fmt: skip
     if figure is not None:
         from stiffness.report.plot import plot_slenderness
