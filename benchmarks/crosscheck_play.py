@@ -15,7 +15,11 @@ from assembly.linear.energy import solve_assembly
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.clearance_metric import FLOOR_ENERGY
 from validation.crosscheck.pair import exact_solution
-from validation.multibody.simulation import SimulationFailed, simulate_assembly
+from validation.multibody.simulation import (
+    SimulationFailed,
+    SimulationModel,
+    simulate_assembly,
+)
 
 
 def posture(name: str, seed: int) -> Posture:
@@ -43,7 +47,9 @@ def main() -> None:
             case = posture(name, seed)
             started = time.perf_counter()
             try:
-                simulated = simulate_assembly(case, clearances=True)
+                simulated = simulate_assembly(
+                    case, model=SimulationModel(clearances=True)
+                )
             except SimulationFailed as error:
                 print(f"  {name} {seed}: {error}")
                 continue

@@ -94,6 +94,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
         rows=60 if many else 116,
         reach=drawn.reach,
         load=load,
+        reference_point=tuple(drawn.point),
         humidity="_humidity" in names or rng.random() < 0.3,
         temperature="around" if "_quadratic_temperature" in names else "swing",
     )
@@ -102,14 +103,13 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
         robot = robot.with_errors(30 * robot.errors)
     if kind != "confounded":
         return generate_campaign(
-            robot, wanted, design, Noise(), drawn.point, int(rng.integers(2**31)),
-            "springs",
-        )  # fmt: skip
+            robot, wanted, design, Noise(), int(rng.integers(2**31)), "springs"
+        )
     # a beam that is longer, or warmer by always the same: nothing can tell them apart
     hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
     fixed = replace(design, temperature="constant")
     return generate_campaign(
-        robot, [(hidden, wanted[names[0]])], fixed, Noise(), drawn.point,
+        robot, [(hidden, wanted[names[0]])], fixed, Noise(),
         int(rng.integers(2**31)), "springs",
     )  # fmt: skip
 

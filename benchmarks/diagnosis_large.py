@@ -38,10 +38,13 @@ def make(folder: Path, case: int) -> None:
     for attempt in range(TRIES):
         rng = np.random.default_rng([77, case, attempt])
         drawn = draw_robot(rng, kind)
-        design = CampaignDesign(configurations, rows, drawn.reach, load=drawn.load)
+        design = CampaignDesign(
+            configurations, rows, drawn.reach, load=drawn.load,
+            reference_point=tuple(drawn.point),
+        )  # fmt: skip
         try:
             campaign = generate_campaign(
-                drawn.robot, {hidden: 5.0}, design, Noise(), drawn.point,
+                drawn.robot, {hidden: 5.0}, design, Noise(),
                 int(rng.integers(2**31)), "springs",
             )  # fmt: skip
         except (SimulationFailed, BadInput):

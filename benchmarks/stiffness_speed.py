@@ -75,14 +75,14 @@ def given(name):
 def ours(name, accuracy):
     """From the surface to K, and the last mesh once more by itself."""
     from stiffness.fem.condensation import condense
-    from stiffness.fem.fea import Budget, solve_link
+    from stiffness.fem.fea import Budget, FemOptions, solve_link
     from stiffness.fem.material import Material
 
     surface, faces, _ = given(name)
     with tempfile.TemporaryDirectory() as folder:
         solved = solve_link(surface, *faces, [Material(60e9, 0.3)],
-            accuracy=float(accuracy), cache=Path(folder),
-            budget=Budget(seconds=7200))  # fmt: skip
+            options=FemOptions(float(accuracy), budget=Budget(seconds=7200),
+                               cache=Path(folder)))  # fmt: skip
     whole, wall, level = used(), time.monotonic() - START, solved.level
     condense(level.mesh, *level.material.T[:2], solved.centers)
     link = solved.link

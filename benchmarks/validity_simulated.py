@@ -15,7 +15,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.energy import solve_assembly
 from validation.assumptions.bushes import solve_bushes
 from validation.crosscheck.spread_weight import energy_between_ends
-from validation.multibody.simulation import simulate_assembly
+from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 ELEMENTS = 8  # of each beam under its weight
 
@@ -33,7 +33,9 @@ def closures(at: Posture) -> tuple[float, ...]:
 
 def weights(at: Posture) -> tuple[float, ...]:
     """[um] [%] against the ends' equivalents, [%] with what is between them."""
-    assembly = simulate_assembly(at, gravity=GRAVITY, elements=ELEMENTS)
+    assembly = simulate_assembly(
+        at, model=SimulationModel(elements=ELEMENTS), gravity=GRAVITY
+    )
     ends = solve_assembly(at, gravity=GRAVITY)
     shift = (assembly.platform_screw - ends.platform_screw)[3:]
     whole = ends.energy + energy_between_ends(at, GRAVITY, ELEMENTS)
@@ -48,7 +50,9 @@ def discs(at: Posture) -> tuple[float, ...]:
     """[%] what bushes cost more by cones, and by contacts at a sixteenth of all."""
     by_cones = solve_bushes(at).energy / solve_assembly(at).energy
     disc, bushes = (
-        simulate_assembly(at, 1 / 16, clearances=True, bushes=b).rigid_energy
+        simulate_assembly(
+            at, 1 / 16, SimulationModel(clearances=True, bushes=b)
+        ).rigid_energy
         for b in (False, True)
     )
     return 100 * (by_cones - 1), 100 * (bushes / disc - 1)

@@ -2,10 +2,11 @@
 
 Run ``python examples/hexapod_accuracy.py``; it takes some minutes.  Over a square of
 100 mm at working height the sweep draws the errors of ``hexapod_errors.toml`` at every
-posture, for ball joints with 8 and with 4 micrometres of play, and bounds the pose
-error (27) that errors and play can add up to.  Printed is, for each play, the error
-that 90 % of the machines stay below, at the middle of the square and at its worst
-posture, beside the error by play alone; and how near the square is to a singularity.
+posture, for ball joints with 8 and with 4 micrometres of clearance.  It bounds the pose
+error (27) that errors and clearances can add up to.  Printed is, for each clearance,
+the error that 90 % of the machines stay below, at the middle of the square and at its
+worst posture, beside the error by clearances alone; and how near the square is to a
+singularity.
 
 The same sweep on the command line, on two processes:
 
@@ -20,11 +21,11 @@ from pathlib import Path
 
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import run_sweep
 
 HERE = Path(__file__).parent
-PLAY = "ball_3.clearance.axial"
+CLEARANCE = "ball_3.clearance.axial"
 
 
 def main():
@@ -37,28 +38,31 @@ def main():
     square = ",".join(f"{axis}=-0.05:0.05:{options.step}" for axis in ("tx", "ty"))
     asked = ask_sweep(
         "hexapod",
-        grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
-        vary=[f"{PLAY}=8e-6,4e-6"],
-        errors=HERE / "hexapod_errors.toml",
-        draws=options.draws,
-        play_alone=True,
+        SweepOptions(
+            grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
+            vary=[f"{CLEARANCE}=8e-6,4e-6"],
+            errors=HERE / "hexapod_errors.toml",
+            draws=options.draws,
+            play_alone=True,
+        ),
     )
     run_sweep(asked, options.output)
     data = open_dataset(options.output).squeeze()
-    for place, part in data.groupby(PLAY):
+    for place, part in data.groupby(CLEARANCE):
         print_errors(float(place), part.squeeze())
-    near = data["singular_distance"].min(["tx", "ty", "draw", PLAY])
+    near = data["singular_distance"].min(["tx", "ty", "draw", CLEARANCE])
     said = ", ".join(f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values)
     print(f"least distances to singularities in the square: {said}")
-    figure = figure_of(data, {PLAY: 8e-6})
+    figure = figure_of(data, {CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 
 
-def print_errors(play, data):
-    """Errors of the middle and of the worst posture, at one play."""
+def print_errors(clearance, data):
+    """Errors of the middle and of the worst posture, at one clearance."""
     upper = data.sel(bound="upper")
     print(
-        f"ball joints with {play * 1e6:.0f} um of play, {data.sizes['draw']} machines:"
+        f"ball joints with {clearance * 1e6:.0f} um of clearance, "
+        f"{data.sizes['draw']} machines:"
     )
     for part, factor, unit in (("translation", 1e6, "um"), ("rotation", 1e6, "urad")):
         share = factor * upper[f"{part}_error"].quantile(0.9, "draw")
@@ -66,7 +70,7 @@ def print_errors(play, data):
         middle = share.sel(tx=0, ty=0, method="nearest")
         print(f"  {part:11s} 90 % below {float(middle):.0f} {unit} in the middle, "
               f"{float(share.max()):.0f} {unit} at the worst posture; "
-              f"by play alone {float(alone.max()):.0f} {unit}")  # fmt: skip
+              f"by clearances alone {float(alone.max()):.0f} {unit}")  # fmt: skip
 
 
 if __name__ == "__main__":

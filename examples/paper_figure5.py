@@ -19,7 +19,7 @@ from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_n
 from assembly.robots import load_robot
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import run_sweep
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
@@ -52,7 +52,9 @@ def main():
         base = options.output / f"figure5_{signs}"
         errors = draw_errors(robot, ErrorDraw(frames, LEAST, MOST, 1, signs))
         write_robot(robot.with_errors(errors), base.with_suffix(".toml"))
-        asked = ask_sweep(str(base.with_suffix(".toml")), grid=grid, play_alone=True)
+        asked = ask_sweep(
+            str(base.with_suffix(".toml")), SweepOptions(grid=grid, play_alone=True)
+        )
         run_sweep(asked, base.with_suffix(".nc"))
         data = open_dataset(base.with_suffix(".nc"))
         figure_of(data).savefig(base.with_suffix(".png"), dpi=150)
@@ -64,7 +66,7 @@ def print_table(signs, data, column):
     reached = data["status"] == "ok"
     inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
     print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % go "
-          "together by play with compliant joints free")  # fmt: skip
+          "together by clearances with compliant joints free")  # fmt: skip
     for name, factor, unit, *reference in ROWS:
         values = data[name]
         if "bound" in values.dims:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 SCREW = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 WRENCH = ("MX", "MY", "MZ", "FX", "FY", "FZ")
+UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def skew(vector: ArrayLike) -> NDArray:

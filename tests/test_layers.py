@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,31 @@ def wrong_imports(tree):
                     yield f"{file} imports {module}"
 
 
+def circle(tree):
+    """Names of modules of which each is imported by the one before; none is right."""
+    files = {
+        ".".join(path.relative_to(tree).with_suffix("").parts): path
+        for package in PACKAGES
+        for path in sorted((tree / package).rglob("*.py"))
+    }
+    files = {name.removesuffix(".__init__"): path for name, path in files.items()}
+    graph = {
+        name: {
+            # of "from module import name" one or the other is a file
+            one
+            for module in imports(path)
+            for one in (module, module.rpartition(".")[0])
+            if one in files and one != name
+        }
+        for name, path in files.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
+
+
 def in_memory(code, tree):
     """Modules in memory after a fresh Python ran some code."""
     code = f"{code}\nimport sys; print(*sys.modules, file=sys.stderr)"
@@ -126,6 +152,11 @@ def loaded(modules, tree):
 
 def test_every_import_of_the_project_is_allowed():
     assert list(wrong_imports(ROOT)) == []
+
+
+def test_no_modules_import_one_another_in_a_circle():
+    """In folders too: what is below another module can be read without it."""
+    assert circle(ROOT) == []
 
 
 def test_every_folder_was_looked_at():
@@ -244,6 +275,27 @@ def test_a_forbidden_import_is_found(file, code, message, tmp_path):
     path.write_text(code)
     (found,) = wrong_imports(tmp_path)
     assert found.startswith(f"{file} {message}")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "from assembly.linear.a import x",
+        "import assembly.linear.a",
+        "from assembly.linear import a",
+        "def f():\n from assembly.linear.a import x",
+    ],
+)
+def test_a_circle_is_found(code, tmp_path):
+    """Of two files of one folder, where the floors of folders see nothing."""
+    folder = tmp_path / "assembly" / "linear"
+    folder.mkdir(parents=True)
+    (folder / "a.py").write_text("from assembly.linear.b import y")
+    types = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n "
+    (folder / "b.py").write_text(types + "from assembly.linear.a import x")
+    assert circle(tmp_path) == []
+    (folder / "b.py").write_text(code)
+    assert set(circle(tmp_path)) == {"assembly.linear.a", "assembly.linear.b"}
 
 
 def test_a_heavy_import_is_found(tmp_path):

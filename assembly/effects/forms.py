@@ -119,13 +119,13 @@ def _slow_wave(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 def _spline(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
     indices = np.array([column_indices(name) for name in names]).reshape(len(names), -1)
-    answer = np.ones((len(inputs[0]), len(names)))
+    columns = np.ones((len(inputs[0]), len(names)))
     for k, x in enumerate(inputs):
         ends = [f"{end}.{k + 1}" if len(inputs) > 1 else end for end in _ENDS]
         first, last = (shapes[end] for end in ends)
         knots = np.linspace(first, last, int(indices[:, k].max()))
-        answer *= natural_spline(knots, x)[:, indices[:, k] - 1]
-    return answer
+        columns *= natural_spline(knots, x)[:, indices[:, k] - 1]
+    return columns
 
 
 _ENDS = ("first", "last")

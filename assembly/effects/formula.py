@@ -52,9 +52,9 @@ def parse_formula(text: str) -> ast.expr:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
-        found = describe(text)
+        given = describe(text)
         raise BadInput(
-            f'found {found}, expected a formula such as "a*sin(q)"'
+            f'found {given}, expected a formula such as "a*sin(q)"'
         ) from None
     _check(tree, 0)
     return tree
@@ -81,17 +81,17 @@ def _check(node: ast.AST, depth: int) -> None:
                 raise BadInput(f"found {quoted(name)}, which is no function{hint}")
             _check(inner, depth + 1)
         case _:
-            found = quoted(ast.unparse(node))
+            part = quoted(ast.unparse(node))
             allowed = f"+ - * / **, brackets and {', '.join(FUNCTIONS)} of one number"
-            raise BadInput(f"found {found} in the formula, expected {allowed}")
+            raise BadInput(f"found {part} in the formula, expected {allowed}")
 
 
 def names_in(tree: ast.expr) -> list[str]:
     """Names of variables and parameters, in order of use."""
     called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
-    found = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
-    found.sort(key=lambda n: n.col_offset)
-    names = (n.id for n in found if id(n) not in called and n.id != "pi")
+    nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    nodes.sort(key=lambda n: n.col_offset)
+    names = (n.id for n in nodes if id(n) not in called and n.id != "pi")
     return list(dict.fromkeys(names))
 
 
@@ -147,7 +147,7 @@ def parameter_units(
     number = units.reduced(whole)
     if any(abs(k) > _SAME for k in number.values()):
         units.equal(whole, dict(result), ast.unparse(tree))
-    return units.found([n for n in names_in(tree) if n not in variables])
+    return units.of_parameters([n for n in names_in(tree) if n not in variables])
 
 
 @dataclass
@@ -191,10 +191,10 @@ class _Units:
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
         """A unit with what is known of parameters put in."""
-        answer: dict[str, float] = {}
+        reduction: dict[str, float] = {}
         for name, k in unit.items():
-            answer = _added(answer, self.known.get(name, {name: 1.0}), k)
-        return {name: k for name, k in answer.items() if abs(k) > _SAME}
+            reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
+        return {name: k for name, k in reduction.items() if abs(k) > _SAME}
 
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
@@ -212,7 +212,7 @@ class _Units:
                 f"units clash in {quoted(where)}: found {pair[0]}, expected {pair[1]}"
             )
 
-    def found(self, names: list[str]) -> dict[str, Unit]:
+    def of_parameters(self, names: list[str]) -> dict[str, Unit]:
         """Units of parameters; what nothing says is a number."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {

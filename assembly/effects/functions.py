@@ -46,7 +46,7 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
         Names without ``cov.``; ``time`` where a form counts it, ``approach`` where a
         direction has no row before it to follow from.
     """
-    found: dict[str, str] = {}
+    owners: dict[str, str] = {}
     for function in robot.functions:
         if function.session not in (None, *sessions):
             continue
@@ -54,8 +54,8 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
         form = FORMS.get(function.form)
         if form is not None and form.remembers:
             names.append("approach" if form.name == "reversal" else "time")
-        found |= dict.fromkeys(names, function.title)
-    return found
+        owners |= dict.fromkeys(names, function.title)
+    return owners
 
 
 def _is_covariate(name: str) -> bool:
@@ -161,8 +161,8 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
         aliases = variable_names(function.variables)
         known = {name: np.asarray(number) for name, number in numbers.items()}
         known |= {name: inputs[k] for name, k in aliases.items()}
-        answer = evaluate(_parsed(function.formula), known)
-        return np.broadcast_to(answer, inputs[0].shape)
+        values = evaluate(_parsed(function.formula), known)
+        return np.broadcast_to(values, inputs[0].shape)
     names = columns_of(function, component)
     columns = FORMS[function.form].basis(names, inputs, numbers)
     return columns @ np.array([numbers[name] for name in names])
@@ -178,12 +178,12 @@ def variable_names(variables: Sequence[str]) -> dict[str, int]:
         Which variable each stands for: the last part, the first part where only one
         variable has it, and the whole with ``_`` for dots.
     """
-    found: dict[str, list[int]] = {}
+    indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
         parts = name.split(".")
         for spelt in dict.fromkeys([parts[-1], parts[0], "_".join(parts)]):
-            found.setdefault(spelt, []).append(k)
-    return {name: which[0] for name, which in found.items() if len(which) == 1}
+            indices.setdefault(spelt, []).append(k)
+    return {name: which[0] for name, which in indices.items() if len(which) == 1}
 
 
 def apply_functions(

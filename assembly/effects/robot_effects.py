@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,7 +74,7 @@ def apply_robot_effects(
         load,
         mismatch=posture.mismatch,
         gravity=np.zeros(3) if gravity is None else gravity,
-        **by_argument(given),
+        covariates=given,
     )
     conditions = apply_known(declared, robot)
     g = conditions.gravity[0] if conditions.gravity.any() else None
@@ -87,19 +86,6 @@ def apply_robot_effects(
     if not robot.has_effects:
         effective = posture
     return AppliedEffects(effective, conditions.load_at_origin()[0], g, conditions)
-
-
-def by_argument(under: Mapping[str, float | str]) -> dict[str, Any]:
-    """The values of ``--under``, as :func:`as_declared` takes them.
-
-    Args:
-        under: numbers by name, and ``session``.
-
-    Returns:
-        Its arguments ``covariates`` and ``session``.
-    """
-    numbers = {name: value for name, value in under.items() if name != "session"}
-    return {"covariates": numbers, "session": under.get("session")}
 
 
 def check_covariates(

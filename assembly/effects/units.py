@@ -57,13 +57,13 @@ def units_of(robot: Robot, function: Function) -> dict[str, str]:
     Returns:
         By parameter, such as ``"rad/K"``.
     """
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for component in function.components:
         for name in parameters_of(function, component):
             full = f"{component}.{name}"
             full = full if full in function.parameters else name
-            found[full] = _parameter_unit(robot, function, component, name)
-    return {name: found[name] for name in function.parameters}
+            units[full] = _parameter_unit(robot, function, component, name)
+    return {name: units[name] for name in function.parameters}
 
 
 def _parameter_unit(

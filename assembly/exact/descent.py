@@ -31,31 +31,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh, svd
+from scipy.linalg import cho_factor, cho_solve, svd
 
-from assembly.exact.contact_qp import (
-    AT_BOUNDARY,
-    ClearanceProblem,
-    boundary_normals,
-    clearance_step,
-    cone_multipliers,
-)
+from assembly.exact.contact_qp import ClearanceProblem, clearance_step
 from assembly.exact.dead_load import (
     DeadLoads,
     curvature_of,
     largest_wrench,
-    load_magnitudes,
     work_gradient,
     work_of,
 )
 from assembly.exact.placement import Placement, place
 from assembly.linear.thresholds import ROWS_RANK, rank_tolerance
-from assembly.solvers.conic import SolverFailed, cone_sizes, into_cones
+from assembly.solvers.conic import SolverFailed, into_cones
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths]
 _SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] whose wrenches count as small
-_ANGLE_ROUNDING = 1e-5  # of that residual: rounding of an angle
 _LEAST_DAMPING = 1e-9  # of the largest closure wrench: resists what nothing else does
 _FIRST_DAMPING = 1e-8  # of the same, where more is needed
 _ATTEMPTS = 40  # at a step, each damped eight times as much
@@ -287,7 +279,7 @@ def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
     )
     step = clearance_step(problem, near)
     if step is None:
-        status = "no play within its bounds closes what no spring can"
+        status = "no clearance within its bounds closes what no spring can"
         raise NotConverged(problem_name(at), status)
     u, rigid = step
     z = np.concatenate([u, -relaxed[:, nu] - relaxed[:, :nu] @ u])
@@ -318,91 +310,3 @@ def _restored(local: Expansion, change: NDArray) -> Placement:
             break
         after = better
     return after
-
-
-def imbalance(local: Expansion) -> float:
-    """How far a placement is from equilibrium.
-
-    Args:
-        local: the expansion there.
-
-    Returns:
-        [-] largest generalised force on an unknown that nothing balances, relative to
-        the sizes of those that act on it, or to those of a residual of 1e-9.
-    """
-    at, A, model = local.placement, local.placement.rows, local.placement.model
-    unbalanced = local.gradient - A.T @ local.multipliers
-    wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
-    loads = load_magnitudes(at, local.loads)
-    acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # inside a cone the force is zero; at its boundary it is normal to it
-    u, group = at.x[model.bounded], model.joints.group
-    force = cone_multipliers(u, unbalanced[model.bounded], group)
-    unbalanced[model.bounded] += force[group] * u
-    complementarity = np.zeros(len(unbalanced))
-    complementarity[model.bounded] = (force * (1.0 - cone_sizes(u, group)))[group]
-    worst = np.maximum(np.abs(unbalanced), np.abs(complementarity))
-    return float(np.max(worst / np.maximum(acting, 1e-30), initial=0.0))
-
-
-def least_curvature(local: Expansion) -> float:
-    """Whether an equilibrium is stable.
-
-    Args:
-        local: the expansion there.
-
-    Returns:
-        [J/rad^2] least second derivative of the potential along the motions that keep
-        closures and active constraints, per squared rad and reference length of all
-        screws together; positive at a strict minimum, inf if nothing can move.
-    """
-    D, H = tangent_space(local)
-    if not D.shape[1]:
-        return np.inf
-    metric = D.T @ local.placement.model.metric @ D
-    return float(eigh(H, metric, eigvals_only=True)[0])
-
-
-def tangent_space(
-    local: Expansion, hold_touching: bool = False
-) -> tuple[NDArray, NDArray]:
-    """Motions near an equilibrium that keep closures and active clearances.
-
-    Args:
-        local: the expansion there.
-        hold_touching: whether clearances at their bound that carry no force keep it
-            too.
-
-    Returns:
-        (N, k) a basis of them, and (k, k) [J] the potential's second derivative there.
-    """
-    at, model = local.placement, local.placement.model
-    u, group = at.x[model.bounded], model.joints.group
-    active, force = active_clearances(local)
-    if hold_touching:
-        active = active | (cone_sizes(u, group) >= 1.0 - AT_BOUNDARY)
-    B, nu = local.basis, len(group)
-    C = np.hstack([boundary_normals(u, active, group), local.rigid_rows.T])
-    C = np.vstack([C, np.zeros((B.shape[1] - nu, C.shape[1]))])
-    D = B @ np.linalg.qr(C, mode="complete")[0][:, np.linalg.matrix_rank(C) :]
-    H = local.hessian.copy()
-    H[~local.unbounded, ~local.unbounded] += force[group]
-    return D, D.T @ H @ D
-
-
-def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
-    """Clearances that carry a force at an equilibrium.
-
-    Args:
-        local: the expansion there.
-
-    Returns:
-        (cones,) bool, and (cones,) [J] the force on each bound times the bound.
-    """
-    at, model = local.placement, local.placement.model
-    u, group = at.x[model.bounded], model.joints.group
-    gradient = local.gradient - at.rows.T @ local.multipliers
-    force = cone_multipliers(u, gradient[model.bounded], group)
-    bound = np.sqrt(np.bincount(group, weights=np.diag(model.metric)[model.bounded]))
-    rounding = _ANGLE_ROUNDING * local.small_wrench * bound
-    return force > np.maximum(1e-9 * force.max(initial=0.0), rounding), force

@@ -44,11 +44,10 @@ from assembly.exact.descent import (
     advance,
     energy_of,
     expand,
-    imbalance,
-    least_curvature,
     potential,
     problem_name,
 )
+from assembly.exact.equilibrium import imbalance, least_curvature
 from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
 from assembly.exact.placement import Placement, place
 from assembly.kinematics.pieces import CutRobot, cut_beams

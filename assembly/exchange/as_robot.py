@@ -31,7 +31,7 @@ Places = Mapping[str, tuple[str, NDArray]]
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class RobotAndMechanism:
     """A robot beside the mechanism it is.
 
     Attributes:
@@ -82,7 +82,7 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
     return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
 
 
-def robot_of_mechanism(mechanism: Mechanism) -> Placed:
+def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     """The robot that a mechanism is.
 
     Args:
@@ -135,7 +135,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> Placed:
         places[body.name] = name, after
     closures = tuple((places[k.first][0], places[k.second][0]) for k in mechanism.loops)
     robot = Robot(mechanism.name, places[platform][0], tuple(frames), closures)
-    return Placed(robot, mechanism, places)
+    return RobotAndMechanism(robot, mechanism, places)
 
 
 def guess_platform(mechanism: Mechanism) -> str:
@@ -181,8 +181,8 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
 
 
-def mechanism_of_robot(robot: Robot, home: NDArray) -> Placed:
-    """The mechanism that a robot is: rigid, without play, its errors left aside.
+def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
+    """The mechanism that a robot is: rigid, without clearance, its errors left aside.
 
     Args:
         robot: of n frames.
@@ -224,7 +224,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> Placed:
         ),
         platform=on[robot.platform],
     )
-    return Placed(robot, mechanism, places)
+    return RobotAndMechanism(robot, mechanism, places)
 
 
 def _unlike(name: str, taken: set[str]) -> str:

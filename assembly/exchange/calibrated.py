@@ -48,7 +48,7 @@ def with_calibration(home: Posture) -> Robot:
 
 
 def not_rigid(robot: Robot) -> tuple[str, ...]:
-    """What a robot file says and a rigid robot without play cannot hold, in words."""
+    """In words, what of a robot file no rigid robot without clearance can hold."""
     frames = robot.frames
     kinds = {
         "elastic links": [f.name for f in frames if f.link is not None],

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from assembly.exchange.as_robot import (
-    Placed,
+    RobotAndMechanism,
     mechanism_of_robot,
     points_as_joints,
     robot_of_mechanism,
@@ -145,24 +145,24 @@ def convert(
     source, target = Path(source), Path(target)
     ending = target.suffix.lower()
     if ending not in _KINDS:
-        found = f"the ending {quoted(target.suffix)}" if target.suffix else "no ending"
-        raise BadInput(f"{target}: found {found}, expected {' or '.join(_KINDS)}")
+        given = f"the ending {quoted(target.suffix)}" if target.suffix else "no ending"
+        raise BadInput(f"{target}: found {given}, expected {' or '.join(_KINDS)}")
     beside = target.with_suffix(".yaml") if ending == ".urdf" else None
     check_writable(target, _KINDS[ending])
     if beside is not None:
         check_writable(beside, _LOOPS)
     if source.suffix.lower() in _READERS:
-        answer, placed = _from_others(source, loops, overlay)
+        conversion, placed = _from_others(source, loops, overlay)
     elif loops is not None:
         raise BadInput(f"--loops: found one beside {source}, which says its own loops")
     else:
-        answer, placed = _declared(source, overlay), None
-    return _written(answer, placed, target)
+        conversion, placed = _declared(source, overlay), None
+    return _written(conversion, placed, target)
 
 
 def _from_others(
     source: Path, loops: Path | str | None, overlay: Path | str | None
-) -> tuple[Conversion, Placed]:
+) -> tuple[Conversion, RobotAndMechanism]:
     """The robot of a file of another program."""
     ending = source.suffix.lower()
     if loops is None and ending == ".urdf":
@@ -192,7 +192,15 @@ def _from_others(
             "chain (an overlay's platform says another)"
         )
     after = home_posture(robot).mismatch
-    conversion = Conversion(robot, (), before, after, held, 0.0, tuple(left_out))
+    conversion = Conversion(
+        robot=robot,
+        files=(),
+        open_before=before,
+        open_after=after,
+        drives_held=held,
+        difference=0.0,
+        left_out=tuple(left_out),
+    )
     return conversion, placed
 
 
@@ -203,12 +211,22 @@ def _declared(source: Path, overlay: Path | str | None) -> Conversion:
         content = robot_table(robot, Path(overlay).parent)
         robot = robot_of(lay_over(content, overlay), robot.name)
     mismatch = home_posture(robot).mismatch
-    return Conversion(robot, (), mismatch, mismatch, True, 0.0, ())
+    return Conversion(
+        robot=robot,
+        files=(),
+        open_before=mismatch,
+        open_after=mismatch,
+        drives_held=True,
+        difference=0.0,
+        left_out=(),
+    )
 
 
-def _written(answer: Conversion, placed: Placed | None, target: Path) -> Conversion:
+def _written(
+    conversion: Conversion, placed: RobotAndMechanism | None, target: Path
+) -> Conversion:
     """Write, read back and compare in a folder of its own, then where it belongs."""
-    ending, robot = target.suffix.lower(), answer.robot
+    ending, robot = target.suffix.lower(), conversion.robot
     with TemporaryDirectory() as folder:
         trial = Path(folder) / target.name
         if ending == ".toml":
@@ -219,7 +237,7 @@ def _written(answer: Conversion, placed: Placed | None, target: Path) -> Convers
             difference = largest_difference(replace(placed, robot=read_robot(trial)))
             texts: dict[Path, str] = {}
         else:
-            answer, built = _built_in(answer)
+            conversion, built = _built_in(conversion)
             texts = _texts(built.mechanism, target)
             for path, text in texts.items():
                 write_text(text, trial.with_suffix(path.suffix))
@@ -235,18 +253,18 @@ def _written(answer: Conversion, placed: Placed | None, target: Path) -> Convers
     for path, text in texts.items():
         write_text(text, path)
     files = tuple(texts) or (target,)
-    return replace(answer, files=files, difference=difference)
+    return replace(conversion, files=files, difference=difference)
 
 
-def _built_in(answer: Conversion) -> tuple[Conversion, Placed]:
+def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     """The rigid mechanism of a robot, its calibration built in, its loops closed."""
-    posture = home_posture(answer.robot)
+    posture = home_posture(conversion.robot)
     robot = with_calibration(posture)
     home = posture.coordinates
     placed = mechanism_of_robot(robot, home)
     mechanism = placed.mechanism
-    left_out = [*answer.left_out, *not_rigid(answer.robot)]
-    after, held = loop_residual(mechanism, home), answer.drives_held
+    left_out = [*conversion.left_out, *not_rigid(conversion.robot)]
+    after, held = loop_residual(mechanism, home), conversion.drives_held
     if after >= CLOSED:  # errors pull the loops apart
         home, after, held = nearest_closed(mechanism, 0)
         pairs = zip(mechanism.joints, home, strict=True)
@@ -260,10 +278,10 @@ def _built_in(answer: Conversion) -> tuple[Conversion, Placed]:
     positions = dict(zip((f.name for f in robot.frames), home, strict=True))
     frames = (replace(f, position=float(positions[f.name])) for f in robot.frames)
     placed = replace(placed, robot=replace(robot, frames=tuple(frames)))
-    answer = replace(
-        answer, open_after=after, drives_held=held, left_out=tuple(left_out)
+    conversion = replace(
+        conversion, open_after=after, drives_held=held, left_out=tuple(left_out)
     )
-    return answer, placed
+    return conversion, placed
 
 
 def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:

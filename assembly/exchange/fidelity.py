@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assembly.exchange.as_robot import Placed
+from assembly.exchange.as_robot import RobotAndMechanism
 from assembly.exchange.mechanism import body_poses
 from assembly.model.robot import BASE, JOINTS
 from forcefit.inputs.errors import BadInput
@@ -12,7 +12,7 @@ FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
 _POSTURES = 100
 
 
-def largest_difference(placed: Placed) -> float:
+def largest_difference(placed: RobotAndMechanism) -> float:
     """Where bodies stand, by the mechanism and by the robot, in random postures.
 
     All joints of the trees are moved, within 1 rad or m of home: loops need not close.

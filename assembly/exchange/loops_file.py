@@ -121,8 +121,8 @@ def _yaml(path: Path | str) -> dict[str, Any]:
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise BadInput(f"{path}: not valid YAML: {one_line(str(error), 200)}") from None
     if not isinstance(content, dict):
-        found = describe(content)
-        raise BadInput(f"{path}: found {found}, expected keys such as closed_loop")
+        kind = describe(content)
+        raise BadInput(f"{path}: found {kind}, expected keys such as closed_loop")
     content = {str(k): v for k, v in content.items()}
     if "closed_loop" not in content:
         hint = nearest("closed_loop", content)

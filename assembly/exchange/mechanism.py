@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, nearest, quoted
-from stiffness.screws import rotation_matrix, transform
+from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
+WORLD = "world"  # the link that stands still
 HERE = np.eye(4)
 HERE.setflags(write=False)
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Joint:
     parent: str
     child: str
     placement: NDArray = field(default_factory=lambda: HERE)
-    axis: NDArray = field(default_factory=lambda: np.array(_AXES["z"]))
+    axis: NDArray = field(default_factory=lambda: np.array(UNIT_VECTORS["z"]))
     after: NDArray = field(default_factory=lambda: HERE)
     position: float = 0.0
     actuated: bool = False
@@ -148,8 +148,8 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
         below[joint.parent].append(joint)
     roots = [name for name in bodies if name not in carried]
     if len(roots) != 1:
-        found = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
-        raise BadInput(f"{file}: found as root {found}, expected exactly one link")
+        names = " and ".join(map(quoted, roots[:3])) or "none (a ring of parents)"
+        raise BadInput(f"{file}: found as root {names}, expected exactly one link")
     order, waiting = [], list(reversed(below[roots[0]]))
     while waiting:
         joint = waiting.pop()
@@ -223,9 +223,9 @@ def chain(
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
     """Freedoms of a ball joint as three turns, singular only far from home."""
-    return [(f"r{axis}", "revolute", np.array(_AXES[axis])) for axis in turns]
+    return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
     """Freedoms of a shift in space as three slides."""
-    return [(f"t{axis}", "prismatic", np.array(_AXES[axis])) for axis in "xyz"]
+    return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

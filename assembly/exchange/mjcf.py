@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
+    WORLD,
     Body,
     Joint,
     Loop,
@@ -35,7 +36,6 @@ _ZERO = np.zeros(3)
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
 _REFUSED = ("include", "replicate", "attach", "composite", "flexcomp")
 _HELD = ("body", "joint", "freejoint", "inertial", "site", "frame")
-WORLD = "world"
 
 
 @dataclass
@@ -232,7 +232,15 @@ def _freedoms(
         axis = given.unit_vector("axis", np.array([0.0, 0.0, 1.0]))
         ref = given.number("ref", "angle or m", 0.0)
         ref *= reading.angles.unit if kind == "revolute" else 1.0
-        joint = Joint(name, kind, "", "", there, axis, back)
+        joint = Joint(
+            name=name,
+            kind=kind,
+            parent="",
+            child="",
+            placement=there,
+            axis=axis,
+            after=back,
+        )
         # the coordinate at rest is ref: the joint's own zero lies before it
         yield replace(joint, placement=there @ motion(joint, -ref), position=ref)
 
@@ -266,7 +274,7 @@ def _at_key(
 
 def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...]]:
     """Joints that follow another become drives of their own, which must be said."""
-    joints, said = list(reading.joints), []
+    joints, remarks = list(reading.joints), []
     for group in root.children("equality"):
         for node in group.children("joint"):
             name = node.text("joint1")
@@ -276,11 +284,11 @@ def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...
             joints = [
                 replace(j, actuated=True) if j.name == name else j for j in joints
             ]
-            said.append(
+            remarks.append(
                 f"mimic: {name} follows {node.text('joint2', 'a constant')}: it is a "
                 "drive of its own, command it so"
             )
-    return joints, tuple(said)
+    return joints, tuple(remarks)
 
 
 def _loops(root: Node, reading: _Reading, poses: dict[str, NDArray]) -> Iterator[Loop]:

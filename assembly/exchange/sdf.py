@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
+    WORLD,
     Body,
     Joint,
     Loop,
@@ -33,7 +34,6 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal",
 _FRAMES = ("link", "joint", "frame")
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
          "link": ("pose", "inertial")}  # fmt: skip
-WORLD = "world"
 
 
 @dataclass
@@ -213,7 +213,17 @@ def _joints(
     after = np.linalg.inv(at) @ model.pose(child)
     if len(parts) == 1:
         ((_, one, axis),) = parts
-        return [Joint(name, one, parent, carried, placement, axis, after)], []
+        return [
+            Joint(
+                name=name,
+                kind=one,
+                parent=parent,
+                child=carried,
+                placement=placement,
+                axis=axis,
+                after=after,
+            )
+        ], []
     return chain(name, parent, carried, placement, after, parts)
 
 

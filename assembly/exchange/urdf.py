@@ -145,7 +145,7 @@ def _follow_mimics(
     nodes: list[Node], joints: dict[str, Joint]
 ) -> tuple[dict[str, Joint], tuple[str, ...]]:
     """Joints that follow another become drives of their own, which must be said."""
-    said = []
+    remarks = []
     for node in nodes:
         mimic = node.child("mimic")
         if mimic is None:
@@ -156,11 +156,11 @@ def _follow_mimics(
         factor = mimic.number("multiplier", "-", 1.0)
         offset = mimic.number("offset", "rad or m", 0.0)
         joints = joints | {name: replace(joints[name], actuated=True, position=offset)}
-        said.append(
+        remarks.append(
             f"mimic: {name} = {factor:g} * {leader} + {offset:g} is a drive of its "
             "own: command it so"
         )
-    return joints, tuple(said)
+    return joints, tuple(remarks)
 
 
 def _left_out(root: Node, joints: list[Node]) -> tuple[str, ...]:

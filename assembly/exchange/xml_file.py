@@ -165,8 +165,8 @@ def read_xml(path: Path | str, root: str) -> Node:
     except ValueError as error:
         raise BadInput(f"{path}: not valid XML: {one_line(str(error), 200)}") from None
     if element.tag != root:
-        found = quoted(str(element.tag))
-        raise BadInput(f"{path}: found the root element {found}, expected {root}")
+        tag = quoted(str(element.tag))
+        raise BadInput(f"{path}: found the root element {tag}, expected {root}")
     layer, depth = [element], 0
     while layer:
         layer, depth = [inner for outer in layer for inner in outer], depth + 1

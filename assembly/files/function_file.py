@@ -67,9 +67,17 @@ def read_function(table: Table, robot: Robot) -> Function:
     formula = table.text("formula", longest=500) if form == FORMULA else ""
     session = table.text("session", longest=200) if table.has("session") else None
     function = Function(
-        where, components, variables, form, _numbers(table, "parameters"), kind, label,
-        formula, session, _numbers(table, "std", least=0.0),
-    )  # fmt: skip
+        where=where,
+        components=components,
+        variables=variables,
+        form=form,
+        parameters=_numbers(table, "parameters"),
+        kind=kind,
+        label=label,
+        formula=formula,
+        session=session,
+        std=_numbers(table, "std", least=0.0),
+    )
     table.finish()
     _check_parameters(table, function, robot)
     return function

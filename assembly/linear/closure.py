@@ -87,11 +87,11 @@ def virtual_joints(
     """
     if isinstance(bounded_motion, bool):
         bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
-    return _virtual_joints(_CacheKey(_parts(robot), robot), compliant, bounded_motion)
+    return _virtual_joints(_JointsKey(_parts(robot), robot), compliant, bounded_motion)
 
 
 @dataclass(frozen=True)
-class _CacheKey:
+class _JointsKey:
     """Robots that differ in errors and masses alone have the same virtual joints."""
 
     parts: tuple
@@ -112,7 +112,7 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    key: _CacheKey, compliant: Compliant, bounded_motion: frozenset[int]
+    key: _JointsKey, compliant: Compliant, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
     """The columns, once for all robots of the same parts."""
     robot = key.robot

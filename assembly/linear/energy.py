@@ -148,13 +148,13 @@ def _minimise(reduced: Reduction) -> LeastEnergy:
     if reduced.inconsistent:
         raise CannotAssemble(
             f"a rigid part stays open by {reduced.inconsistent:.3g} (rad, or m per "
-            f"reference length): no play or spring acts there{beyond}"
+            f"reference length): no clearance or spring acts there{beyond}"
         )
     least = minimise_energy(
         reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group
     )
     if not least.feasible:
         raise CannotAssemble(
-            f"no play within its bounds closes what no spring can{beyond}"
+            f"no clearance within its bounds closes what no spring can{beyond}"
         )
     return least

@@ -236,11 +236,11 @@ def flexibility(postures: Posture) -> Flexibility:
         postures.transforms,
     ):
         digest.update(np.ascontiguousarray(numbers).tobytes())
-    return _factorise(_CacheKey(digest.digest(), postures, bodies, joints))
+    return _factorise(_FlexibilityKey(digest.digest(), postures, bodies, joints))
 
 
 @dataclass(frozen=True)
-class _CacheKey:
+class _FlexibilityKey:
     """Robots that differ in errors and loads alone share one factorisation."""
 
     digest: bytes
@@ -250,13 +250,13 @@ class _CacheKey:
 
 
 @lru_cache(maxsize=4)
-def _factorise(key: _CacheKey) -> Flexibility:
+def _factorise(key: _FlexibilityKey) -> Flexibility:
     """The system of every posture, and its inverse."""
     postures, C_body, C_joint = key.postures, key.bodies, key.joints
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:
-        raise ValueError(f"{robot.name} has play, which is not linear")
+        raise ValueError(f"{robot.name} has clearance, which is not linear")
     n, count = len(robot.frames), len(postures.transforms)
     size = size_of(robot)
     scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])

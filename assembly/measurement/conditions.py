@@ -207,7 +207,6 @@ def as_declared(
     point: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     covariates: Mapping[str, ArrayLike] | None = None,
-    session: ArrayLike | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
     """Conditions of a robot as its file declares it.
@@ -219,8 +218,8 @@ def as_declared(
         point: (3,) [m] the reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] base axes.
         covariates: (R,) or one number for all rows, by name: ``temperature`` [K],
-            ``time`` [s], ``approach`` -1 or 1, NaN if absent; and any others.
-        session: its name, or (R,) names.
+            ``time`` [s], ``approach`` -1 or 1, NaN if absent; any others; and
+            ``session``, its name or (R,) names.
         target: (3,) or (R, 3) [m] the point measured, platform axes; the reference
             point if absent.
 
@@ -228,6 +227,7 @@ def as_declared(
         R rows.
     """
     given = dict.fromkeys(COVARIATES, np.nan) | dict(covariates or {})
+    session = given.pop("session", None)
     robot = postures.robot
     n = len(robot.frames)
     T = postures.transforms.reshape(-1, n, 4, 4)

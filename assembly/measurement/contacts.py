@@ -11,8 +11,8 @@ from assembly.linear.energy import Assembly
 from assembly.measurement.conditions import Conditions, ContactLaw
 from assembly.model.links import in_series, own_screw
 
-_ITERATIONS = 100  # at most
-_CONVERGED = 1e-11  # relative change of a contact's deflection
+ITERATIONS = 100  # at most
+CONVERGED = 1e-11  # relative change of a contact's deflection
 
 
 def softened(
@@ -86,14 +86,14 @@ def contact_deflections(
     d = np.sign(w) * (np.abs(w) / c) ** (1 / n)
     residual = gradient(d)
     tiny = 1e-9 * np.abs(A).max(initial=0.0) + 1e-300
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         norm = np.linalg.norm(residual, axis=1)
-        if np.all(norm <= _CONVERGED):
+        if np.all(norm <= CONVERGED):
             break
         slope = c * n * np.abs(d) ** (n - 1) + tiny
         H = np.einsum("ri,ij->rij", slope, np.eye(len(c))) - A
         step = -np.linalg.solve(H, (residual * scale)[..., None])[..., 0]
-        length = np.where(norm <= _CONVERGED, 0.0, 1.0)
+        length = np.where(norm <= CONVERGED, 0.0, 1.0)
         for _ in range(30):
             trial = gradient(d + length[:, None] * step)
             worse = (np.linalg.norm(trial, axis=1) > norm) & (length > 0)

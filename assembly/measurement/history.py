@@ -72,7 +72,7 @@ class History:
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
         even = ~self.first & (not held)
-        answer = np.empty(len(u))
+        response = np.empty(len(u))
         for i, value in enumerate(u.tolist()):
             if self.first[i]:
                 state = 0.0
@@ -80,8 +80,8 @@ class History:
             # exact for u linear from ``before`` to ``value``
             late = (value - before) * share[i]
             state = value - late + (state - before) * decay[i]
-            answer[i] = state
-        return answer
+            response[i] = state
+        return response
 
     def fading(self, time_constant: float) -> NDArray:
         """(H,) exp(-time / time constant): what is left of a state at time 0."""

@@ -24,6 +24,8 @@ from assembly.linear.reduction import FreeMotion
 from assembly.linear.without_clearance import flexibility, in_groups
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.contacts import (
+    CONVERGED,
+    ITERATIONS,
     contact_columns,
     contact_deflections,
     secants,
@@ -41,10 +43,8 @@ from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
 
-_ITERATIONS = 100  # at most
 _MOST_ONE_BY_ONE = 40  # configurations corrected to second order one by one
-_CONVERGED = 1e-11  # relative change of a contact's deflection
-_CONVERGED_FINITE = 1e-5  # likewise, from the solution of the linear model
+_CONVERGED_FINITE = 1e-5  # as CONVERGED, from the solution of the linear model
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +288,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
     assembly: Assembly | ExactAssembly
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         there = softened(posture, conditions.laws, compliances)
         if conditions.exact:
             assembly = solve_exact(
@@ -297,10 +297,10 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
         else:
             assembly = solve_assembly(there, load, gravity=gravity)
         before, compliances = compliances, secants(assembly, conditions.laws)
-        tolerance = _CONVERGED_FINITE if conditions.exact else _CONVERGED
+        tolerance = _CONVERGED_FINITE if conditions.exact else CONVERGED
         if np.all(np.abs(compliances - before) <= tolerance * compliances):
             return assembly
-    raise SolverFailed("contact", f"no convergence in {_ITERATIONS} iterations")
+    raise SolverFailed("contact", f"no convergence in {ITERATIONS} iterations")
 
 
 def _assemble_yielding(row: Conditions) -> Assembly | ExactAssembly:

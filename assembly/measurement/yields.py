@@ -72,15 +72,15 @@ class Yields:
 
     def slope(self, through: NDArray) -> NDArray:
         """(R, m, t) derivative of the deflections, by central differences."""
-        answer = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
+        slopes = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
         for k in range(through.shape[1]):
             step = _STEP * max(float(np.abs(through[:, k]).max(initial=0.0)), 1e-9)
             more, less = through.copy(), through.copy()
             more[:, k] += step
             less[:, k] -= step
             change = self.deflections(more) - self.deflections(less)
-            answer[:, :, k] = change / (2 * step)
-        return answer
+            slopes[:, :, k] = change / (2 * step)
+        return slopes
 
     def correction(self, give: NDArray, through: NDArray, A: NDArray) -> NDArray:
         """What deflections lack, carried over to what their own stress makes of it.
@@ -147,10 +147,10 @@ def settle_yields(
     give = np.zeros((len(conditions), len(conditions.yields)))
     stress = A(yields)
     for _ in range(_STEPS):
-        answer, wrenches = solve(with_deflections(conditions, yields.places, give))
+        solution, wrenches = solve(with_deflections(conditions, yields.places, give))
         step = yields.correction(give, wrenches @ yields.read, stress)
         if not step.any():
-            return answer
+            return solution
         give += step
     raise SolverFailed("yields", f"deflections that do not settle in {_STEPS} steps")
 

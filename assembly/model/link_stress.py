@@ -146,7 +146,7 @@ def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
     """Peak stress of a link given by its surface."""
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.fem.stress import stress_influence, von_mises
     from stiffness.surface.interface import parse_interface
@@ -159,7 +159,8 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
         read_surface(link.surface, link.unit),
         parse_interface(link.base, f"{place}.base"),
         parse_interface(link.tip, f"{place}.tip"),
-        (Material(link.young, link.poisson),), interface=link.interface,
+        (Material(link.young, link.poisson),),
+        options=FemOptions(interface=link.interface),
     )  # fmt: skip
     influence = stress_influence(solved)
     R = mesh_turn(frame, solved.link.tip - solved.link.base)

@@ -47,7 +47,8 @@ _SOLVED: dict[tuple, LinkStiffness] = {}  # by this process
 
 def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
     """Stiffness in the mesh's axes; links of one shape and material are solved once."""
-    from stiffness.fem.fea import mesh_link
+    from stiffness.fem.fea import FemOptions, mesh_link
+    from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
 
     try:
@@ -63,8 +64,8 @@ def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
             link.surface,
             parse_interface(link.base, f"{place}.base"),
             parse_interface(link.tip, f"{place}.tip"),
-            link.young, link.poisson,
-            unit=link.unit, accuracy=accuracy, interface=link.interface,
+            Material(link.young, link.poisson),
+            unit=link.unit, options=FemOptions(accuracy, link.interface),
         )  # fmt: skip
     return _SOLVED[key]
 

@@ -21,7 +21,8 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.descent import Expansion, tangent_space
+from assembly.exact.descent import Expansion
+from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.platform_stiffness.linear_tangent import Side, owners

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.exact.descent import tangent_space
+from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture

@@ -87,7 +87,7 @@ def deflection_text(results: dict[str, Any]) -> str:
         lines.append(
             f"{results['loads'][i]:20.6g}{moved:20.6g}{results['stiffness'][i]:20.6g}"
             f"{len(results['contacts'][i]):20d}"
-            + ("  free play" if results["free_play"][i] else "")
+            + ("  within clearances" if results["free_play"][i] else "")
         )
     for event in results["events"]:
         at = f"{event['load']:.6g} {units[0]}"
@@ -95,7 +95,7 @@ def deflection_text(results: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def draw_deflection(results: dict[str, Any]) -> "Figure":
+def plot_deflection(results: dict[str, Any]) -> "Figure":
     """Load over deflection, kinks marked.
 
     Args:

@@ -61,9 +61,10 @@ def stiffness_of(
     }  # fmt: skip
     try:
         if exact:
-            answer = solve_exact(posture, load, gravity=gravity)
-            platform, sides = answer.placement.platform, [exact_tangent(answer)]
-            away = exact_tangent(answer, "letting go")
+            equilibrium = solve_exact(posture, load, gravity=gravity)
+            platform = equilibrium.placement.platform
+            sides = [exact_tangent(equilibrium)]
+            away = exact_tangent(equilibrium, "letting go")
             if away.free.shape[1] > sides[0].free.shape[1]:
                 sides.append(away)
         else:
@@ -89,48 +90,48 @@ def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
     """The tangent of (22): one, or two where a clearance just touches its bound."""
-    answer = solve_assembly(posture, load, gravity=gravity)
-    pressed, touching = contacts(answer)
+    assembly = solve_assembly(posture, load, gravity=gravity)
+    pressed, touching = contacts(assembly)
     sides: list[Side] = ["holding"]
     if touching.any():
         sides.append("letting go")
     return [
         {"side": side, "contacts": int(pressed.sum()), "touching": int(touching.sum())}
-        | stiffness_values(in_contact(answer, side), point, length)
+        | stiffness_values(in_contact(assembly, side), point, length)
         for side in sides
     ]
 
 
-def _status(answer: PlatformStiffness) -> str:
+def _status(stiffness: PlatformStiffness) -> str:
     """Whether the platform is held, and stable."""
-    if not answer.stable:
+    if not stiffness.stable:
         return "unstable"
-    return "free motion" if answer.free.shape[1] else "ok"
+    return "free motion" if stiffness.free.shape[1] else "ok"
 
 
 def stiffness_values(
-    answer: PlatformStiffness, point: NDArray, length: float | None = None
+    platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
     """One stiffness as plain values; NaN and infinity stand for no number.
 
     Args:
-        answer: of a posture.
+        platform: of a posture.
         point: (3,) [m] where to read it, base axes.
         length: [m] by which rotations are multiplied.
 
     Returns:
         Matrices, free motions, eigenscrews, shares by direction.
     """
-    answer = answer.at(point, length)
-    eigen = answer.eigen
+    platform = platform.at(point, length)
+    eigen = platform.eigen
     return {
-        "state": answer.state,
-        "point": answer.point,
-        "compliance": answer.compliance,
-        "stiffness": answer.stiffness,
-        "free_motions": answer.free.T,
-        "rigid_wrenches": answer.rigid.T,
-        "characteristic_length": answer.length,
+        "state": platform.state,
+        "point": platform.point,
+        "compliance": platform.compliance,
+        "stiffness": platform.stiffness,
+        "free_motions": platform.free.T,
+        "rigid_wrenches": platform.rigid.T,
+        "characteristic_length": platform.length,
         "eigen": [
             {"stiffness": float(value), "screw": screw, "pitch": float(pitch)}
             for value, screw, pitch in zip(
@@ -138,22 +139,22 @@ def stiffness_values(
             )
         ],
         "condition": eigen.condition,
-        "centre": answer.centre,
+        "centre": platform.centre,
         "along": {
-            name: dict(zip(("free", "blocked"), answer.along(axis), strict=True))
+            name: dict(zip(("free", "blocked"), platform.along(axis), strict=True))
             for name, axis in zip(DIRECTIONS, np.eye(6), strict=True)
         },
         "shares": {
-            name: _share_values(answer, axis)
+            name: _share_values(platform, axis)
             for name, axis in zip(DIRECTIONS, np.eye(6), strict=True)
         },
     }
 
 
-def _share_values(answer: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
+def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
     """Shares along an axis by kind and frame."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
-    for part, share in answer.shares(axis).items():
+    for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:
             table.setdefault(_KINDS[part.kind], {})[part.frame] = share
         else:
@@ -256,7 +257,7 @@ def _largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
     return first | {f"{len(names) - _SHOWN} others": rest.tolist()}
 
 
-def draw_shares(results: dict[str, Any]) -> "Figure":
+def plot_shares(results: dict[str, Any]) -> "Figure":
     """A bar chart of the parts' shares in the compliance along each direction.
 
     Args:

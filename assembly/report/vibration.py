@@ -74,8 +74,8 @@ def vibration_text(results: dict[str, Any]) -> str:
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
     for mode in results["modes"]:
         most = list(mode["shares"].items())[:_NAMED]
-        said = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
-        lines.append(f"{mode['frequency']:12.6g} Hz  {said or 'nothing resists'}")
+        shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
+        lines.append(f"{mode['frequency']:12.6g} Hz  {shares or 'nothing resists'}")
     if results["idle_motions"]:
         lines.append(
             f"{results['idle_motions']} motions that nothing resists leave the "

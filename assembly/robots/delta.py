@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import (
-    Placed,
+    PlacedFrame,
     at,
     ball_joint,
     drive_stiffness,
@@ -75,7 +75,7 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
     """
     P = parameters or DeltaParameters()
     angle = drive_angle(P, AZIMUTHS[0], np.array([0.0, 0.0, P.home]))
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     for number, azimuth in enumerate(AZIMUTHS, 1):
         placed += _leg(f"leg{number}", azimuth, angle, P)
     tips = [f"leg{number}.{rod}_tip" for number in (1, 2, 3) for rod in "ab"]
@@ -122,7 +122,9 @@ def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 
 
-def _leg(name: str, azimuth: float, angle: float, P: DeltaParameters) -> list[Placed]:
+def _leg(
+    name: str, azimuth: float, angle: float, P: DeltaParameters
+) -> list[PlacedFrame]:
     """A driven arm and its two rods."""
     out, across = _radial(azimuth)
     foot = P.base_radius * out
@@ -131,7 +133,7 @@ def _leg(name: str, azimuth: float, angle: float, P: DeltaParameters) -> list[Pl
     platform = np.array([0.0, 0.0, P.home])
     drive = Frame(f"{name}.drive", joint="revolute", actuated=True, position=angle,
                   joint_stiffness=drive_stiffness(P.drive))  # fmt: skip
-    placed: list[Placed] = [
+    placed: list[PlacedFrame] = [
         (drive, at(foot, across, out)),
         (Frame(f"{name}.elbow", drive.name, link=P.arm_link), at(elbow, across, arm)),
     ]
@@ -151,7 +153,7 @@ def _rod(
     far: NDArray,
     across: NDArray,
     P: DeltaParameters,
-) -> list[Placed]:
+) -> list[PlacedFrame]:
     """A rod between ball joints; their axes next to it are its own, so it can spin."""
     along = (far - near) / np.linalg.norm(far - near)
     third = np.cross(along, across)

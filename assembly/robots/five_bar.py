@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import Placed, pin, place_frames
+from assembly.robots.placing import PlacedFrame, pin, place_frames
 from assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_arms
 
 
@@ -45,7 +45,7 @@ def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
     """
     P = parameters or FiveBarParameters()
     tip = np.array(P.home)
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     for name, side in (("left", 1), ("right", -1)):
         foot = np.array([-side * P.base / 2, 0.0])
         leg = P.leg

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import Placed, drive_stiffness, pin, place_frames
+from assembly.robots.placing import PlacedFrame, drive_stiffness, pin, place_frames
 from assembly.robots.planar import direction, in_plane
 
 
@@ -55,7 +55,7 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
     rocker = math.atan2(*(middle - foot)[::-1])
     crank = Frame("crank", joint="revolute", actuated=True, position=P.home,
                   joint_stiffness=drive_stiffness(P.drive))  # fmt: skip
-    placed: list[Placed] = [
+    placed: list[PlacedFrame] = [
         (crank, in_plane([0, 0])),
         (pin("crank_pin", "crank", P.clearance, P.link), in_plane(tip, P.home)),
         (Frame("middle", "crank_pin", link=P.link), in_plane(middle, coupler)),

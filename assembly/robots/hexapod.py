@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots.placing import (
-    Placed,
+    PlacedFrame,
     at,
     ball_joint,
     cardan_joint,
@@ -62,7 +62,7 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
         is the distance of its joints' centres.
     """
     P = parameters or HexapodParameters()
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     for number, (a, b) in enumerate(zip(*points(), strict=True), 1):
         placed += _leg(f"leg{number}", a, b + [0.0, 0.0, P.height], P)
     closures = tuple(("leg1.tip", f"leg{number}.tip") for number in range(2, 7))
@@ -76,7 +76,7 @@ def points() -> tuple[NDArray, NDArray]:
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 
 
-def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed]:
+def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[PlacedFrame]:
     """A strut from a to b, where its ball joint holds the platform."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length

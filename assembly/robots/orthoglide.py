@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import Placed, at, drive_stiffness, pin, place_frames
+from assembly.robots.placing import PlacedFrame, at, drive_stiffness, pin, place_frames
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     for k, name in enumerate("xyz"):
         placed += _leg(name, axes[k], axes[(k + 1) % 3], P)
     closures = (
@@ -66,14 +66,14 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
-) -> list[Placed]:
+) -> list[PlacedFrame]:
     """A leg along an axis of the base, its hinges along another."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,
         joint_stiffness=drive_stiffness(P.drive, "prismatic"),
     )  # fmt: skip
-    placed: list[Placed] = [
+    placed: list[PlacedFrame] = [
         (slide, at(far, along, hinge)),
         (pin(f"{name}.hinge", slide.name, P.clearance), at(near, hinge, along)),
     ]

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.model.robot import BASE, Clearance, Frame, Link
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
-Placed = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
+PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
 
 
-def place_frames(placed: Iterable[Placed]) -> tuple[Frame, ...]:
+def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
     """Frames with the translation and rotation of their home poses.
 
     Args:
@@ -76,7 +76,7 @@ def pin(
 def cardan_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None,
-) -> list[Placed]:  # fmt: skip
+) -> list[PlacedFrame]:  # fmt: skip
     """Two revolute joints at one point, their axes at right angles.
 
     Args:
@@ -100,7 +100,7 @@ def cardan_joint(
 def ball_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None, link: Link | None = None,
-) -> list[Placed]:  # fmt: skip
+) -> list[PlacedFrame]:  # fmt: skip
     """Three revolute joints at one point, their axes at right angles at home.
 
     It is singular where the second joint has turned by a right angle.

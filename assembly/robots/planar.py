@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.robot import BeamLink, Clearance, Frame
-from assembly.robots.placing import Placed, at, drive_stiffness, pin
+from assembly.robots.placing import PlacedFrame, at, drive_stiffness, pin
 from forcefit.inputs.table import BadInput
 
 
@@ -73,7 +73,7 @@ def arm_angle(
 
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
-) -> list[Placed]:
+) -> list[PlacedFrame]:
     """Drive, elbow and the frame at the second arm's end, where a pin may sit.
 
     The drive's coordinate is the arm's angle to the x axis.

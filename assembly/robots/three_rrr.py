@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
-from assembly.robots.placing import Placed, pin, place_frames
+from assembly.robots.placing import PlacedFrame, pin, place_frames
 from assembly.robots.planar import (
     PlanarLeg,
     arm_angle,
@@ -64,7 +64,7 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
     """
     P = parameters or ThreeRRRParameters()
     leg = P.leg
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     pairs = zip(P.feet(), P.corners(), strict=True)
     for number, (foot, corner) in enumerate(pairs, 1):
         name, end = f"leg{number}", corner + P.home

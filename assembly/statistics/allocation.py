@@ -77,13 +77,13 @@ def allocate(
     if fresh:
         tolerances, verification = verify(requirement, tolerances, fresh, progress)
     allocation = Allocation(
-        plan,
-        tolerances,
-        plan.price(tolerances),
-        uniformly_scaled,
-        plan.price(uniformly_scaled),
-        price_bound if requirement.is_convex else np.nan,
-        cuts,
+        plan=plan,
+        tolerances=tolerances,
+        price=plan.price(tolerances),
+        uniformly_scaled=uniformly_scaled,
+        price_uniformly_scaled=plan.price(uniformly_scaled),
+        price_bound=price_bound if requirement.is_convex else np.nan,
+        cuts=cuts,
         verification=verification,
     )
     if plan.asked_yield == 1.0:

@@ -24,10 +24,10 @@ from assembly.solvers.conic import minimise_energy
 
 # the option --play and its explanation
 CLEARANCE_MODELS = {
-    "worst": "play anywhere it may be, the largest pose errors count, eq. (27)",
-    "uniform": "play uniform over all places it may be",
-    "contact": "play pushed in a random direction until taken up",
-    "least": "play where the solution leaves it, one possible place of many",
+    "worst": "clearances anywhere they may be, the largest pose errors count, eq. (27)",
+    "uniform": "clearances uniform over all places they may be",
+    "contact": "clearances taken up in a random direction",
+    "least": "clearances where the solution leaves them, one possible place of many",
 }
 CLEARANCE_STREAM = 1  # of random numbers; 0 is the errors'
 

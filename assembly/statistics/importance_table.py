@@ -145,11 +145,11 @@ def importance_dataset(
         "component": ["rotation", "translation"],
         "error_unit": ("group", _units(experiment.sources, design)),
     }  # fmt: skip
-    said = {
+    attributes = {
         "importance_draws": len(design.A),
         "importance_clearance_model": importance_clearance_model(experiment),
     }
-    return xarray.Dataset(data, labels, said)
+    return xarray.Dataset(data, labels, attributes)
 
 
 def _parts(
@@ -220,7 +220,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
     """The same as a table for people, the largest parts first."""
     quantities = report["quantities"]
     lines = [
-        f"importance of the errors, {report['base_draws']} base draws, play "
+        f"importance of the errors, {report['base_draws']} base draws, clearances "
         f"{report['play']} in the shares, least in what moves the platform:"
     ]
     for name, one in quantities.items():

@@ -22,7 +22,7 @@ MEANINGS = {
     "force": "largest force through any body",
     "moment": "largest moment through any body",
     "stress": "largest von Mises stress in the link",
-    "play_mixed": "1 where the walk that settles the play met its criterion",
+    "play_mixed": "1 where the walk that settles the clearances met its criterion",
     "status": "0 solved, 1 no answer",
 }
 POSE_ERRORS = ("rotation", "translation")

@@ -262,8 +262,8 @@ class Requirement:
             where = ", ".join(f"{k} = {v:.4g}" for k, v in at if abs(v) > 1e-9)
             raise BadInput(
                 f"limit {key}: even perfect parts reach {limit * lower[worst, 0]:.4g} "
-                f"{unit} by play alone at {where or 'the origin'}; expected at most "
-                f"{limit:g} {unit} (or --play least, if play stays as it is solved)"
+                f"{unit} by clearances alone at {where or 'the origin'}; expected at "
+                f"most {limit:g} {unit} (or --play least, if clearances stay as solved)"
             )
 
     def check_taken_up(self) -> None:

@@ -32,8 +32,8 @@ _ROUNDING = 1e-18  # of the largest value: less is zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 _WORDS = {
     "forced": "goes together, by force if need be",
-    "rigid": "goes together by play alone, compliant joints rigid",
-    "rigid_compliant_free": "goes together by play alone, compliant joints free",
+    "rigid": "goes together by clearances alone, compliant joints rigid",
+    "rigid_compliant_free": "goes together by clearances alone, compliant joints free",
 }
 
 
@@ -182,8 +182,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     ]
     if summary.get("play_not_mixed"):
         lines.append(
-            f"warning: in {summary['play_not_mixed']} draws uniform play is not mixed "
-            "when its walk ends: their pose errors are too narrow"
+            f"warning: in {summary['play_not_mixed']} draws uniform clearances are not "
+            "mixed when their walk ends: their pose errors are too narrow"
         )
     lines += [f"{_WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
     for key, results in summary["exceeds"].items():

@@ -3,7 +3,9 @@
 See ``docs/tolerances.md``.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,9 +47,48 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
     root.finish()
     if not tables:
         raise root.bad("tolerance", "missing; expected tables [[tolerance]]")
-    rows: dict[tuple[int, int], int] = {}
-    names: list[str] = []
-    costs, least, most = [], [], []
+    groups = _groups(root, tables, robot)
+    frame, component = np.array(list(groups.of)).T
+    count = len(groups.of)
+    sources = ErrorSources(
+        robot=robot,
+        frame=frame,
+        component=component,
+        kind=np.full(count, KINDS.index(distribution)),
+        centre=np.zeros(count),
+        scale=np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
+        least=np.zeros(count),
+        limit=np.full(count, deviations),
+        signed=np.ones(count, dtype=bool),
+    )
+    return Plan(
+        sources=sources,
+        group=np.array(list(groups.of.values())),
+        names=tuple(groups.names),
+        costs=np.array(groups.costs),
+        least=np.array(groups.least),
+        most=np.array(groups.most),
+        limits=limits or {"margin_free": 1.0},
+        cost=cost,
+        asked_yield=float(asked_yield),
+        draws=int(draws),
+        seed=int(seed),
+    )
+
+
+class _Groups(NamedTuple):
+    """Tables ``[[tolerance]]``: errors that share one."""
+
+    of: dict[tuple[int, int], int]  # by frame and component
+    names: list[str]
+    costs: list[float]
+    least: list[float]
+    most: list[float]
+
+
+def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
+    """The groups of errors of a file."""
+    rows, names, costs, least, most = groups = _Groups({}, [], [], [], [])
     for number, table in enumerate(tables):
         places, unit = _places(table, robot)
         for place in places:
@@ -66,24 +107,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
         table.finish()
     if len(set(names)) < len(names):
         raise root.bad("tolerance", "two of them share a name; expected different ones")
-    frame, component = np.array(list(rows)).T
-    count = len(rows)
-    sources = ErrorSources(
-        robot,
-        frame,
-        component,
-        np.full(count, KINDS.index(distribution)),
-        np.zeros(count),
-        np.full(count, 1.0 / deviations if distribution == "truncated" else 1.0),
-        np.zeros(count),
-        np.full(count, deviations),
-        np.ones(count, dtype=bool),
-    )
-    return Plan(
-        sources, np.array(list(rows.values())), tuple(names), np.array(costs),
-        np.array(least), np.array(most), limits or {"margin_free": 1.0}, cost,
-        float(asked_yield), int(draws), int(seed),
-    )  # fmt: skip
+    return groups
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:

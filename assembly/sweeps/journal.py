@@ -220,9 +220,9 @@ def _difference(first_line: bytes, header: bytes) -> str:
     keys = [k for k in expected if other.get(k) != expected[k]]
     # the hash of the whole question is no use where a part of it is named
     keys = [k for k in keys if k != "question_sha256"] or keys
-    found = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
+    theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)
     return (
-        f"journal of another sweep: found {found}; expected {wanted} (finish that "
+        f"journal of another sweep: found {theirs}; expected {wanted} (finish that "
         "sweep, delete its journal, or write to another file)"
     )

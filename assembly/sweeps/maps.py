@@ -24,9 +24,11 @@ _PAPER = (
     ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
     ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
     ("translation", 1e3, "platform position error [mm]", "viridis"),
-    ("rotation_error_play", 1e3, "orientation error by play alone [mrad]", "viridis"),
-    ("translation_error_play", 1e3, "position error by play alone [mm]", "viridis"),
-)
+    ("rotation_error_play", 1e3,
+     "orientation error by clearances alone [mrad]", "viridis"),
+    ("translation_error_play", 1e3,
+     "position error by clearances alone [mm]", "viridis"),
+)  # fmt: skip
 _RIGID = ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
 _SAFETY = ("safety", 1.0, "yield strength over peak stress [-]", "viridis")
 _STIFFNESS = (

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from assembly.batch.many_postures import Energies
 from assembly.effects import apply_known
-from assembly.effects.robot_effects import by_argument
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble
@@ -51,7 +50,7 @@ def point_conditions(
         question.load,
         mismatch=mismatch,
         gravity=question.gravity,
-        **by_argument(question.under),
+        covariates=question.under,
     )
     if errors is not None:
         conditions = replace(conditions, errors=errors)

@@ -4,7 +4,7 @@ Points are solved in blocks.  A point without a solution has its reason in ``sta
 and ``reason`` and stops no other; no point's numbers depend on the others of its block.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -208,15 +208,7 @@ def _solve_reached(
         energies, wrenches = assemble_rows(conditions)
     else:
         energies = minimise_energies(robot, T, errors, mismatch)
-    ok = []
-    for i, row in enumerate(rows.tolist()):
-        status, reason = energies.status[i], energies.reason[i]
-        if i in failed:
-            status, reason = "solver failed", failed[i]
-        if status == "ok":
-            ok.append(i)
-        else:
-            _fail(solved, range(row, row + 1), status, reason)
+    ok = _solved_rows(energies, failed, solved, rows)
     rows_ok = rows[ok]
     for key, values in (
         ("energy", energies.energy), ("platform_screw", energies.platform_screw),
@@ -229,14 +221,8 @@ def _solve_reached(
         out["reading"][rows_ok] = read(conditions.take(ok), energies.platform_screw[ok])
     if wrenches is None and (question.wrenches or question.strength is not None):
         wrenches = _wrenches(robot, T, energies)
-    if question.wrenches and wrenches is not None:
-        chosen = [robot.index(name) for name in question.wrenches]
-        out["wrench"][rows_ok] = wrenches[ok][:, chosen]
-    if question.strength is not None and wrenches is not None:
-        stress = peak_stresses(robot, wrenches[ok])
-        out["stress"][rows_ok] = stress
-        with np.errstate(divide="ignore"):
-            out["safety"][rows_ok] = question.strength / stress.max(axis=1)
+    if wrenches is not None:
+        _record_wrenches(question, robot, wrenches[ok], solved, rows_ok)
     if question.clearance_only:
         _bound_clearance_only(perfect, T, mismatch, solved, rows)
     if question.reading is not None and ok:
@@ -249,6 +235,38 @@ def _solve_reached(
     if question.linearisation:
         for i in ok:
             _compare_finite(conditions, i, solved, int(rows[i]))
+
+
+def _solved_rows(
+    energies: Energies, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
+) -> list[int]:
+    """Which points have a solution; of the others status and reason are kept."""
+    ok = []
+    for i, row in enumerate(rows.tolist()):
+        status, reason = energies.status[i], energies.reason[i]
+        if i in failed:
+            status, reason = "solver failed", failed[i]
+        if status == "ok":
+            ok.append(i)
+        else:
+            _fail(solved, range(row, row + 1), status, reason)
+    return ok
+
+
+def _record_wrenches(
+    question: Question, robot: Robot, wrenches: NDArray, solved: SolvedPoints,
+    rows: NDArray,
+) -> None:  # fmt: skip
+    """Wrenches at the frames asked for, and the stress of the links."""
+    out = solved.records
+    if question.wrenches:
+        chosen = [robot.index(name) for name in question.wrenches]
+        out["wrench"][rows] = wrenches[:, chosen]
+    if question.strength is not None:
+        stress = peak_stresses(robot, wrenches)
+        out["stress"][rows] = stress
+        with np.errstate(divide="ignore"):
+            out["safety"][rows] = question.strength / stress.max(axis=1)
 
 
 def _note_singularities(
@@ -276,16 +294,16 @@ def _record_stiffness(
     """K_C once a posture; errors do not change it, draws of a posture share it."""
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
-    answer = platform_stiffnesses(robot, T[starts], mismatch[starts])
-    along = np.stack([answer.along(axis) for axis in np.eye(6)], axis=1)
-    by_axis = [list(answer.shares(axis).values()) for axis in np.eye(6)]
+    stiffnesses = platform_stiffnesses(robot, T[starts], mismatch[starts])
+    along = np.stack([stiffnesses.along(axis) for axis in np.eye(6)], axis=1)
+    by_axis = [list(stiffnesses.shares(axis).values()) for axis in np.eye(6)]
     shares = np.array(by_axis).transpose(2, 1, 0)
     out = solved.records
     for i, run in enumerate(runs):
-        out["compliance"][rows[run]] = answer.compliance[i]
+        out["compliance"][rows[run]] = stiffnesses.compliance[i]
         out["stiffness"][rows[run]] = along[i]
-        out["eigen_stiffness"][rows[run]] = answer.eigen_stiffnesses[i]
-        out["stiffness_condition"][rows[run]] = answer.condition[i]
+        out["eigen_stiffness"][rows[run]] = stiffnesses.eigen_stiffnesses[i]
+        out["stiffness_condition"][rows[run]] = stiffnesses.condition[i]
         out["share"][rows[run]] = shares[i]
 
 
@@ -325,7 +343,7 @@ def _bound_clearance_only(
         ]
         if bounds.status[i] != "ok":
             for row in rows[run].tolist():
-                reason = f"play alone: {bounds.reason[i]}"
+                reason = f"clearances alone: {bounds.reason[i]}"
                 solved.texts["reason"].setdefault(row, reason)
 
 

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,31 +32,14 @@ from stiffness.screws import WRENCH
 if TYPE_CHECKING:
     import xarray
 
+    from assembly.model.error_distributions import ErrorSources
 
-def ask_sweep(
-    robot: str | Path,
-    *,
-    grid: str | None = None,
-    poses: Path | str | None = None,
-    vary: Sequence[str] = (),
-    errors: Path | str | None = None,
-    draws: int | None = None,
-    seed: int = 1,
-    reading: str = "frozen",
-    play_alone: bool = False,
-    wrench: Sequence[str] = (),
-    linearisation: bool = False,
-    near: float = 0.02,
-    yield_strength: float | None = None,
-    load: Sequence[float] = (0.0,) * 6,
-    gravity: Sequence[float] = (0.0,) * 3,
-    under: Mapping[str, float | str] | None = None,
-    stiffness: bool = False,
-) -> Sweep:
-    """The sweep of the options of ``forcefit assembly sweep``, by their names.
 
-    Args:
-        robot: a robot file, or a built-in name.
+@dataclass(frozen=True)
+class SweepOptions:
+    """The options of ``forcefit assembly sweep``, by their names.
+
+    Attributes:
         grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
         poses: a table of postures.
         vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``.
@@ -72,6 +56,32 @@ def ask_sweep(
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
         stiffness: also K_C and the shares of its parts, clearances held at zero.
+    """
+
+    grid: str | None = None
+    poses: Path | str | None = None
+    vary: Sequence[str] = ()
+    errors: Path | str | None = None
+    draws: int | None = None
+    seed: int = 1
+    reading: str = "frozen"
+    play_alone: bool = False
+    wrench: Sequence[str] = ()
+    linearisation: bool = False
+    near: float = 0.02
+    yield_strength: float | None = None
+    load: Sequence[float] = (0.0,) * 6
+    gravity: Sequence[float] = (0.0,) * 3
+    under: Mapping[str, float | str] = field(default_factory=dict)
+    stiffness: bool = False
+
+
+def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
+    """The sweep that ``forcefit assembly sweep`` would run.
+
+    Args:
+        robot: a robot file, or a built-in name.
+        options: of the command.
 
     Returns:
         The sweep, everything in it checked.
@@ -79,67 +89,73 @@ def ask_sweep(
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
     """
-    options = {k: v for k, v in locals().items() if k != "robot"}
     machine = load_robot(robot)
-    under = dict(under or {})
-    check_covariates(machine, under)
-    options |= {
-        "load": _assigned((name.lower() for name in WRENCH), load),
-        "gravity": _assigned("xyz", gravity),
-        "under": ",".join(f"{k}={_short(v)}" for k, v in under.items()) or None,
-    }
-    if (grid is None) == (poses is None):
-        raise BadInput("sweep: expected --grid or --poses, one of them")
-    if reading not in (*READINGS, "none"):
-        hint = nearest(reading, [*READINGS, "none"])
-        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
-    if not 0 <= near <= 1:
-        raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
-    for name in wrench:
-        machine.index(name)
-    if yield_strength is not None:
-        if not 0 < yield_strength < float("inf"):
-            raise BadInput(f"--yield-strength: found {yield_strength:g}, expected > 0")
-        if not stressed_names(machine):
-            raise BadInput(
-                f"--yield-strength: no link of {machine.name} has a shape from which "
-                "its stress follows"
-            )
-    design = load_design(robot) if vary else None
-    varied = _vary(design, vary) if design is not None else {}
-    sources = None
-    if (errors is None) != (draws is None):
-        raise BadInput("sweep: --errors and --draws go together; found one of them")
-    if errors is not None:
-        from assembly.model.error_distributions import read_sources
-
-        sources = read_sources(errors, machine)
-        drawn = [path for path in varied if ".geometric_error." in path]
-        if drawn:
-            raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")
-    targets = _targets(machine, grid, poses)
+    check_covariates(machine, options.under)
+    _check(options, machine)
+    design = load_design(robot) if options.vary else None
+    varied = _vary(design, options.vary) if design is not None else {}
+    sources = _sources(options, machine, varied)
+    targets = _targets(machine, options.grid, options.poses)
     question = Question(
         machine,
         design=design,
         varied=tuple(varied),
         components=targets.names,
         sources=sources,
-        seed=seed,
-        reading=None if reading == "none" else reading,
-        clearance_only=play_alone,
-        wrenches=tuple(wrench),
-        linearisation=linearisation,
-        near=near,
-        strength=yield_strength,
-        load=tuple(load),
-        gravity=tuple(gravity),
-        under=under,
-        stiffness=stiffness,
+        seed=options.seed,
+        reading=None if options.reading == "none" else options.reading,
+        clearance_only=options.play_alone,
+        wrenches=tuple(options.wrench),
+        linearisation=options.linearisation,
+        near=options.near,
+        strength=options.yield_strength,
+        load=tuple(options.load),
+        gravity=tuple(options.gravity),
+        under=dict(options.under),
+        stiffness=options.stiffness,
     )
     _check_readings(question)
-    return Sweep(
-        question, targets, tuple(varied.values()), draws or 0, _command(robot, options)
-    )
+    command = _command(robot, options)
+    return Sweep(question, targets, tuple(varied.values()), options.draws or 0, command)
+
+
+def _check(options: SweepOptions, machine: Robot) -> None:
+    """Refuse options that contradict each other or the robot."""
+    if (options.grid is None) == (options.poses is None):
+        raise BadInput("sweep: expected --grid or --poses, one of them")
+    reading, near, strength = options.reading, options.near, options.yield_strength
+    if reading not in (*READINGS, "none"):
+        hint = nearest(reading, [*READINGS, "none"])
+        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
+    if not 0 <= near <= 1:
+        raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
+    for name in options.wrench:
+        machine.index(name)
+    if strength is not None:
+        if not 0 < strength < float("inf"):
+            raise BadInput(f"--yield-strength: found {strength:g}, expected > 0")
+        if not stressed_names(machine):
+            raise BadInput(
+                f"--yield-strength: no link of {machine.name} has a shape from which "
+                "its stress follows"
+            )
+
+
+def _sources(
+    options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
+) -> "ErrorSources | None":
+    """How the errors drawn are distributed; None if none are."""
+    if (options.errors is None) != (options.draws is None):
+        raise BadInput("sweep: --errors and --draws go together; found one of them")
+    if options.errors is None:
+        return None
+    from assembly.model.error_distributions import read_sources
+
+    sources = read_sources(options.errors, machine)
+    drawn = [path for path in varied if ".geometric_error." in path]
+    if drawn:
+        raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")
+    return sources
 
 
 def _short(value: float | str) -> str:
@@ -192,17 +208,22 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
     return values_by_path
 
 
-def _command(robot: str | Path, options: Mapping[str, Any]) -> str:
+def _command(robot: str | Path, options: SweepOptions) -> str:
     """The command of the same sweep, options at their default left out."""
-    default = {"seed": 1, "reading": "frozen", "near": 0.02}
+    default = {option.name: option.default for option in fields(options)}
+    given = {name: getattr(options, name) for name in default} | {
+        "load": _assigned((name.lower() for name in WRENCH), options.load),
+        "gravity": _assigned("xyz", options.gravity),
+        "under": ",".join(f"{k}={_short(v)}" for k, v in options.under.items()) or None,
+    }
     words = ["forcefit", "assembly", "sweep", str(robot)]
-    for key, value in options.items():
+    for key, value in given.items():
         name = "--" + key.replace("_", "-")
         if value is True:
             words.append(name)
         elif isinstance(value, list | tuple):
             words += [word for one in value for word in (name, str(one))]
-        elif value not in (None, False) and value != default.get(key):
+        elif value not in (None, False) and value != default[key]:
             words += [name, str(value)]
     # names of files may hold bytes that are not UTF-8
     return shlex.join(words).encode(errors="backslashreplace").decode()

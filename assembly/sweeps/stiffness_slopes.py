@@ -56,6 +56,6 @@ def stiffness_slopes(
 
 def _at(posture: Posture, point: NDArray | None) -> PlatformStiffness:
     """The classical stiffness at a point of the platform."""
-    answer, T = without_clearance(posture), posture.platform
+    stiffness, T = without_clearance(posture), posture.platform
     offset = np.zeros(3) if point is None else np.asarray(point)
-    return answer.at(T[:3, 3] + T[:3, :3] @ offset)
+    return stiffness.at(T[:3, 3] + T[:3, :3] @ offset)

@@ -39,7 +39,7 @@ def convert(
     """
     from assembly.exchange.convert import convert as convert_robot
 
-    answer = convert_robot(source, output, loops, overlay)
-    write_json(answer.table(), json)
+    conversion = convert_robot(source, output, loops, overlay)
+    write_json(conversion.table(), json)
     if json != "-":
-        print(answer.text())
+        print(conversion.text())

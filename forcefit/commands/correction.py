@@ -49,13 +49,13 @@ def predict(
     from validation.correction.prediction import foretell, reading_table
 
     check_writable(output, TABLE)
-    found = foretell(read_commands(commands, load_robot(robot)))
-    table = found.table()
-    write_text(reading_table(found), output)
+    prediction = foretell(read_commands(commands, load_robot(robot)))
+    table = prediction.table()
+    write_text(reading_table(prediction), output)
     write_json(table, json)
     if json != "-":
-        print(f"{output}: {len(found.commands)} readings")
-        position, rotation, sigma = found.error
+        print(f"{output}: {len(prediction.commands)} readings")
+        position, rotation, sigma = prediction.error
         if position == position:
             print(f"rms of measured minus foretold: {1e6 * position:.4g} um")
         if rotation == rotation:
@@ -110,15 +110,15 @@ def compensate(
     if offsets is not None:
         check_writable(offsets, TABLE)
     left = None if diagnosed is None else _left(diagnosed)
-    found = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
-    table = tables.summary(found, left)
-    write_text(tables.command_table(found), output)
+    compensation = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
+    table = tables.summary(compensation, left)
+    write_text(tables.command_table(compensation), output)
     if offsets is not None:
-        write_text(tables.offset_table(found), offsets)
+        write_text(tables.offset_table(compensation), offsets)
     write_json(table, json)
     if json != "-":
-        print(tables.summary_text(found, table))
-    if any(found.reason):
+        print(tables.summary_text(compensation, table))
+    if any(compensation.reason):
         raise typer.Exit(1)
 
 
@@ -176,13 +176,13 @@ def carry(
     declared = read_campaign(campaign)
     data = read_commands(campaign, load_robot(robot))
     data = data.take(data.cells.any(axis=1))
-    found = carrying.carry(data, declared, carrying.setup_rows(data, setup), fitted)
-    good = all(one.suffices and one.better for one in found)
+    sessions = carrying.carry(data, declared, carrying.setup_rows(data, setup), fitted)
+    good = all(one.suffices and one.better for one in sessions)
     if output is not None and good:
-        write_robot(carrying.carried_robot(data.robot, found), output)
-    write_json(carrying_table.table(found), json)
+        write_robot(carrying.carried_robot(data.robot, sessions), output)
+    write_json(carrying_table.table(sessions), json)
     if json != "-":
-        print(carrying_table.text(found))
+        print(carrying_table.text(sessions))
         if output is not None and not good:
             print(f"{output}: not written")
     if not good:
@@ -196,7 +196,7 @@ def explain(
         typer.Option(help="Range of a variable: q.drive=-1:1,cov.tilt=0:0.1."),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw the curves, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot the curves, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -212,12 +212,12 @@ def explain(
     machine = load_robot(robot)
     if not machine.functions:
         raise BadInput(f"{robot}: has no function to explain")
-    found = curves.curves_of(machine, _ranges(machine.functions, over or []))
+    shown = curves.curves_of(machine, _ranges(machine.functions, over or []))
     if figure is not None:
-        save_figure(curves.figure_of(found), figure)
-    write_json({"functions": curves.table(machine, found)}, json)
+        save_figure(curves.figure_of(shown), figure)
+    write_json({"functions": curves.table(machine, shown)}, json)
     if json != "-":
-        print(curves.text(found))
+        print(curves.text(shown))
 
 
 def _ranges(
@@ -225,7 +225,7 @@ def _ranges(
 ) -> dict[str, tuple[float, float]]:
     """Ranges by variable from ``--over``."""
     valid = {name for function in functions for name in (*function.variables, "time")}
-    found = {}
+    ranges = {}
     for part in ",".join(texts).split(",") if texts else ():
         name, _, ends = (piece.strip() for piece in part.partition("="))
         if name not in valid:
@@ -237,5 +237,5 @@ def _ranges(
         if not -1e15 < least < most < 1e15:
             expected = "expected LEAST:LARGEST"
             raise BadInput(f"--over {name}: found {quoted(ends)}, {expected}")
-        found[name] = (least, most)
-    return found
+        ranges[name] = (least, most)
+    return ranges

@@ -43,7 +43,7 @@ def deflection(
         bool, typer.Option("--back", help="Also back to the first load.")
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Draw the curve.")
+        Path | None, typer.Option("-o", "--output", help="Plot the curve.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -54,7 +54,7 @@ def deflection(
     from assembly.report.deflection import (
         deflection_of,
         deflection_text,
-        draw_deflection,
+        plot_deflection,
     )
 
     if output is not None:
@@ -70,7 +70,7 @@ def deflection(
     if json != "-":
         print(deflection_text(results))
     if output is not None and "deflection" in results:
-        save_figure(draw_deflection(results), output)
+        save_figure(plot_deflection(results), output)
     if results["status"] != "ok":
         raise typer.Exit(1)
 

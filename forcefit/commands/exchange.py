@@ -32,10 +32,10 @@ def import_(
     """
     from validation.exchange.tracker import import_readings
 
-    answer = import_readings(files, targets, commands, output)
-    write_json(answer.table(), json)
+    imported = import_readings(files, targets, commands, output)
+    write_json(imported.table(), json)
     if json != "-":
-        print(answer.text())
+        print(imported.text())
 
 
 def iso(campaign: CampaignArgument, json: JsonOption = None) -> None:

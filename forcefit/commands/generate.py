@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from forcefit.commands.options import JsonOption, RobotArgument
+from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import check_json, write_json
@@ -38,29 +38,6 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
             raise BadInput(f'--effect: "{name[:60]}" is given twice')
         wanted[name] = multiple
     return wanted
-
-
-def parse_point(text: str) -> list[float]:
-    """Three numbers from ``--point``.
-
-    Args:
-        text: such as ``"0,0,0.05"``.
-
-    Returns:
-        They.
-
-    Raises:
-        BadInput: not three numbers.
-    """
-    try:
-        point = [float(part) for part in text.split(",")]
-    except ValueError:
-        point = []
-    if len(point) != 3 or not all(abs(x) < 1e6 for x in point):
-        raise BadInput(
-            f'--point: found "{text[:60]}", expected three numbers, as 0,0,0'
-        )
-    return point
 
 
 def generate(
@@ -134,7 +111,8 @@ def generate(
         raise BadInput(
             f'--program: found "{program[:60]}", expected ' + " | ".join(PROGRAMS)
         )
-    wanted, measured = parse_effects(effect), parse_point(point)
+    wanted = parse_effects(effect)
+    x, y, z = parse_point(point, "--point")
     design = CampaignDesign(
         configurations=configurations,
         rows=rows,
@@ -145,6 +123,7 @@ def generate(
         temperature=temperature,
         command=command,
         humidity=humidity,
+        reference_point=(x, y, z),
     )
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
     check_folder(folder)
@@ -162,7 +141,7 @@ def generate(
     try:
         with progress_bars() as update:
             campaign = generate_campaign(
-                machine, wanted, design, noise, measured, seed, program, update
+                machine, wanted, design, noise, seed, program, update
             )
     except (NotApplicable, SimulationFailed) as error:
         raise BadInput(str(error)) from None

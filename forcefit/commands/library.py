@@ -1,11 +1,13 @@
 """The commands ``forcefit stiffness library ...``."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from forcefit.commands.options import JsonOption
+from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
@@ -20,21 +22,13 @@ def build(
     json: JsonOption = None,
 ) -> None:
     """Compute the entries of a build file that are not there yet."""
-    from rich.console import Console
-    from rich.progress import Progress
-
     from forcefit.inputs.errors import checked
     from stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)
     count = int(checked("--workers", workers, "1", least=1))
-    with Progress(console=Console(stderr=True)) as bars:
-        task = bars.add_task("entries")
-        files = build_library(
-            wanted,
-            count,
-            lambda done, total: bars.update(task, completed=done, total=total),
-        )
+    with progress_bars() as update:
+        files = build_library(wanted, count, partial(update, "entries"))
     write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
     if json != "-":
         print(f"{len(files)} entries in {wanted.folder}")

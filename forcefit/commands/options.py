@@ -334,9 +334,6 @@ def parse_assignments(
     return values
 
 
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
 def parse_axis(option: str, text: str) -> "NDArray":
     """A direction as ``x``, ``-y`` or ``1,0,2``.
 
@@ -353,11 +350,12 @@ def parse_axis(option: str, text: str) -> "NDArray":
     import numpy as np
 
     from forcefit.inputs.number_arrays import comma_numbers
+    from stiffness.screws import UNIT_VECTORS
 
     name = text.strip().lower()
-    if name.lstrip("+-") in _AXES and len(name) <= 2:
+    if name.lstrip("+-") in UNIT_VECTORS and len(name) <= 2:
         sign = -1.0 if name.startswith("-") else 1.0
-        return sign * np.array(_AXES[name.lstrip("+-")])
+        return sign * np.array(UNIT_VECTORS[name.lstrip("+-")])
     vector = comma_numbers(text)
     if vector.shape != (3,) or not vector.any():
         raise BadInput(

@@ -59,7 +59,7 @@ def stiffness(
 ) -> None:
     """How stiff the platform is, and which part gives way."""
     from assembly.report.platform_stiffness import (
-        draw_shares,
+        plot_shares,
         stiffness_of,
         stiffness_text,
     )
@@ -82,7 +82,7 @@ def stiffness(
         for path, slope in results.get("slopes", {}).items():
             print(f"dC/d({path}), diagonal: {slope.diagonal()}")
     if output is not None and "shares" in results:
-        save_figure(draw_shares(results), output)
+        save_figure(plot_shares(results), output)
     if results["status"] != "ok":
         raise typer.Exit(1)
 

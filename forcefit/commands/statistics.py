@@ -4,7 +4,7 @@ import sys
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,9 @@ from forcefit.commands.options import (
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from assembly.statistics.allocation import Allocation
 
 PlayOption = Annotated[
     str,
@@ -65,7 +68,7 @@ def statistics(
         Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw histograms, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -167,7 +170,7 @@ def tolerances(
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw the tolerances, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -181,13 +184,8 @@ def tolerances(
     from dataclasses import replace
 
     from assembly.robots import load_robot
-    from assembly.statistics.allocated_tolerances import (
-        allocation_of,
-        allocation_text,
-        tolerance_dataset,
-    )
+    from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
-    from assembly.statistics.plot import allocation_figure
     from assembly.statistics.replay import journalled
     from assembly.statistics.tolerance_file import read_plan
     from assembly.statistics.tolerances import (
@@ -196,7 +194,7 @@ def tolerances(
         present_errors,
         present_text,
     )
-    from assembly.sweeps.dataset import check_dataset, save_dataset
+    from assembly.sweeps.dataset import check_dataset
 
     _check_clearance_model(play)
     _check_word("--compliant", compliant, ("free", "rigid"))
@@ -235,11 +233,7 @@ def tolerances(
             allocation = allocate(postures, asked_plan, fresh, update, replay)
             results["allocation"] = allocation_of(allocation)
             texts.append(allocation_text(results["allocation"]))
-            data = tolerance_dataset(allocation)
-            if output is not None:
-                save_dataset(data, output)
-            if figure is not None:
-                save_figure(allocation_figure(data), figure)
+            _save_allocation(allocation, output, figure)
     write_json(results, json)
     held.close()
     if json != "-":
@@ -247,3 +241,18 @@ def tolerances(
     check = results.get("allocation", {}).get("verification") or {}
     if check.get("verdict") == "contradicted":
         raise typer.Exit(1)
+
+
+def _save_allocation(
+    allocation: "Allocation", output: Path | None, figure: Path | None
+) -> None:
+    """The tolerances as a data set and as a picture, where asked for."""
+    from assembly.statistics.allocated_tolerances import tolerance_dataset
+    from assembly.statistics.plot import allocation_figure
+    from assembly.sweeps.dataset import save_dataset
+
+    data = tolerance_dataset(allocation)
+    if output is not None:
+        save_dataset(data, output)
+    if figure is not None:
+        save_figure(allocation_figure(data), figure)

@@ -1,6 +1,7 @@
 """The commands ``forcefit stiffness ...``: parse, call, print or save."""
 
 import logging
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ import typer
 from forcefit.commands.library import library
 from forcefit.commands.link_exchange import export, import_
 from forcefit.commands.options import JsonOption
+from forcefit.commands.progress import progress_bars
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
@@ -121,7 +123,14 @@ def beam(
     from stiffness.report.results import link_results, link_text
 
     options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, theory, section
+        young=young,
+        poisson=poisson,
+        radius=radius,
+        inner_radius=inner_radius,
+        width=width,
+        height=height,
+        theory=theory,
+        section_text=section,
     )
     along = parse_axis("--axis", axis)
     tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
@@ -169,7 +178,7 @@ def fea(
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.parts import parse_mass, parse_part
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import Budget, solve_link
+    from stiffness.fem.fea import Budget, FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.report.results import link_results, link_text
     from stiffness.surface.surface import read_surface
@@ -178,14 +187,14 @@ def fea(
     held, moved = _interfaces(base, tip)
     density = checked("--density", density, "kg/m^3", least=0)
     budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
-    accuracy = _accuracy(accuracy)
+    options = FemOptions(_accuracy(accuracy), interface, budget)
     materials = [Material(E, nu, density)]
     materials += [parse_part("--part", text) for text in part or ()]
     masses = [parse_mass("--mass", text) for text in mass or ()]
     _tell_progress()
     link = solve_link(
         read_surface(surface, unit), held, moved, materials,
-        accuracy=accuracy, interface=interface, point_masses=masses, budget=budget,
+        options=options, point_masses=masses,
     ).link  # fmt: skip
     write_json(link_results(link), json)
     if json != "-":
@@ -218,12 +227,20 @@ def compare(
     The beam is straight, of the section given, or along a curve.
     """
     from forcefit.commands.beam_options import BeamOptions
-    from stiffness.fem.fea import mesh_link
+    from stiffness.fem.fea import FemOptions, mesh_link
+    from stiffness.fem.material import Material
     from stiffness.report.compare import compare_link
     from stiffness.report.results import comparison_results, comparison_text
 
     options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, theory, section
+        young=young,
+        poisson=poisson,
+        radius=radius,
+        inner_radius=inner_radius,
+        width=width,
+        height=height,
+        theory=theory,
+        section_text=section,
     )
     (E, nu), roll = options.material(), _up(up)
     if curve is not None:
@@ -238,8 +255,9 @@ def compare(
         check_writable(figure, PICTURE)
     _tell_progress()
     meshed = mesh_link(
-        surface, held, moved, E, nu, unit=unit, accuracy=accuracy, interface=interface
-    )
+        surface, held, moved, Material(E, nu), unit=unit,
+        options=FemOptions(accuracy, interface),
+    )  # fmt: skip
     if bent is None:
         straight = options.link(meshed.base, meshed.tip, roll)
         comparison = compare_link(straight, meshed, size)
@@ -273,9 +291,6 @@ def slenderness(
 
     r is twice the section's larger radius of gyration, a round bar's radius.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_sizes
     from stiffness.report.results import sweep_results, sweep_text
@@ -289,11 +304,11 @@ def slenderness(
     accuracy = _accuracy(accuracy)
     if figure is not None:
         check_writable(figure, PICTURE)
-    with Progress(console=Console(stderr=True)) as bars:
-        task = bars.add_task("lengths", total=len(wanted))
+    with progress_bars() as update:
+        update("lengths", 0, len(wanted))
         sweep = sweep_slenderness(
             declared, E, nu, wanted, accuracy=accuracy, interface=interface,
-            update=lambda done, total: bars.update(task, completed=done, total=total),
+            update=partial(update, "lengths"),
         )  # fmt: skip
     if figure is not None:
         from stiffness.report.plot import plot_slenderness
@@ -337,7 +352,7 @@ def stress(
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.commands.options import parse_load
     from forcefit.inputs.errors import checked
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.fem.stress import peak_stress, stress_influence
     from stiffness.report.results import stress_results, stress_text
@@ -362,7 +377,7 @@ def stress(
     _tell_progress()
     solved = solve_link(
         read_surface(surface, unit), held, moved, [Material(E, nu)],
-        accuracy=accuracy, interface=interface,
+        options=FemOptions(accuracy, interface),
     )  # fmt: skip
     peak = peak_stress(solved, load, section=declared, up=roll, away=away)
     if figure is not None:

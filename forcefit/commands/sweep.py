@@ -3,7 +3,7 @@
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,9 @@ from forcefit.commands.options import (
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+
+if TYPE_CHECKING:
+    from assembly.sweeps.sweep import Solver
 
 
 def sweep(
@@ -83,7 +86,7 @@ def sweep(
         str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw it, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot it, as PNG, SVG or PDF.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -94,8 +97,13 @@ def sweep(
     """
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
-    from assembly.sweeps.request import ask_sweep, summary_of, summary_text
-    from assembly.sweeps.sweep import Solver, journal_path, run_sweep, solve_here
+    from assembly.sweeps.request import (
+        SweepOptions,
+        ask_sweep,
+        summary_of,
+        summary_text,
+    )
+    from assembly.sweeps.sweep import journal_path, run_sweep
 
     if workers is not None and scheduler is not None:
         raise BadInput("sweep: found --workers and --scheduler, expected one of them")
@@ -107,21 +115,20 @@ def sweep(
     with progress_bars() as update:
         update("robot", 0, 1)  # where it is placed, code may be compiled
         asked = ask_sweep(
-            robot, grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-            seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
-            linearisation=linearisation, near=near, yield_strength=yield_strength,
-            load=wrench or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
-            stiffness=stiffness,
+            robot,
+            SweepOptions(
+                grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
+                seed=seed, reading=reading, play_alone=play_alone,
+                wrench=wrench_of or (), linearisation=linearisation, near=near,
+                yield_strength=yield_strength, load=wrench or (0.0,) * 6,
+                gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
+            ),
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
     done = [0]
-    solver: Solver = solve_here
-    if workers is not None or scheduler is not None:
-        from assembly.sweeps.cluster import cluster_solver
-
-        solver = cluster_solver(workers, scheduler)
+    solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written
     try:
         with progress_bars() as update:
@@ -148,6 +155,17 @@ def sweep(
         print(summary_text(summary, data))
 
 
+def _solver(workers: int | None, scheduler: str | None) -> "Solver":
+    """What solves blocks of points: this process, others beside it, or a cluster."""
+    if workers is None and scheduler is None:
+        from assembly.sweeps.sweep import solve_here
+
+        return solve_here
+    from assembly.sweeps.cluster import cluster_solver
+
+    return cluster_solver(workers, scheduler)
+
+
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
     output: Annotated[
@@ -162,7 +180,7 @@ def plot(
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
 ) -> None:
-    """Draw a saved file: maps, lines, histograms, tolerances."""
+    """Plot a saved file: maps, lines, histograms, tolerances."""
     from assembly.statistics.plot import KINDS, figure_of_draws
     from assembly.sweeps.dataset import open_dataset
     from assembly.sweeps.maps import figure_of

@@ -133,7 +133,7 @@ def crosscheck(
     ] = None,
     json: JsonOption = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw the slopes, as PNG, SVG or PDF.")
+        Path | None, typer.Option(help="Also plot the slopes, as PNG, SVG or PDF.")
     ] = None,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="[s] for each simulation.")

@@ -84,7 +84,7 @@ _SHORT.maxstring = 60
 _SHORT.maxlist = 8
 
 
-_LARGEST = 1e15  # in SI: beyond any length, modulus or density; its inverse below
+LARGEST = 1e15  # in SI: beyond any length, modulus or density; its inverse below
 
 
 def checked(
@@ -113,11 +113,11 @@ def checked(
         BadInput: it is not finite, outside the range, or of no physical size.
     """
     if math.isfinite(value) and above < value < below and value >= least:
-        in_range = abs(value) <= _LARGEST and (above != 0 or value >= 1 / _LARGEST)
+        in_range = abs(value) <= LARGEST and (above != 0 or value >= 1 / LARGEST)
         if not in_range:
             raise BadInput(
-                f"{option}: found {value:g}, expected a size between {1 / _LARGEST:g} "
-                f"and {_LARGEST:g} [{unit}]"
+                f"{option}: found {value:g}, expected a size between {1 / LARGEST:g} "
+                f"and {LARGEST:g} [{unit}]"
             )
         return value
     limits = [

@@ -16,9 +16,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from forcefit.inputs.errors import BadInput, nearest
-
-_LARGEST = 1e15  # in SI: beyond any length or constant of a section
+from forcefit.inputs.errors import LARGEST, BadInput, nearest
 
 
 @dataclass(frozen=True)
@@ -262,7 +260,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
     """
     if set(given) in _SECTIONS:
         for name, value in given.items():
-            if not (value == 0 or 1e-40 <= abs(value) <= _LARGEST):
+            if not (value == 0 or 1e-40 <= abs(value) <= LARGEST):
                 raise BadInput(f"{place}.{name}: found {value:g}, no size of a section")
         return
     known = set().union(*_SECTIONS)

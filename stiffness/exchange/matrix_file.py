@@ -143,8 +143,8 @@ def _matrix_market(path: Path, text: str) -> csr_array:
     from scipy.io import mmread
 
     try:
-        found = mmread(io.BytesIO(text.encode()))
-        return csr_array(found, dtype=float)
+        matrix = mmread(io.BytesIO(text.encode()))
+        return csr_array(matrix, dtype=float)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: no Matrix Market file: {reason}") from None
@@ -224,8 +224,8 @@ def _dmig(path: Path, text: str) -> tuple[csr_array, list[Freedom]]:
             names.add(fields[0])
             if fields[1] in {"0", ""}:  # the header: form, types
                 if fields[2] not in {"1", "6", ""}:
-                    found = describe(fields[2])
-                    raise BadInput(f"{path}: form {found}, expected 6 or 1, real")
+                    form = describe(fields[2])
+                    raise BadInput(f"{path}: form {form}, expected 6 or 1, real")
                 column = None
                 continue
             column = _whole(path, fields[1]), max(1, _whole(path, fields[2] or "0"))
@@ -239,8 +239,8 @@ def _dmig(path: Path, text: str) -> tuple[csr_array, list[Freedom]]:
                 row = _whole(path, node), max(1, _whole(path, direction or "0"))
                 entries[row, column] = _real(path, value)
     if len(names) != 1:
-        found = ", ".join(sorted(names)) or "none"
-        raise BadInput(f"{path}: found the matrices {found}, expected exactly one")
+        matrices = ", ".join(sorted(names)) or "none"
+        raise BadInput(f"{path}: found the matrices {matrices}, expected exactly one")
     return _from_entries(path, entries)
 
 

@@ -61,9 +61,9 @@ def link_of_both_ends(
     check_definite(f"{who}: the tip's part", K)
     X = -inverted(K) @ K12[6:, :6]
     arm = X[3:, :3]
-    found = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
+    own_offset = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
                       arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip
-    offset = found
+    offset = own_offset
     if base is not None and tip is not None:
         offset = np.asarray(base, dtype=float) - np.asarray(tip, dtype=float)
     ideal = both_ends(K, offset)

@@ -9,7 +9,7 @@ import logging
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,37 @@ class Budget:
     levels: int = 12
 
 
+@dataclass(frozen=True)
+class FemOptions:
+    """How exactly a link is solved, held by which interfaces, at what cost.
+
+    Attributes:
+        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
+        interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
+            see :mod:`stiffness.fem.condensation`.
+        budget: what it may cost.
+        cache: folder of meshes; the user's cache if absent.
+    """
+
+    accuracy: float = 0.005
+    interface: str = "rigid"
+    budget: Budget = field(default_factory=Budget)
+    cache: Path | str | None = None
+
+    def __post_init__(self) -> None:
+        if self.interface not in KINDS:
+            given = describe(self.interface)
+            hint = nearest(str(self.interface), KINDS)
+            raise BadInput(f"interface: found {given}{hint}")
+        if not 1e-5 <= self.accuracy <= 0.5:
+            raise BadInput(
+                f"accuracy = {self.accuracy:g} must lie between 1e-05 and 0.5"
+            )
+
+
+_STANDARD = FemOptions()
+
+
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
     """A link solved on its finest mesh, for stresses besides the stiffness.
@@ -74,15 +105,10 @@ def mesh_link(
     surface: Path | str,
     base: Interface,
     tip: Interface,
-    E: float,
-    nu: float,
+    material: Material,
     *,
     unit: str = "m",
-    accuracy: float = 0.005,
-    interface: str = "rigid",
-    density: float = 0.0,
-    budget: Budget | None = None,
-    cache: Path | str | None = None,
+    options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
     """Stiffness of a link of one material, from a surface file.
 
@@ -90,39 +116,23 @@ def mesh_link(
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
         base: the held interface, in metres, in the surface's axes.
         tip: the interface that moves.
-        E: [Pa] Young's modulus, > 0.
-        nu: [-] Poisson's ratio, in (-1, 0.5).
+        material: of the link; without a density mass and inertia are left out.
         unit: of the surface file's coordinates.
-        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
-        interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
-            see :mod:`stiffness.fem.condensation`.
-        density: [kg/m^3] for mass and inertia; 0 leaves them out.
-        budget: what it may cost.
-        cache: folder of meshes; the user's cache if absent.
+        options: how it is solved.
 
     Returns:
         The stiffness at the tip's centre, in the surface's axes; its ``mesh`` says
         whether the asked accuracy was ``reached``.
 
     Raises:
-        BadInput: the file, an interface, the material or an option is not proper.
+        BadInput: the file or an interface is not proper.
 
     Sources:
         Rivara (1984) for the bisection; :mod:`stiffness.fem.error_indicator` for the
         error.
     """
     shape = read_surface(Path(surface), unit)
-    material = (Material(E, nu, density),)
-    return solve_link(
-        shape,
-        base,
-        tip,
-        material,
-        accuracy=accuracy,
-        interface=interface,
-        budget=budget,
-        cache=cache,
-    ).link
+    return solve_link(shape, base, tip, (material,), options=options).link
 
 
 def solve_link(
@@ -131,11 +141,8 @@ def solve_link(
     tip: Interface,
     materials: Sequence[Material],
     *,
-    accuracy: float = 0.005,
-    interface: str = "rigid",
+    options: FemOptions = _STANDARD,
     point_masses: Sequence[PointMass] = (),
-    budget: Budget | None = None,
-    cache: Path | str | None = None,
 ) -> MeshedLink:
     """Solve a link to an asked accuracy.
 
@@ -144,32 +151,26 @@ def solve_link(
         base: the held interface.
         tip: the interface that moves.
         materials: the first fills the link, later ones where they say.
-        accuracy: [1] wanted largest error, entries scaled by sqrt(K_ii K_jj).
-        interface: ``"rigid"``, ``"distributing"`` or ``"distributing-both"``.
+        options: how it is solved.
         point_masses: added to mass, centre and inertia.
-        budget: what it may cost.
-        cache: folder of meshes; the user's cache if absent.
 
     Returns:
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface or an option is not proper.
+        BadInput: an interface is not proper.
     """
-    if interface not in KINDS:
-        raise BadInput(
-            f"interface: found {describe(interface)}{nearest(str(interface), KINDS)}"
-        )
-    if not 1e-5 <= accuracy <= 0.5:
-        raise BadInput(f"accuracy = {accuracy:g} must lie between 1e-05 and 0.5")
-    budget = budget or Budget()
+    accuracy, interface, budget = options.accuracy, options.interface, options.budget
     start = time.monotonic()
     centers = np.array([
         interface_center(surface, side, name)
         for side, name in ((base, "base"), (tip, "tip"))
     ])
     level = solve_level(
-        first_mesh(surface, base, tip, budget, cache), materials, centers, interface
+        first_mesh(surface, base, tip, budget, options.cache),
+        materials,
+        centers,
+        interface,
     )
     history, sizes = [level.totals()], [len(level.solid.cells)]
     while True:

@@ -149,7 +149,15 @@ def peak_stress(
     stress, where = peak_beam_stress(section, length - 2 * field.away, near_tip)
     where = base + R @ (where + [field.away, 0, 0])
     beam = (float(stress), where)
-    return PeakStress(w, value, place, field.region, field.away, beam, float(whole))
+    return PeakStress(
+        wrench=w,
+        von_mises=value,
+        place=place,
+        region=field.region,
+        away=field.away,
+        beam=beam,
+        beam_whole=float(whole),
+    )
 
 
 def von_mises(stress: ArrayLike) -> NDArray:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from forcefit.inputs.errors import checked
+from forcefit.inputs.errors import LARGEST, checked
 from forcefit.inputs.table import BadInput, read_toml
 from forcefit.inputs.writing import write_json
 from stiffness.beam.curve import curve_compliance
@@ -27,7 +27,6 @@ from stiffness.surface.beam_surfaces import check_shape, shape_beam, shape_surfa
 
 _MATERIAL = ("young", "poisson", "density")
 _METHODS = ("beam", "fea")
-_LARGEST = 1e15  # in SI: beyond any length, modulus or density
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def read_spec(path: Path | str) -> Spec:
 def _is_number(value: object) -> bool:
     """A number of a sane size, not true or false."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
-    return proper and -_LARGEST <= value <= _LARGEST  # type: ignore[operator]
+    return proper and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
@@ -243,7 +242,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
     if spec.method == "beam":
         C = curve_compliance(shape_beam(spec.shape, lengths, nu), E, nu)
         return LinkStiffness("Timoshenko beam", C, tip=tip, base=np.zeros(3)), ""
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
 
@@ -253,7 +252,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
         parse_interface("z=0"),
         parse_interface(f"z={lengths['length']!r}"),
         [Material(E, nu, point.get("density", 0.0))],
-        accuracy=spec.accuracy,
+        options=FemOptions(spec.accuracy),
     )
     return solved.link, surface.digest()
 

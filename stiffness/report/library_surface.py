@@ -80,15 +80,16 @@ class SurfaceLink:
         Raises:
             BadInput: the surface or an interface is not usable.
         """
-        from stiffness.fem.fea import mesh_link
+        from stiffness.fem.fea import FemOptions, mesh_link
+        from stiffness.fem.material import Material
 
         try:
             return mesh_link(
                 self.surface,
                 parse_interface(self.base, "base"),
                 parse_interface(self.tip, "tip"),
-                self.young, self.poisson, unit=self.unit, accuracy=self.accuracy,
-                interface=self.interface, density=self.density,
+                Material(self.young, self.poisson, self.density), unit=self.unit,
+                options=FemOptions(self.accuracy, self.interface),
             )  # fmt: skip
         except BadInput as error:
             raise BadInput(f"link {quoted(self.name)}: {error}") from None

@@ -101,7 +101,7 @@ def sweep_slenderness(
     Raises:
         BadInput: a section of another kind, or fewer than two lengths.
     """
-    from stiffness.fem.fea import solve_link
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
 
@@ -124,8 +124,7 @@ def sweep_slenderness(
             parse_interface("z=0"),
             parse_interface(f"z={length!r}"),
             [Material(E, nu)],
-            accuracy=accuracy,
-            interface=interface,
+            options=FemOptions(accuracy, interface),
         ).link
         C = beam_compliance(length, constants, E, nu, axis=[0, 0, 1], up=[0, 1, 0])
         beam = LinkStiffness("Timoshenko beam", C, tip=fea.tip, base=fea.base)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.number_arrays import comma_numbers, number_array
 from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.beam.beam import unit_vector
+from stiffness.screws import UNIT_VECTORS
 
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +97,8 @@ def _from_text(text: str) -> Interface:
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
-    if equals and kind in _AXES and lengths == [1]:
-        direction = np.array(_AXES[kind])
+    if equals and kind in UNIT_VECTORS and lengths == [1]:
+        direction = np.array(UNIT_VECTORS[kind])
         return Interface("plane", parts[0][0] * direction, direction, math.inf)
     if equals and kind == "plane" and lengths == [3, 3]:
         return Interface("plane", parts[0], parts[1], math.inf)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink, Frame, beam_axis
 from stiffness.beam.beam import section_axes
-from stiffness.fem.fea import solve_link
+from stiffness.fem.fea import FemOptions, solve_link
 from stiffness.fem.material import Material
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import Surface
@@ -49,7 +49,8 @@ def bar_compliance(
     ])  # fmt: skip
     surface = Surface(points, triangles, f"round bar of slenderness {slenderness:g}")
     ends = parse_interface("z=0"), parse_interface("z=1")
-    solved = solve_link(surface, *ends, [Material(1.0, poisson)], accuracy=accuracy)
+    material, options = Material(1.0, poisson), FemOptions(accuracy)
+    solved = solve_link(surface, *ends, [material], options=options)
     return np.array(solved.link.compliance)
 
 

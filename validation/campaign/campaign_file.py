@@ -4,6 +4,7 @@ The format is that of ``docs/campaigns.md``.
 """
 
 import os.path
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -104,14 +105,14 @@ def _declared(root: Table) -> _Declared:
     """All of ``campaign.toml`` but its robot."""
     folder = Path(root.file).parent
     declared = _Declared(
-        root,
-        folder.resolve().name,
-        tuple(folder / name for name in _table_names(root)),
-        root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4),
-        _read_points(root),
-        root.choice("registration", ("known", "unknown"), "known"),
-        _read_noise(root),
-        read_dialect(root),
+        root=root,
+        name=folder.resolve().name,
+        files=tuple(folder / name for name in _table_names(root)),
+        point=root.array("reference_point", (3,), "m", np.zeros(3), largest=1e4),
+        points=_read_points(root),
+        registration=root.choice("registration", ("known", "unknown"), "known"),
+        noise=_read_noise(root),
+        dialect=read_dialect(root),
     )
     root.finish()
     return declared
@@ -152,21 +153,16 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     transforms = np.array([p.transforms for p in postures])
     platform = transforms[:, robot.index(robot.platform)]
     extent = extent_of(transforms, platform[:, :3, 3])
-    named = {"reference_point": point, **{f"points.{k}": p for k, p in points.items()}}
-    for place, at in named.items():
-        if np.linalg.norm(at) > 10 * extent:
-            message = f"found {np.linalg.norm(at):g} m from the platform, the robot is "
-            message += f"{extent:.3g} m across; expected a point in m"
-            raise declared.root.bad(place, message)
+    _check_points(declared, extent)
     if measured:
         check_measured(table, points)
+    # readings and their sigma by point, the reference point's first
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
         reach = extent_of(transforms, platform[:, :3, 3] + platform[:, :3, :3] @ at)
         check_readings(table, name, every[name][1], declared.registration, reach)
     row, which = _rows_of_points(every, measured)
-    names = [*every]
     configuration = configuration[row]
     loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # no negative zero
     session = np.array(table.sessions)[row] if table.sessions else None
@@ -176,10 +172,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     return Campaign(
         name=declared.name,
         robot=robot,
-        ids=tuple(
-            f"{table.ids[i]}:{names[k]}" if names[k] else table.ids[i]
-            for i, k in zip(row, which, strict=True)
-        ),
+        ids=_labels(table.ids, [*every], row, which),
         coordinates=np.array([p.coordinates for p in postures])[configuration],
         transforms=transforms[configuration],
         mismatch=np.array([p.mismatch for p in postures])[configuration],
@@ -198,7 +191,27 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         repeat=number_rows(configuration, loads, *kinds),
         session=session,
         points=points,
-        point=np.array(names, dtype=str)[which] if points else None,
+        point=np.array([*every], dtype=str)[which] if points else None,
+    )
+
+
+def _check_points(declared: _Declared, extent: float) -> None:
+    """Refuse points measured that lie far from a robot of an extent [m]."""
+    points = {f"points.{name}": at for name, at in declared.points.items()}
+    for place, at in ({"reference_point": declared.point} | points).items():
+        if np.linalg.norm(at) > 10 * extent:
+            message = f"found {np.linalg.norm(at):g} m from the platform, the robot is "
+            message += f"{extent:.3g} m across; expected a point in m"
+            raise declared.root.bad(place, message)
+
+
+def _labels(
+    ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
+) -> tuple[str, ...]:
+    """Names of rows of points: the row's own, and the point's if it has a name."""
+    return tuple(
+        f"{ids[i]}:{points[k]}" if points[k] else ids[i]
+        for i, k in zip(row, which, strict=True)
     )
 
 
@@ -267,8 +280,10 @@ def _read_robot(root: Table, name: str) -> Robot:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
     if not os.path.isfile(path):
-        found = f"found {quoted(name)}, neither a built-in robot nor a file beside this"
-        raise root.bad("robot", f"{found}{nearest(name, BUILT_IN)}")
+        message = (
+            f"found {quoted(name)}, neither a built-in robot nor a file beside this"
+        )
+        raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
     return read_robot(path)
 
 
@@ -310,12 +325,12 @@ def _place(table: MeasurementTable, robot: Robot, commanded: str,
     """The posture of each of these rows, or an error that names the first missed."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
-    found = []
+    placed = []
     for row, posture, reason in zip(rows, postures, reasons, strict=True):
         if posture is None:
             raise table.bad(int(row), "", reason)
         if not posture.mismatch < _CLOSED:
             message = f"the closures stay open by {posture.mismatch:.3g} rad or m"
             raise table.bad(int(row), "", f"{message}, expected < {_CLOSED:g}")
-        found.append(posture)
-    return found
+        placed.append(posture)
+    return placed

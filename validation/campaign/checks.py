@@ -61,13 +61,13 @@ def _check_covariates(table: MeasurementTable) -> None:
         time, what = columns["cov.time"], "seconds since the first measurement"
         _within(table, "cov.time", time, _LATEST, what)
         for i in np.flatnonzero(time < 0)[:1]:
-            found = f"found {time[i]:g} s, expected {what}, >= 0"
-            raise table.bad(int(i), "cov.time", found)
+            message = f"found {time[i]:g} s, expected {what}, >= 0"
+            raise table.bad(int(i), "cov.time", message)
     if "cov.approach" in columns:
         side = columns["cov.approach"]
         for i in np.flatnonzero(np.abs(side) != 1)[:1]:
-            found = f"found {side[i]:g}, expected -1 or 1"
-            raise table.bad(int(i), "cov.approach", found)
+            message = f"found {side[i]:g}, expected -1 or 1"
+            raise table.bad(int(i), "cov.approach", message)
 
 
 def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
@@ -114,8 +114,8 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)
         for i in np.flatnonzero(~(sigma[:, k] >= _FINEST) & ~np.isnan(sigma[:, k]))[:1]:
-            found = f"found {sigma[i, k]:g} {unit}"
-            message = f"{found}, expected one standard deviation > 0"
+            message = f"found {sigma[i, k]:g} {unit}, expected one standard "
+            message += "deviation > 0"
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         expected = (
             f"at most half a turn in rad{_UNITS}"
@@ -154,5 +154,5 @@ def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
     """Refuse the first value whose size is larger than any sound one."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
-        found = f"found {values[i]:g}"
-        raise table.bad(int(i), name, f"{found}, expected {expected}")
+        message = f"found {values[i]:g}, expected {expected}"
+        raise table.bad(int(i), name, message)

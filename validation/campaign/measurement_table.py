@@ -17,13 +17,19 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE
 from assembly.model.robot import Robot
-from forcefit.inputs.errors import BadInput, describe, nearest, printable, quoted
+from forcefit.inputs.errors import (
+    LARGEST,
+    BadInput,
+    describe,
+    nearest,
+    printable,
+    quoted,
+)
 from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
 from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
 
 _TEXTS = ("id", "session")  # columns that are no numbers
-_LARGEST = 1e15  # no reading in any unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +147,15 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
     stems = [Path(table.file).stem for table in tables]
     pairs = list(zip(stems, tables, strict=True))
     return MeasurementTable(
-        tables[0].file,
-        tuple(f"{stem}/{label}" for stem, t in pairs for label in t.ids),
-        tuple(line for t in tables for line in t.lines),
-        columns,
-        tables[0].dialect,
-        tuple(s for stem, t in pairs for s in (t.sessions or (stem,) * len(t))),
-        tuple(t.file for t in tables for _ in t.ids),
+        file=tables[0].file,
+        ids=tuple(f"{stem}/{label}" for stem, t in pairs for label in t.ids),
+        lines=tuple(line for t in tables for line in t.lines),
+        columns=columns,
+        dialect=tables[0].dialect,
+        sessions=tuple(
+            s for stem, t in pairs for s in (t.sessions or (stem,) * len(t))
+        ),
+        files=tuple(t.file for t in tables for _ in t.ids),
     )
 
 
@@ -272,7 +280,7 @@ def _numbers(
         if not cell:
             raise table.bad(i, name, "empty; only meas. and sigma. cells may be")
         values[i] = parse_number(cell, table.dialect.decimal)
-        if not abs(values[i]) <= _LARGEST:
+        if not abs(values[i]) <= LARGEST:
             expected = f"expected a finite number{f' [{unit}]' if unit else ''}"
             hint = _number_hint(name, cell, table.dialect)
             raise table.bad(i, name, f"found {quoted(cell)}, {expected}{hint}")
@@ -284,12 +292,12 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
     other = "," if dialect.decimal == "." else "."
     if math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
-        said = f'decimal = "{other}" in campaign.toml'
+        setting = f'decimal = "{other}" in campaign.toml'
         if other == dialect.delimiter:  # in quotes: the comma cannot part cells too
-            said = f'delimiter = ";", {said} and part cells by ";"'
+            setting = f'delimiter = ";", {setting} and part cells by ";"'
         return (
             f'; a decimal "{other}" is not read here: write {written}, or say [table] '
-            f"{said}"
+            f"{setting}"
         )
     if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:
         taken = name.startswith(("meas.", "sigma."))

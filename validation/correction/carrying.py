@@ -87,10 +87,10 @@ class Carried:
     @property
     def effects(self) -> dict[str, dict[str, float]]:
         """What was fitted, by effect."""
-        found: dict[str, dict[str, float]] = {}
+        values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, self.values.tolist(), strict=True):
-            found.setdefault(effect, {})[name] = value
-        return found
+            values.setdefault(effect, {})[name] = value
+        return values
 
 
 def carry(
@@ -121,17 +121,17 @@ def carry(
         chosen = setup[of_it]
         which = f"session {quoted(session)}" if session is not None else campaign.name
         if not chosen.any() or chosen.all():
-            found = "no set-up rows" if not chosen.any() else "nothing but set-up rows"
-            raise BadInput(f"--setup: found {found} in {which}; expected some, not all")
+            rows = "no set-up rows" if not chosen.any() else "nothing but set-up rows"
+            raise BadInput(f"--setup: found {rows} in {which}; expected some, not all")
         own = replace(campaign.take(of_it), robot=_unregistered(campaign.robot))
         answers.append(_carried(own, declared.take(of_it), chosen, fitted, session))
     return answers
 
 
-def carried_robot(robot: Robot, found: Sequence[Carried]) -> Robot:
+def carried_robot(robot: Robot, carried: Sequence[Carried]) -> Robot:
     """The robot with what was found of its sessions, its old registration gone."""
     robot = _unregistered(robot)
-    for one in found:
+    for one in carried:
         if one.session is None:
             merged = _added(robot.effects, one.effects)
             robot = replace(robot, effects=merged)
@@ -189,11 +189,17 @@ def _carried(
         worst = np.flatnonzero(blame > 0.1 * blame.max())
         open_ = tuple(names[k][1] for k in worst)
     return Carried(
-        session, tuple(names), fit.values, np.sqrt(np.diag(fit.covariance)),
-        (int(setup.sum()), int((~setup).sum())), error_of(rest, fit.deviation[~setup]),
-        error_of(declared.take(~setup), other.deviation[~setup]), uncertainty, left,
-        open_,
-    )  # fmt: skip
+        session=session,
+        names=tuple(names),
+        values=fit.values,
+        std=np.sqrt(np.diag(fit.covariance)),
+        rows=(int(setup.sum()), int((~setup).sum())),
+        error=error_of(rest, fit.deviation[~setup]),
+        declared=error_of(declared.take(~setup), other.deviation[~setup]),
+        uncertainty=uncertainty,
+        left=left,
+        open_=open_,
+    )
 
 
 def _names(
@@ -213,7 +219,7 @@ def _names(
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _SessionFit:
     """Values of a session.
 
     Attributes:
@@ -231,7 +237,7 @@ class _Fit:
 
 def _fitted(
     campaign: Campaign, setup: NDArray, names: list[tuple[str, str]], prior: NDArray
-) -> _Fit:
+) -> _SessionFit:
     """Gauss-Newton's method on the set-up rows."""
     conditions = finite_conditions(campaign)
     x = np.zeros(len(names))
@@ -259,7 +265,7 @@ def _fitted(
     excess = max(1.0, float(b @ b) / max(len(b) - len(x), 1))
     distinct = len(np.unique(campaign.configuration[setup]))
     alike = float(setup.sum()) / distinct
-    return _Fit(x, inverse * excess * alike, slopes, deviation)
+    return _SessionFit(x, inverse * excess * alike, slopes, deviation)
 
 
 def _tangent(

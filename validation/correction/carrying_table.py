@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from validation.correction.carrying import Carried
 
 
-def table(found: Sequence[Carried]) -> dict[str, Any]:
+def table(sessions: Sequence[Carried]) -> dict[str, Any]:
     """For machines: every session, its values and its errors on the other rows."""
     return {
         "sessions": [
@@ -29,7 +29,7 @@ def table(found: Sequence[Carried]) -> dict[str, Any]:
                     )
                 ],
             }
-            for one in found
+            for one in sessions
         ],
         "unit": {"position": "m", "rotation": "rad", "uncertainty": "m"},
     }
@@ -40,10 +40,10 @@ def _error(error: NDArray) -> dict[str, float]:
     return {"position": position, "rotation": rotation, "normalised": normalised}
 
 
-def text(found: Sequence[Carried]) -> str:
+def text(sessions: Sequence[Carried]) -> str:
     """For people."""
     lines = []
-    for one in found:
+    for one in sessions:
         name = one.session or "campaign"
         lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} others")
         lines.append(f"  others, as carried over: {_said(one.error)}")

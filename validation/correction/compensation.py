@@ -130,10 +130,17 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     )
     at_limit = np.asarray((q <= limits[0]) | (q >= limits[1]))
     return Compensation(
-        targets, tuple(robot.frames[i].name for i in driven), q,
-        there.conditions.transforms, last.coordinates, before, there.error, spread,
-        np.asarray(at_limit.any(axis=1)), reason,
-    )  # fmt: skip
+        targets=targets,
+        drives=tuple(robot.frames[i].name for i in driven),
+        commands=q,
+        transforms=there.conditions.transforms,
+        coordinates=last.coordinates,
+        before=before,
+        after=there.error,
+        spread=spread,
+        limited=np.asarray(at_limit.any(axis=1)),
+        reason=reason,
+    )
 
 
 def _each_once(targets: Campaign) -> Campaign:
@@ -222,9 +229,9 @@ class _Machine:
         """
         campaign, reason = _commanded(last, q)
         conditions = self.conditions(campaign)
-        answer = predict(conditions)
-        reason = np.where(reason == "", answer.reason, reason)
-        error = _between(conditions, answer.deviation, self.goal)
+        prediction = predict(conditions)
+        reason = np.where(reason == "", prediction.reason, reason)
+        error = _between(conditions, prediction.deviation, self.goal)
         return _Standing(
             campaign, conditions, error, _jacobian(conditions, q.shape[1])
         ), reason
@@ -287,8 +294,8 @@ def _step(
     for _ in range(q.shape[1] + 1):
         free = np.where(held[:, None, :], 0.0, A)
         rest = b - np.einsum("rij,rj->ri", A, np.where(held, step, 0.0))
-        found = np.einsum("rdi,ri->rd", np.linalg.pinv(free), rest)
-        step = np.where(held, step, found)
+        newton = np.einsum("rdi,ri->rd", np.linalg.pinv(free), rest)
+        step = np.where(held, step, newton)
         beyond = ~held & ((q + step < limits[0]) | (q + step > limits[1]))
         if not beyond.any():
             break

@@ -12,73 +12,75 @@ from validation.correction.compensation import Compensation
 from validation.correction.prediction import csv_text
 
 
-def command_table(found: Compensation) -> str:
+def command_table(compensation: Compensation) -> str:
     """The corrected commands as a table with the columns of the targets.
 
     Args:
-        found: of any targets.
+        compensation: of any targets.
 
     Returns:
         CSV: ``id``, ``q.*`` or ``pose.*``, loads and covariates as given; it can be
         commanded, measured and compensated again.
     """
-    targets = found.targets
-    platform = found.transforms[:, targets.robot.index(targets.robot.platform)]
+    targets = compensation.targets
+    platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
     columns: dict[str, Any] = {}
     if targets.commanded == "pose":
         poses = pose_components(platform)
         columns |= {f"pose.{name}": poses[:, k] for k, name in enumerate(POSE)}
     else:
         columns |= {
-            f"q.{n}": x for n, x in zip(found.drives, found.commands.T, strict=True)
+            f"q.{n}": x
+            for n, x in zip(compensation.drives, compensation.commands.T, strict=True)
         }
     loads = zip(LOAD, targets.loads.T, strict=True)
     columns |= {f"load.{name}": w for name, w in loads if w.any()}
     columns |= {f"cov.{name}": x for name, x in targets.covariates.items()}
     if targets.session is not None:
         columns["session"] = targets.session
-    return _text(found, columns)
+    return _text(compensation, columns)
 
 
-def offset_table(found: Compensation) -> str:
+def offset_table(compensation: Compensation) -> str:
     """What a controller adds to its commands, and the error before and after.
 
     Args:
-        found: of any targets.
+        compensation: of any targets.
 
     Returns:
         CSV: ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in position
         [m] and rotation [rad], ``spread`` [m] of the position after.
     """
     columns: dict[str, Any] = {
-        f"offset.{n}": x for n, x in zip(found.drives, found.offsets.T, strict=True)
+        f"offset.{n}": x
+        for n, x in zip(compensation.drives, compensation.offsets.T, strict=True)
     }
-    for when, error in (("before", found.before), ("after", found.after)):
+    for when, error in (("before", compensation.before), ("after", compensation.after)):
         columns[f"{when}.position"] = np.linalg.norm(error[:, 3:], axis=1)
         columns[f"{when}.rotation"] = np.linalg.norm(error[:, :3], axis=1)
-    columns["spread.position"] = np.linalg.norm(found.spread[:, 3:], axis=1)
-    return _text(found, columns)
+    columns["spread.position"] = np.linalg.norm(compensation.spread[:, 3:], axis=1)
+    return _text(compensation, columns)
 
 
-def _text(found: Compensation, columns: dict[str, Any]) -> str:
+def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
     """Columns under their names."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
             for name, values in columns.items()
         }
-        for i, label in enumerate(found.targets.ids)
+        for i, label in enumerate(compensation.targets.ids)
     }
     return csv_text(rows, list(columns))
 
 
 def summary(
-    found: Compensation, diagnosed: Mapping[str, float] | None = None
+    compensation: Compensation, diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
     """The same for machines: errors to be expected, and what stands in the way.
 
     Args:
-        found: of any targets.
+        compensation: of any targets.
         diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading that the
             robot's diagnosis left on rows kept aside, if known.
 
@@ -86,31 +88,31 @@ def summary(
         Plain values; ``expected`` is what the diagnosis left, as vectors of three, or
         else by the spread that the file states, None where neither says anything.
     """
-    ids = found.targets.ids
-    spread = _sizes(found.spread)
+    ids = compensation.targets.ids
+    spread = _sizes(compensation.spread)
     expected: dict[str, float | None] = {"position": None, "rotation": None}
     if diagnosed is not None:
         expected = {
             key: float(np.hypot(size or 0.0, np.sqrt(3.0) * diagnosed[key]))
-            for key, size in _sizes(found.after).items()
+            for key, size in _sizes(compensation.after).items()
         }
-    elif found.spread.any():
-        expected = _sizes(np.hypot(found.after, found.spread))
+    elif compensation.spread.any():
+        expected = _sizes(np.hypot(compensation.after, compensation.spread))
     return {
         "rows": len(ids),
-        "drives": list(found.drives),
-        "offsets": found.offsets,
+        "drives": list(compensation.drives),
+        "offsets": compensation.offsets,
         "error": {
             "unit": {"position": "m", "rotation": "rad"},
-            "before": _sizes(found.before),
-            "after": _sizes(found.after),
+            "before": _sizes(compensation.before),
+            "after": _sizes(compensation.after),
             "spread": spread,
             "expected": expected,
         },
-        "limited": [ids[i] for i in np.flatnonzero(found.limited)],
+        "limited": [ids[i] for i in np.flatnonzero(compensation.limited)],
         "without_answer": [
-            {"id": ids[i], "reason": found.reason[i]}
-            for i in np.flatnonzero(found.reason != "")
+            {"id": ids[i], "reason": compensation.reason[i]}
+            for i in np.flatnonzero(compensation.reason != "")
         ],
     }
 
@@ -125,16 +127,16 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
     return {"position": rms(error[:, 3:]), "rotation": rms(error[:, :3])}
 
 
-def summary_text(found: Compensation, table: Mapping[str, Any]) -> str:
+def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
     """The same for people, ``table`` being :func:`summary`'s."""
-    lines = [f"{table['rows']} commands, drives {', '.join(found.drives)}"]
+    lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",
         "expected": "to be expected",
     }  # fmt: skip
     for key, words in says.items():
         size = table["error"][key]
-        if key == "spread" and not found.spread.any():
+        if key == "spread" and not compensation.spread.any():
             continue
         if size["position"] is not None:
             lines.append(

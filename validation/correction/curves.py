@@ -1,7 +1,7 @@
 """Functions of a robot's file as curves, each with the band that its numbers leave.
 
-A function that remembers is drawn as its answer to a step of one unit, with time; one
-that turns with the direction, as it is when coming from below.
+A function that remembers is plotted as its response to a step of one unit, with time;
+one that turns with the direction, as it is when coming from below.
 """
 
 from collections.abc import Mapping
@@ -73,7 +73,7 @@ def curves_of(
         A curve for each component; of two variables one for each of three values of
         the second.
     """
-    found = []
+    curves = []
     for function in robot.functions:
         along, others = _variables(function)
         least, most = (over or {}).get(along) or _range(robot, function, along)
@@ -84,8 +84,8 @@ def curves_of(
             beside = [(others, v) for v in np.linspace(*ends, 3).tolist()]
         for component in function.components:
             for fixed in beside:
-                found.append(_curve(robot, function, component, along, fixed, x))
-    return found
+                curves.append(_curve(robot, function, component, along, fixed, x))
+    return curves
 
 
 def _variables(function: Function) -> tuple[str, str]:
@@ -114,9 +114,15 @@ def _curve(
     value_unit = f"rad{given.removeprefix('1')}" if turns else given
     x_unit = "s" if along == "time" else whole_unit(variable_unit(robot, along))
     return Curve(
-        function, component, along, fixed, x, values, np.sqrt(variance),
-        (x_unit, value_unit),
-    )  # fmt: skip
+        function=function,
+        component=component,
+        variable=along,
+        beside=fixed,
+        x=x,
+        values=values,
+        std=np.sqrt(variance),
+        units=(x_unit, value_unit),
+    )
 
 
 def _values(
@@ -157,7 +163,7 @@ def _range(robot: Robot, function: Function, variable: str) -> tuple[float, floa
     return -size, size
 
 
-def table(robot: Robot, found: list[Curve]) -> list[dict[str, Any]]:
+def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
     """The same for machines."""
     return [
         {
@@ -182,14 +188,14 @@ def table(robot: Robot, found: list[Curve]) -> list[dict[str, Any]]:
             "units": {"variable": c.units[0], "value": c.units[1]},
             "x": c.x, "value": c.values, "std": c.std,
         }
-        for c in found
+        for c in curves
     ]  # fmt: skip
 
 
-def text(found: list[Curve]) -> str:
+def text(curves: list[Curve]) -> str:
     """The same for people: a dozen points of each curve."""
     lines: list[str] = []
-    for c in found:
+    for c in curves:
         beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""
         form = FORMS[c.function.form].summary if c.function.form in FORMS else "formula"
         lines += [
@@ -204,22 +210,22 @@ def text(found: list[Curve]) -> str:
     return "\n".join(lines[1:])
 
 
-def figure_of(found: list[Curve]) -> "Figure":
+def figure_of(curves: list[Curve]) -> "Figure":
     """Every curve in a panel of its own, with twice its standard deviation.
 
     Args:
-        found: of :func:`curves_of`, at least one.
+        curves: of :func:`curves_of`, at least one.
 
     Returns:
         The figure.
     """
     from matplotlib.figure import Figure
 
-    columns = min(len(found), 3)
-    rows = -(-len(found) // columns)
+    columns = min(len(curves), 3)
+    rows = -(-len(curves) // columns)
     figure = Figure(figsize=(4.2 * columns, 3.2 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for panel, c in zip(panels, found, strict=False):
+    for panel, c in zip(panels, curves, strict=False):
         panel.fill_between(
             c.x, c.values - 2 * c.std, c.values + 2 * c.std, color="C0", alpha=0.25,
             lw=0,
@@ -230,6 +236,6 @@ def figure_of(found: list[Curve]) -> "Figure":
         panel.set_xlabel(plot_label(f"{c.variable} [{c.units[0]}]"))
         panel.set_ylabel(plot_label(f"{c.component} [{c.units[1]}]"))
         panel.grid(visible=True, alpha=0.3)
-    for panel in panels[len(found) :]:
+    for panel in panels[len(curves) :]:
         panel.set_visible(False)
     return figure

@@ -149,13 +149,13 @@ def reading_table(foretold: Foretold) -> str:
     Returns:
         CSV; a cell is empty where the robot has no answer.
     """
-    commands, found = foretold.commands, foretold.prediction.deviation
+    commands, deviations = foretold.commands, foretold.prediction.deviation
     columns = reading_names(commands)
     values: dict[str, dict[str, float]] = {}
     for i, full in enumerate(commands.ids):
         point = "" if commands.point is None else str(commands.point[i])
         row = values.setdefault(full.removesuffix(f":{point}") if point else full, {})
-        row |= {name: found[i, k] for name, at, k in columns if at == point}
+        row |= {name: deviations[i, k] for name, at, k in columns if at == point}
     return csv_text(values, [name for name, _, _ in columns])
 
 

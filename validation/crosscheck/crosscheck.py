@@ -198,7 +198,7 @@ def crosscheck(
     compared = replace(posture, robot=robot)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     force = wrench * [0, 0, 0, 1, 1, 1]  # its moment acts as a couple of dead forces
-    models = link_models(robot, links)
+    model = replace(link_models(robot, links), elements=ELEMENTS, clearances=clearances)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
@@ -208,9 +208,8 @@ def crosscheck(
     def solve(s: float) -> Pair:
         linear = solve_assembly(scaled(compared, s), s * wrench, gravity=s * g)
         simulated = simulate_assembly(
-            compared, s, load=s * force, gravity=s * g, elements=ELEMENTS,
-            clearances=clearances, time_limit=time_limit, couple=s * wrench[:3],
-            hold=bool(held) and not clearances, **vars(models),
+            compared, s, replace(model, hold=bool(held) and not clearances),
+            load=s * force, gravity=s * g, couple=s * wrench[:3], time_limit=time_limit,
         )  # fmt: skip
         if simulated.held:
             held.append(s)
@@ -223,7 +222,15 @@ def crosscheck(
             if clearances
             else PoseMetric(robot, pairs, springs, bool(g.any()))
         )
-        return Crosscheck(compared, wrench, links, g, pairs, asked, metric)
+        return Crosscheck(
+            posture=compared,
+            load=wrench,
+            links=links,
+            gravity=g,
+            pairs=pairs,
+            asked=asked,
+            metric=metric,
+        )
 
     return compare_scales(scales, solve, judge)
 

@@ -1,7 +1,6 @@
 """How a simulation models a robot's links: as beams, as springs or as solids."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,28 +9,13 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.solids import mesh_bodies
-from validation.multibody.exudyn_parts import MeshBody
+from validation.multibody.simulation import SimulationModel
 
 KINDS = ("beam", "spring", "fem")
 
 
-@dataclass(frozen=True, eq=False)
-class LinkModels:
-    """How a simulation models links, ready for ``simulate_assembly``.
-
-    Attributes:
-        links: ``"beam"`` or ``"spring"``.
-        stiffness: K_E of springs by frame.
-        meshes: solids by frame.
-    """
-
-    links: str
-    stiffness: Mapping[str, NDArray]
-    meshes: Mapping[str, MeshBody]
-
-
-def link_models(robot: Robot, kind: str) -> LinkModels:
-    """Stiffnesses and solids with which a simulation models a robot's links.
+def link_models(robot: Robot, kind: str) -> SimulationModel:
+    """The model of a robot's links: stiffnesses of springs, and solids.
 
     Args:
         robot: any.
@@ -39,7 +23,7 @@ def link_models(robot: Robot, kind: str) -> LinkModels:
             springs; ``"fem"``: meshed links as solids, the others as with ``"beam"``.
 
     Returns:
-        Stiffnesses and solids.
+        The model, joints without clearance.
 
     Raises:
         BadInput: an unknown kind, or a mesh is not usable.
@@ -52,7 +36,7 @@ def link_models(robot: Robot, kind: str) -> LinkModels:
         for name, K in link_stiffnesses(robot, kind).items()
         if name not in meshes
     }
-    return LinkModels("spring" if kind == "spring" else "beam", stiffness, meshes)
+    return SimulationModel("spring" if kind == "spring" else "beam", stiffness, meshes)
 
 
 def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:

@@ -63,7 +63,13 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
         q = link.density * section.area * g
         own = (R @ section_axes(axis, link.up)).T @ q
         yield HeavyBeam(
-            index, link, section, length, R @ (length * axis), own, q * length
+            index=index,
+            link=link,
+            section=section,
+            length=length,
+            line=R @ (length * axis),
+            weight=own,
+            total=q * length,
         )
 
 

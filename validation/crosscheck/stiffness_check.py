@@ -119,8 +119,8 @@ class StiffnessCheck:
             lines.append(f"{name:12s}{cells}")
         for name, value in self.differences.items():
             lines.append(f"{name} minus simulation: {value:.2g} of sqrt(C_ii C_jj)")
-        said = "passed" if self.passed else "FAILED"
-        lines.append(f"{said}: exact within {self.tolerance:.2g}")
+        outcome = "passed" if self.passed else "FAILED"
+        lines.append(f"{outcome}: exact within {self.tolerance:.2g}")
         return "\n".join(lines)
 
 
@@ -159,19 +159,19 @@ def check_stiffness(
     robot = without_clearance(posture.robot)
     posture = replace(posture, robot=robot)
     assembly = solve_exact(posture, wrench, gravity=gravity)
-    answer = exact_tangent(assembly)
-    if answer.free.shape[1]:
-        screw = numbers(answer.free[:, 0])
+    exact = exact_tangent(assembly)
+    if exact.free.shape[1]:
+        screw = numbers(exact.free[:, 0])
         raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
-    models = link_models(robot, links)
-    scale = np.repeat([1.0, 1.0 / answer.length], 3)
+    model = link_models(robot, links)
+    scale = np.repeat([1.0, 1.0 / exact.length], 3)
     columns, turns = [], []
-    for row, moved in enumerate(answer.compliance):
+    for row, moved in enumerate(exact.compliance):
         step = STEP / np.abs(moved * scale).max() * np.eye(6)[row]
         ahead, back = (
             simulate_assembly(
-                posture, 1.0, models.links, models.stiffness, wrench + sign * step,
-                gravity, meshes=models.meshes, time_limit=time_limit,
+                posture, model=model, load=wrench + sign * step, gravity=gravity,
+                time_limit=time_limit,
             ).platform_screw
             for sign in (1, -1)
         )  # fmt: skip
@@ -182,4 +182,4 @@ def check_stiffness(
     simulated = to_motion @ np.column_stack(columns)
     springs = np.stack([assembly.link_screws, assembly.joint_screws])[..., :3]
     turned = float(np.linalg.norm(springs, axis=-1).max())
-    return StiffnessCheck(answer, classical(posture), simulated, wrench, links, turned)
+    return StiffnessCheck(exact, classical(posture), simulated, wrench, links, turned)

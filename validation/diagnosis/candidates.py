@@ -2,13 +2,13 @@
 
 A small screw, or a compliance, at a place, as a function of something that was varied.
 
-======  =============  ===========  ==================================================
-symbol  code           shape        meaning
-======  =============  ===========  ==================================================
-a       ``answer``     (R, 6)       change of the reading per unit of a component
-P       ``basis``      (R, p)       columns of a form in a variable
-T       ``mixed``      (p, q)       numbers of the form per unknown of the search
-======  =============  ===========  ==================================================
+======  ===============  =========  ==================================================
+symbol  code             shape      meaning
+======  ===============  =========  ==================================================
+a       ``sensitivity``  (R, 6)     change of the reading per unit of a component
+P       ``basis``        (R, p)     columns of a form in a variable
+T       ``mixed``        (p, q)     numbers of the form per unknown of the search
+======  ===============  =========  ==================================================
 
 A component of a candidate adds a times P T to the readings.
 """
@@ -37,7 +37,7 @@ MANY = 150  # rows from which many waves a turn are looked for
 
 
 @dataclass(frozen=True)
-class Part:
+class CandidatePart:
     """Where a candidate acts, and what it depends on there.
 
     Attributes:
@@ -52,7 +52,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Shape:
+class CandidateShape:
     """A form with the names of its columns.
 
     Attributes:
@@ -76,9 +76,9 @@ class Candidate:
         shape: the form, the same for all parts.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[CandidatePart, ...]
     kind: str
-    shape: Shape
+    shape: CandidateShape
 
     def functions(self) -> list[Function]:
         """The functions of a robot file, their numbers still to be found."""
@@ -96,23 +96,23 @@ class Candidate:
         ]
 
 
-class Answers:
-    """How readings answer to components at any place, and the variables of the rows."""
+class Sensitivities:
+    """How readings respond to a component at any place; the rows' variables."""
 
     def __init__(
-        self, conditions: Conditions, robot: Robot, answers: Responses
+        self, conditions: Conditions, robot: Robot, response: Responses
     ) -> None:
         """Keep what candidates are made of.
 
         Args:
             conditions: R rows as declared.
             robot: the campaign's.
-            answers: of the readings there.
+            response: of the readings there.
         """
-        self.conditions, self.robot, self._answers = conditions, robot, answers
+        self.conditions, self.robot, self._response = conditions, robot, response
         self.basis = lru_cache(maxsize=None)(self._basis)
 
-    def answer(self, where: str, component: str, kind: str) -> NDArray:
+    def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         axis = AXES.index(component)
         if where == "reading":
@@ -122,14 +122,14 @@ class Answers:
             screw[:, axis] = 1.0
             origin = self.conditions.postures.platform[:, :3, 3]
             screw[:, 3:] += np.cross(screw[:, :3], origin)
-            return np.einsum("rij,rj->ri", self._answers.reading, screw)
+            return np.einsum("rij,rj->ri", self._response.reading, screw)
         row = self.conditions.robot.index(where)
-        answer = self._answers.screws[:, :, row, axis]
+        sensitivity = self._response.screws[:, :, row, axis]
         if kind == "compliance":
-            return answer * self._answers.wrenches[:, row, axis, None]
-        return answer
+            return sensitivity * self._response.wrenches[:, row, axis, None]
+        return sensitivity
 
-    def _basis(self, name: str, shape: Shape) -> tuple[NDArray, NDArray]:
+    def _basis(self, name: str, shape: CandidateShape) -> tuple[NDArray, NDArray]:
         """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
         numbers = dict.fromkeys(shape.names, 0.0) | dict(shape.given)
         function = Function("reading", ("tx",), (name,), shape.form, numbers)
@@ -164,8 +164,8 @@ class Answers:
         for part in one.parts:
             columns, _ = self.basis(part.variable, one.shape)
             for component in part.components:
-                answer = self.answer(part.where, component, one.kind)
-                blocks.append(answer[:, :, None] * columns[:, None, :])
+                sensitivity = self.sensitivity(part.where, component, one.kind)
+                blocks.append(sensitivity[:, :, None] * columns[:, None, :])
                 axes += [AXES.index(component)] * columns.shape[1]
         return np.concatenate(blocks, axis=2), np.array(axes)
 
@@ -221,7 +221,7 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 def places_of(
     robot: Robot, variables: Sequence[str]
-) -> Iterator[tuple[str, tuple[Part, ...]]]:
+) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
     """Kinds and parts of all candidates, variable by variable.
 
     Args:
@@ -241,13 +241,13 @@ def places_of(
     along = tuple((name, _along(robot, name)) for name in beams(robot))
     for name in variables:
         for where, components in single:
-            yield "screw", (Part(where, components, name),)
+            yield "screw", (CandidatePart(where, components, name),)
             if where not in {"reading", "base"} and len(components) == 1:
-                yield "compliance", (Part(where, components, name),)
+                yield "compliance", (CandidatePart(where, components, name),)
         if not name.startswith("q.") and len(along) > 1:
-            yield "screw", tuple(Part(w, c, name) for w, c in along)
+            yield "screw", tuple(CandidatePart(w, c, name) for w, c in along)
     if len(own) > 1:
-        together = tuple(Part(w, c, f"q.{w}") for w, c in own)
+        together = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)
         yield "screw", together
         yield "compliance", together
 
@@ -260,18 +260,20 @@ def _along(robot: Robot, name: str) -> tuple[str, ...]:
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
 
 
-def _waves(*orders: int) -> Shape:
-    return Shape("waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine")))
+def _waves(*orders: int) -> CandidateShape:
+    return CandidateShape(
+        "waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
+    )
 
 
-def _powers(*powers: int) -> Shape:
-    return Shape("powers", tuple(str(k) for k in powers))
+def _powers(*powers: int) -> CandidateShape:
+    return CandidateShape("powers", tuple(str(k) for k in powers))
 
 
-REVERSAL = Shape("reversal", ("0",))
+REVERSAL = CandidateShape("reversal", ("0",))
 
 
-def first_shapes(robot: Robot, name: str) -> list[Shape]:
+def first_shapes(robot: Robot, name: str) -> list[CandidateShape]:
     """Forms general enough to show whether a variable counts at all."""
     if name == "approach":
         return [_powers(1)]
@@ -282,7 +284,7 @@ def first_shapes(robot: Robot, name: str) -> list[Shape]:
     return [_powers(0, 1, 2, 3)]
 
 
-def all_shapes(conditions: Conditions, name: str, kind: str) -> list[Shape]:
+def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
     """Every form that is tried where a variable counts, those with a name first."""
     x = variable(conditions, name)
     low, high = float(x.min()), float(x.max())
@@ -299,18 +301,21 @@ def all_shapes(conditions: Conditions, name: str, kind: str) -> list[Shape]:
             shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
         if kind == "compliance":
             shapes += [
-                Shape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))
+                CandidateShape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))
                 for k in range(1, 5)
             ]
     if name in {"time", "cov.time"}:
         shapes += [
-            Shape("slow_wave", ("sine", "cosine"), (("period", (high - low) / k),))
+            CandidateShape(
+                "slow_wave", ("sine", "cosine"), (("period", (high - low) / k),)
+            )
             for k in (0.5, 1, 1.5, 2, 3, 4, 6)
         ]
     if not name.startswith(("load", "position")):
         levels = np.quantile(x, np.linspace(0.1, 0.9, 9))
         shapes += [
-            Shape("step", ("size",), (("at", float(v)),)) for v in np.unique(levels)
+            CandidateShape("step", ("size",), (("at", float(v)),))
+            for v in np.unique(levels)
         ]
     if (
         name.startswith("cov.")
@@ -319,12 +324,14 @@ def all_shapes(conditions: Conditions, name: str, kind: str) -> list[Shape]:
     ):
         span = float(np.ptp(conditions.time))
         shapes += [
-            Shape("lag", ("gain", "start"), (("time_constant", part * span),))
+            CandidateShape("lag", ("gain", "start"), (("time_constant", part * span),))
             for part in (0.02, 0.05, 0.1, 0.2, 0.5)
         ]
     if len(np.unique(x)) > KNOTS:
         ends = (("first", low), ("last", high))
-        shapes.append(Shape("spline", tuple(str(k + 1) for k in range(KNOTS)), ends))
+        shapes.append(
+            CandidateShape("spline", tuple(str(k + 1) for k in range(KNOTS)), ends)
+        )
     return shapes
 
 

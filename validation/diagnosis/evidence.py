@@ -117,8 +117,15 @@ class Background:
         return np.split(values, ends[:-1]) if self.terms else []
 
 
-NOTHING = Background((), np.zeros(0), {}, np.zeros((0, 0)), np.zeros(0),
-                     np.zeros((0, 0)), 0.0)  # fmt: skip
+NOTHING = Background(
+    terms=(),
+    size=np.zeros(0),
+    scales={},
+    axes=np.zeros((0, 0)),
+    gains=np.zeros(0),
+    turn=np.zeros((0, 0)),
+    score=0.0,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +166,15 @@ def background(terms: Sequence[SmallTerm], prior: Prior) -> Background:
     shown = gains > _FAINT
     gains, turn = gains[shown], turn[:, shown]
     axes = scaled @ turn / np.sqrt(gains)
-    return Background(tuple(kept), size, prior.scales, axes, gains, turn, prior.cost)
+    return Background(
+        terms=tuple(kept),
+        size=size,
+        scales=prior.scales,
+        axes=axes,
+        gains=gains,
+        turn=turn,
+        score=prior.cost,
+    )
 
 
 def _sizes(term: SmallTerm, scales: Sequence[float]) -> NDArray:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import plot_label
-from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.separability import Separability, compare_signatures
 
 if TYPE_CHECKING:

@@ -84,19 +84,32 @@ def errors_of(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class RowSets:
+    """Which rows were fitted, and which are scored.
+
+    Attributes:
+        fitted: mask (R,).
+        scored: mask (R,).
+    """
+
+    fitted: NDArray
+    scored: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
     """Effects and small unknowns together.
 
     Attributes:
         conditions: conditions of all R rows, as declared and registered.
-        answers: of the readings there.
+        response: of the readings there.
         fit: of effects, on the rows fitted.
         behind: small terms beside them.
         learned: functions among these.
     """
 
     conditions: Conditions
-    answers: Responses
+    response: Responses
     fit: Fit
     behind: Background
     learned: tuple[Learned, ...] = ()
@@ -105,7 +118,7 @@ class Model:
         """(R, 6) [rad, m] readings minus the model; NaN where not measured."""
         there = apply_effects(self.conditions, self.fit.effects)
         small = added(
-            campaign, self.answers, self.conditions, self.behind.terms,
+            campaign, self.response, self.conditions, self.behind.terms,
             self.behind.values(self.fit.residual),
             {term_name(k + 1): one.changes for k, one in enumerate(self.learned)},
         )  # fmt: skip
@@ -113,8 +126,8 @@ class Model:
 
 
 def ladder(
-    campaign: Campaign, declared: Conditions, model: Model, terms: Sequence[SmallTerm],
-    used: NDArray, held: NDArray, rank: int, residual: NDArray,
+    campaign: Campaign, declared: Conditions, model: FittedModel,
+    terms: Sequence[SmallTerm], rows: RowSets, rank: int, residual: NDArray,
 ) -> list[Rung]:  # fmt: skip
     """The steps up to a model.
 
@@ -123,17 +136,16 @@ def ladder(
         declared: conditions of all rows, before any registration.
         model: where the steps lead.
         terms: small terms of the rows fitted, with all their unknowns.
-        used: mask (R,) of the rows fitted.
-        held: mask (R,) of the rows scored.
+        rows: those fitted, and those scored.
         rank: unknowns of the library's effects that the readings can tell apart.
         residual: (R, 6) [rad, m] what the model leaves.
 
     Returns:
         One rung a step; a step that nothing asked for repeats the one before.
     """
-    fitting = campaign.take(used)
+    fitting = campaign.take(rows.fitted)
     conditions = with_clearance_held(model.conditions, model.fit)
-    some = conditions.take(used)
+    some = conditions.take(rows.fitted)
     names = [term.name for term in model.behind.terms]
     first = [name for name in (GEOMETRY, SPRINGS) if name in names]
 
@@ -142,12 +154,12 @@ def ladder(
         begin = np.concatenate([np.zeros(0), *(h.start for h in members)])
         start = model.fit.values if same else begin
         fit = refit(fitting, some, members, start, behind=behind)
-        step = Model(conditions, model.answers, fit, behind, model.learned)
-        error = errors_of(campaign, step.residual(campaign), held)
+        step = FittedModel(conditions, model.response, fit, behind, model.learned)
+        error = errors_of(campaign, step.residual(campaign), rows.scored)
         rungs.append(Rung(name, behind.unknowns - known, error))
 
     before = campaign.measured - predict(declared).deviation
-    rungs = [Rung("declared", 0, errors_of(campaign, before, held))]
+    rungs = [Rung("declared", 0, errors_of(campaign, before, rows.scored))]
     known = 0.0
     nuisance: list[Hypothesis] = []
     if campaign.registration == "unknown":
@@ -163,7 +175,7 @@ def ladder(
         behind = background(own, Evidence(own, len(z)).best(z))
         rung(name, behind, nuisance)
         known = behind.unknowns
-    end = errors_of(campaign, residual, held)
+    end = errors_of(campaign, residual, rows.scored)
     later = names[len(first) :]
     behind = _with_terms(model.behind, first)
     if not rank:

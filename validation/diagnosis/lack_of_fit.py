@@ -105,7 +105,7 @@ def believed_noise(campaign: Campaign, residual: NDArray) -> NDArray:
 def _repeats(
     campaign: Campaign, residual: NDArray, own: NDArray | None = None
 ) -> tuple[float, int]:
-    """Squares between repeats of the same situation, and their number; of ``own``."""
+    """Squares between repeats under one condition, and their number; of ``own``."""
     rows, columns = np.nonzero(campaign.cells)
     group = _alike(campaign)[rows] * 6 + columns
     if own is not None:
@@ -120,7 +120,7 @@ def _repeats(
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """(R,) number of the situation: command, load, every covariate but time."""
+    """(R,) number of the conditions: command, load, every covariate but time."""
     # alike: no covariate differs by more than a thirtieth of its range.  What nobody
     # modelled must not pass for noise
     parts = [campaign.repeat]

@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import (
-    Answers,
     Candidate,
-    Part,
+    CandidatePart,
+    Sensitivities,
     all_shapes,
     first_shapes,
     places_of,
@@ -64,7 +63,7 @@ class Learned:
     candidate: Candidate
     changes: NDArray
     axis: NDArray
-    equivalent: tuple[tuple[Part, ...], ...]
+    equivalent: tuple[tuple[CandidatePart, ...], ...]
     gain: float
 
 
@@ -97,10 +96,10 @@ class _School:
     """What is known while functions are looked for."""
 
     def __init__(
-        self, campaign: Campaign, used: NDArray, answers: Answers,
+        self, campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
         terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
     ) -> None:  # fmt: skip
-        self.campaign, self.used, self.answers = campaign, used, answers
+        self.campaign, self.used, self.sensitivities = campaign, used, sensitivities
         self.fitting = campaign.take(used)
         self.residual, self.effects = residual, effects
         self.terms = list(terms)
@@ -140,7 +139,7 @@ class _School:
         cells = used[rows[np.nonzero(self.fitting.cells)[0]]]
         terms = [t.take(np.ones(len(t), bool), cells) for t in self.terms]
         return _School(
-            self.campaign, used, self.answers, terms, self.residual[cells],
+            self.campaign, used, self.sensitivities, terms, self.residual[cells],
             self.effects[cells],
         )  # fmt: skip
 
@@ -160,7 +159,7 @@ class _School:
 
 
 def learn(
-    campaign: Campaign, used: NDArray, conditions: Conditions, answers: Answers,
+    campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
     terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
     update: Callable[[str, int, int], None],
 ) -> Lesson:  # fmt: skip
@@ -169,8 +168,7 @@ def learn(
     Args:
         campaign: of R rows.
         used: mask (R,) of the rows fitted.
-        conditions: conditions of all rows.
-        answers: of all rows.
+        sensitivities: of all rows, and their conditions.
         terms: small terms of the rows fitted, N cells.
         residual: (N,) whitened readings minus the best set of effects.
         effects: (N, k) whitened change per unknown of that set and the device's frame.
@@ -179,14 +177,14 @@ def learn(
     Returns:
         The lesson; no function where nothing can be shown.
     """
-    school = _School(campaign, used, answers, terms, residual, effects)
-    names = variables_of(conditions.take(used))
+    school = _School(campaign, used, sensitivities, terms, residual, effects)
+    names = variables_of(sensitivities.conditions.take(used))
     every = list(places_of(campaign.robot, names))
     for turn in range(MOST):
         update("functions learned", turn, MOST)
         if school.done:
             break
-        function = _best(school, conditions, every)
+        function = _best(school, every)
         if function is None or not _foretells(school, function):
             break
         school.learned.append(function)
@@ -215,8 +213,7 @@ def _term(school: _School, one: Learned, number: int) -> SmallTerm:
 
 def _best(
     school: _School,
-    conditions: Conditions,
-    every: Sequence[tuple[str, tuple[Part, ...]]],
+    every: Sequence[tuple[str, tuple[CandidatePart, ...]]],
 ) -> Learned | None:
     """The likeliest function, of those worth it."""
     robot = school.campaign.robot
@@ -227,7 +224,7 @@ def _best(
     first = sorted(((_worth(few, c), c) for c in looked), key=lambda one: -one[0])
     chosen = list(dict.fromkeys((c.kind, c.parts) for _, c in first))[:_REFINED]
     refined = []
-    fitted = conditions.take(school.used)
+    fitted = school.sensitivities.conditions.take(school.used)
     for kind, parts in chosen:
         for shape in all_shapes(fitted, parts[0].variable, kind):
             one = Candidate(parts, kind, shape)
@@ -243,13 +240,13 @@ def _best(
         return None
     others = dict.fromkeys(c.parts for w, c in refined if w > worth - _EQUAL)
     same = tuple(parts for parts in others if parts != best.parts)
-    changes, axis = school.answers.changes(best)
+    changes, axis = school.sensitivities.changes(best)
     return Learned(best, changes, axis, same, float(gain))
 
 
 def _worth(school: _School, one: Candidate) -> float:
     """Logarithm of how much likelier a candidate makes the readings."""
-    changes, _ = school.answers.changes(one)
+    changes, _ = school.sensitivities.changes(one)
     raw = school.columns(changes)
     size = np.linalg.norm(raw, axis=0).max(initial=0.0)
     if size == 0.0:

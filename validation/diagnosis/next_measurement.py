@@ -26,7 +26,7 @@ from assembly.measurement.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.refit import Fit
 
-_TRIED = 240  # situations looked at
+_TRIED = 240  # conditions looked at
 _FURTHER = 1.5  # of the range of loads and covariates used so far
 _STEP = 1e-3
 _AS_GOOD = 0.97
@@ -81,7 +81,7 @@ def next_measurement(
             _power(a - b, Jb, rival.covariance), _power(b - a, Ja, fit.covariance)
         )
         powers = np.where(np.isfinite(powers), powers, 0.0)
-        # among situations as good as the best, the one that asks for the least load
+        # among conditions as good as the best, the one that asks for the least load
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
@@ -92,7 +92,7 @@ def next_measurement(
 def _measurement(
     campaign: Campaign, there: Conditions, best: int, power: float, fit: Fit, rival: Fit
 ) -> NextMeasurement:
-    """One of the situations tried, in words and numbers."""
+    """One of the conditions tried, in words and numbers."""
     names = [" + ".join(sorted(one.effects)) for one in (fit, rival)]
     covariates = {
         name: float(getattr(there, name)[best])
@@ -110,7 +110,7 @@ def _measurement(
 
 
 def _situations(conditions: Conditions) -> Conditions:
-    """Situations to choose from: within reach, loads and covariates wider."""
+    """Conditions to choose from: within reach, loads and covariates wider."""
     rng = np.random.default_rng(0)
     there = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -159,9 +159,9 @@ def _model(there: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArra
         conditions = apply_effects(there, fit.at(values))
         return predict(replace(conditions, exact=finite)).deviation / sigma
 
-    answer = read(fit.values, fit.conditions.exact)
+    model = read(fit.values, fit.conditions.exact)
     # finite motions hardly change the slopes, and take a hundred times longer
-    middle = read(fit.values, False) if fit.conditions.exact else answer
+    middle = read(fit.values, False) if fit.conditions.exact else model
     J = np.zeros((*middle.shape, len(fit.values)))
     deviation = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     for k, size in enumerate(deviation):
@@ -170,7 +170,7 @@ def _model(there: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArra
         if size > 0:
             J[:, :, k] = (read(moved, False) - middle) / (_STEP * size)
     known = np.isfinite(sigma)
-    return answer[:, known], J[:, known]
+    return model[:, known], J[:, known]
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
@@ -180,7 +180,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, there: Conditions, row: int) -> dict[str, float]:
-    """A situation's command, by the columns of the campaign."""
+    """The command of some conditions, by the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(there.coordinates[row, i])

@@ -4,7 +4,7 @@ import html
 from pathlib import Path
 
 from forcefit.inputs.writing import write_text
-from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.figures import (
     confounding_figure,
     covariate_figure,

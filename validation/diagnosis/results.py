@@ -10,7 +10,8 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.registration import BASE
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
-from validation.diagnosis.diagnose import Diagnosis, Errors
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.kept_aside import Errors
 from validation.diagnosis.sentence import formula, sentence
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
 from validation.diagnosis.teaching import functions_of

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from assembly.effects.functions import columns_of, parameters_of
 from assembly.model.function import Function
-from validation.diagnosis.diagnose import Diagnosis
+from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.teaching import functions_of
 from validation.diagnosis.verdict import Calibration

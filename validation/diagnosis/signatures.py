@@ -60,7 +60,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
     Raises:
         BadInput: a function of the robot depends on a covariate that is not there.
     """
-    known = campaign.covariates
+    known, session = campaign.covariates, campaign.session
     for name, function in covariates_of(campaign.robot, campaign.sessions).items():
         if name not in known and name != "approach":
             raise BadInput(
@@ -78,8 +78,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
         mismatch=campaign.mismatch,
         point=campaign.reference_point,
         gravity=gravity,
-        covariates=known,
-        session=campaign.session,
+        covariates=known if session is None else {**known, "session": session},
         target=None if campaign.point is None else campaign.targets,
     )
     return apply_known(with_history(declared), campaign.robot)

@@ -71,27 +71,27 @@ class SmallTerm:
 
 
 def small_terms(
-    campaign: Campaign, conditions: Conditions, answers: Responses
+    campaign: Campaign, conditions: Conditions, response: Responses
 ) -> list[SmallTerm]:
     """Geometry and springs of a campaign's robot.
 
     Args:
         campaign: of R rows, N measured cells.
         conditions: its conditions as declared.
-        answers: of the readings there.
+        response: of the readings there.
 
     Returns:
         Terms whose unknowns show in the readings; none of a kind that does not.
     """
     frames = campaign.robot.frames
     own = [conditions.robot.index(frame.name) for frame in frames]
-    screws = answers.screws[:, :, own]
+    screws = response.screws[:, :, own]
     given = np.array([
         np.full(6, np.nan) if frame.tolerance is None else frame.tolerance
         for frame in frames
     ])
     geometry = _term(campaign, GEOMETRY, screws, given, -np.inf)
-    bent = screws * answers.wrenches[:, None, own]
+    bent = screws * response.wrenches[:, None, own]
     # what closures meet at, and the platform, have no spring of their own
     bent[:, :, [not _may_give(campaign.robot, f.name) for f in frames]] = 0.0
     springs = _term(campaign, SPRINGS, bent, np.full((len(frames), 6), np.nan), 0.0)
@@ -118,13 +118,18 @@ def _term(
     shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
     frame = np.repeat(np.arange(count), 6)
     return SmallTerm(
-        name, frame[shown], axis[shown], columns[:, shown], known[shown], lower,
-        bool(np.isfinite(known[shown]).any()),
-    )  # fmt: skip
+        name=name,
+        frame=frame[shown],
+        axis=axis[shown],
+        columns=columns[:, shown],
+        given=known[shown],
+        lower=lower,
+        sure=bool(np.isfinite(known[shown]).any()),
+    )
 
 
 def added(
-    campaign: Campaign, answers: Responses, conditions: Conditions,
+    campaign: Campaign, response: Responses, conditions: Conditions,
     terms: Sequence[SmallTerm], values: Sequence[NDArray],
     changes: Mapping[str, NDArray],
 ) -> NDArray:  # fmt: skip
@@ -132,7 +137,7 @@ def added(
 
     Args:
         campaign: of R rows.
-        answers: of its readings.
+        response: of its readings.
         conditions: its conditions.
         terms: found on these rows or on others of the same robot.
         values: (k,) of each term.
@@ -152,8 +157,8 @@ def added(
         rows = own[term.frame]
         amount = np.broadcast_to(x, (len(conditions), len(x)))
         if term.name == SPRINGS:
-            amount = amount * answers.wrenches[:, rows, term.axis]
-        total += np.einsum("rik,rk->ri", answers.screws[:, :, rows, term.axis], amount)
+            amount = amount * response.wrenches[:, rows, term.axis]
+        total += np.einsum("rik,rk->ri", response.screws[:, :, rows, term.axis], amount)
     return total
 
 

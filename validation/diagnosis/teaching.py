@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from assembly.measurement.conditions import Conditions
 from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import Answers
+from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.evidence import background
-from validation.diagnosis.kept_aside import Model
+from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
 from validation.diagnosis.learning import Learned, learn, term_name
 from validation.diagnosis.refit import refit, with_clearance_held
@@ -52,8 +52,8 @@ def taught(
     unknowns = selection.unknowns + round(selection.behind.unknowns)
     if lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT:
         return selection, ()
-    answers = responses(conditions)
-    places = Answers(conditions, campaign.robot, answers)
+    response = responses(conditions)
+    sensitivities = Sensitivities(conditions, campaign.robot, response)
     device = [device_frame(some)] if campaign.registration == "unknown" else []
     begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
     alone = refit(fitting, some, device, begin)
@@ -65,8 +65,7 @@ def taught(
         learn(
             campaign,
             used,
-            conditions,
-            places,
+            sensitivities,
             selection.terms,
             fit.residual,
             columns,
@@ -91,14 +90,16 @@ def taught(
         nothing = selection.screen.fit(())
         story = replace(story, sets=[nothing, *selection.sets], unknowns=len(begin))
     held = with_clearance_held(conditions, selection.fit)
-    before = Model(held, answers, selection.fit, selection.behind)
-    after = Model(conditions, answers, fit, behind, lesson.learned)
+    before = FittedModel(held, response, selection.fit, selection.behind)
+    after = FittedModel(conditions, response, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
         return selection, ()
     return story, lesson.learned
 
 
-def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -> bool:
+def _foretells(
+    campaign: Campaign, held: NDArray, before: FittedModel, after: FittedModel
+) -> bool:
     """Whether rows kept aside are foretold better, by more than its own uncertainty."""
     if not held.any():
         return True
@@ -115,7 +116,7 @@ def _foretells(campaign: Campaign, held: NDArray, before: Model, after: Model) -
     return bool(gains.sum() > _ERROR * error)
 
 
-def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
+def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]:
     """The functions of a robot file that were learned, with their numbers.
 
     Args:
@@ -126,11 +127,11 @@ def functions_of(campaign: Campaign, model: Model) -> list[list[Function]]:
         For every effect learned one function, or several of one kind.
     """
     behind = model.behind
-    places = Answers(model.conditions, campaign.robot, model.answers)
+    sensitivities = Sensitivities(model.conditions, campaign.robot, model.response)
     values = behind.values(model.fit.residual)
     everyone = zip(behind.terms, values, behind.deviations(), strict=True)
     known = {term.name: (x, std) for term, x, std in everyone}
     return [
-        places.fitted(one.candidate, *known[term_name(k + 1)])
+        sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
         for k, one in enumerate(model.learned)
     ]

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from validation.diagnosis.diagnose import Diagnosis
-from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.next_measurement import NextMeasurement, load_text
 from validation.diagnosis.results import LISTED, effects, learned, small, steps
 from validation.diagnosis.sentence import (
     WORDS,
@@ -22,14 +22,47 @@ from validation.diagnosis.verdict import Calibration
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     """The diagnosis for a terminal."""
     lines = [f"{diagnosis.campaign.name}: {diagnosis.verdict}", sentence(diagnosis), ""]
+    lines += _effects_text(diagnosis)
+    for name in (GEOMETRY, SPRINGS):
+        lines += _small_text(small(diagnosis, name), name)
+    lines += _learned_text(diagnosis)
+    lines += ["", "sets of effects, by probability:"]
+    for names, p in diagnosis.alternatives:
+        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
+    lines += ["", *_errors_text(diagnosis)]
+    lines += ["", *_ladder_text(diagnosis), *diagnosis.remarks]
+    if np.any(diagnosis.noise_factor > 1):
+        lines += ["", noise_text(diagnosis.noise_factor)]
+    if diagnosis.outliers.any():
+        ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
+        left_out = ", ".join(label for label, outlier in ids if outlier)
+        lines += ["", f"left out as outliers: {left_out}"]
+    if diagnosis.open.any():
+        lines += ["", open_text(diagnosis.open)]
+    for trend in diagnosis.trends:
+        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
+    if diagnosis.next is not None:
+        lines += ["", *_next_text(diagnosis.next)]
+    if tally is not None:
+        lines += ["", calibration_text(tally)]
+    return "\n".join(lines)
+
+
+def _effects_text(diagnosis: Diagnosis) -> list[str]:
+    """Effects with their parameters, where the verdict lists them."""
+    lines = []
     for effect in effects(diagnosis) if diagnosis.verdict in LISTED else []:
         lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
         for p in effect["parameters"]:
             lines.append(
                 f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
             )
-    for name in (GEOMETRY, SPRINGS):
-        lines += _small_text(small(diagnosis, name), name)
+    return lines
+
+
+def _learned_text(diagnosis: Diagnosis) -> list[str]:
+    """Functions learned, each in two lines or three."""
+    lines = []
     for one in learned(diagnosis):
         where = f"{one['where']} {', '.join(one['components'])}"
         lines.append(f"learned: {where} of {', '.join(one['variables'])}")
@@ -37,52 +70,36 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
         lines.append(f"  {formula if len(formula) < 160 else formula[:157] + '...'}")
         if one["equivalent_places"]:
             lines.append(f"  {len(one['equivalent_places'])} other places do as well")
-    lines += ["", "sets of effects, by probability:"]
-    for names, p in diagnosis.alternatives:
-        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
+    return lines
+
+
+def _errors_text(diagnosis: Diagnosis) -> list[str]:
+    """A table of the errors before and after."""
     aside = "rows kept aside" if (~diagnosis.split.fitted).any() else "rows fitted"
-    lines += ["", f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
+    lines = [f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
+    columns = diagnosis.before, diagnosis.after, diagnosis.noise
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
-        row = [
-            getattr(e, name)
-            for e in (diagnosis.before, diagnosis.after, diagnosis.noise)
-        ]
+        row = [getattr(errors, name) for errors in columns]
         if name == "normalised":
             row[2] = 1.0
         shown = "".join(
             f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
         )
         lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    far = [
-        i for i, o in zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True) if o
-    ]
     if (diagnosis.outliers & ~diagnosis.split.fitted).any():
-        cut = [f"{e.normalised:>12.3g}" for e in diagnosis.trimmed]
+        cut = [f"{errors.normalised:>12.3g}" for errors in diagnosis.trimmed]
         lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
-    lines += ["", *_ladder_text(diagnosis), *diagnosis.remarks]
-    if np.any(diagnosis.noise_factor > 1):
-        lines += ["", noise_text(diagnosis.noise_factor)]
-    if far:
-        lines += ["", f"left out as outliers: {', '.join(far)}"]
-    if diagnosis.open.any():
-        lines += ["", open_text(diagnosis.open)]
-    for trend in diagnosis.trends:
-        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
-    if diagnosis.next is not None:
-        where = ", ".join(
-            f"{k}={v:.4g}" for k, v in diagnosis.next.configuration.items()
-        )
-        covariates = "".join(
-            f", {k} {v:g}" for k, v in diagnosis.next.covariates.items()
-        )
-        lines += [
-            "",
-            f"measure next: {where}; load {load_text(diagnosis.next.load)}{covariates}",
-            f"  {diagnosis.next.why}",
-        ]
-    if tally is not None:
-        lines += ["", calibration_text(tally)]
-    return "\n".join(lines)
+    return lines
+
+
+def _next_text(following: NextMeasurement) -> list[str]:
+    """The measurement that would decide."""
+    where = ", ".join(f"{k}={v:.4g}" for k, v in following.configuration.items())
+    covariates = "".join(f", {k} {v:g}" for k, v in following.covariates.items())
+    return [
+        f"measure next: {where}; load {load_text(following.load)}{covariates}",
+        f"  {following.why}",
+    ]
 
 
 def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:

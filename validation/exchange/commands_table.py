@@ -85,8 +85,8 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
             else:
                 columns[name][i] = parse_number(cell, writing.decimal) * factor
                 if not np.isfinite(columns[name][i]):
-                    found = describe(cell)
-                    raise BadInput(f"{place}: found {found}, expected a number")
+                    given = describe(cell)
+                    raise BadInput(f"{place}: found {given}, expected a number")
     if not ids:
         raise BadInput(f"{path}: no rows; expected one a command")
     postures = _placed(path, robot, ids, columns, joints)

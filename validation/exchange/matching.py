@@ -58,8 +58,8 @@ def match(
         for reading, target in ours
     ]
     clocks = [*commands.times, *(reading.time for reading, _ in ours)]
-    if sum(len(found) == 1 for found in asked) > len(asked) / 2:
-        how, at = "name", [found[0] if len(found) == 1 else -1 for found in asked]
+    if sum(len(indices) == 1 for indices in asked) > len(asked) / 2:
+        how, at = "name", [indices[0] if len(indices) == 1 else -1 for indices in asked]
     elif np.isfinite(clocks).all():
         how, at = "time", [_nearest(reading, commands, window) for reading, _ in ours]
     else:
@@ -86,14 +86,14 @@ def _of_targets(
     """Readings of targets; where nobody names the only one, all are of it."""
     ours = []
     for reading in readings:
-        found = [part for part in reading.names if part in targets]
-        if len(found) > 1:
+        named = [part for part in reading.names if part in targets]
+        if len(named) > 1:
             expected = ", ".join(map(quoted, targets[:6]))
             raise BadInput(
                 f"{reading.place}: expected the name of one target: {expected}"
             )
-        if found:
-            ours.append((reading, found[0]))
+        if named:
+            ours.append((reading, named[0]))
     if not ours and len(targets) == 1:
         return [(reading, targets[0]) for reading in readings]
     if not ours:

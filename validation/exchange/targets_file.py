@@ -78,5 +78,12 @@ def read_targets(path: Path | str) -> TargetsFile:
     robot = load_robot(name if name in BUILT_IN else Path(path).parent / name)
     places = {key: np.array(place) for key, place in places.items()}
     return TargetsFile(
-        Path(path), robot, name, places, registration, window, noise, writing
+        file=Path(path),
+        robot=robot,
+        robot_name=name,
+        places=places,
+        registration=registration,
+        window=window,
+        noise=noise,
+        writing=writing,
     )

@@ -107,16 +107,16 @@ def import_readings(
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, told, declared.places, declared.window)
-    answer = _campaign(declared, told, joined, folder, len(readings))
+    imported = _campaign(declared, told, joined, folder, len(readings))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
         raise BadInput(f"{folder}: cannot be made: {reason}") from None
-    rows = [",".join(row) for row in (answer.header, *answer.cells)]
+    rows = [",".join(row) for row in (imported.header, *imported.cells)]
     write_text("\n".join(rows) + "\n", folder / "measurements.csv")
-    write_text(answer.declaration, folder / "campaign.toml")
-    return answer
+    write_text(imported.declaration, folder / "campaign.toml")
+    return imported
 
 
 def _nominal(declared: TargetsFile, told: Commands, command: int, target: str
@@ -146,20 +146,10 @@ def _campaign(
     )
     left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
     for i, (command, readings) in enumerate(joined.rows):
-        ks = np.flatnonzero(read[i])
-        order = exchanged_here(base[i, ks], nominal[i, ks], scatter)
-        for place, k in enumerate(ks.tolist()):
-            gap = float(np.linalg.norm(base[i, k] - nominal[i, k]))
-            reason = ""
-            if order is not None and order[place] != place:
-                reason = f"it is {quoted(names[ks[order[place]]])}, exchanged"
-            elif is_gross(gap, scatter):
-                reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
-            if reason:
-                label = told.ids[command]
-                place_of = readings[names[k]].place
-                left_out.append(f"{place_of}: command {quoted(label)}: {reason}")
-                read[i, k] = False
+        for k, reason in _suspects(base[i], nominal[i], read[i], scatter, names):
+            label, place = told.ids[command], readings[names[k]].place
+            left_out.append(f"{place}: command {quoted(label)}: {reason}")
+            read[i, k] = False
     total -= len(joined.strangers)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
@@ -180,8 +170,35 @@ def _campaign(
     labels = _labels(told, rows)
     cells = tuple((a, *map(_cell, row)) for a, row in zip(labels, values, strict=True))
     text = _declaration(declared, folder, np.array(spread)[read[kept]])
-    return Import(declared.robot.name, joined.how, header, cells, text, frame, scatter,
-                  int(read.sum()), tuple(left_out))  # fmt: skip
+    return Import(
+        robot=declared.robot.name,
+        how=joined.how,
+        header=header,
+        cells=cells,
+        declaration=text,
+        frame=frame,
+        scatter=scatter,
+        readings=int(read.sum()),
+        left_out=tuple(left_out),
+    )
+
+
+def _suspects(
+    base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
+) -> list[tuple[int, str]]:
+    """Targets of one command, read where they cannot stand, and why."""
+    suspects = []
+    ks = np.flatnonzero(read)
+    order = exchanged_here(base[ks], nominal[ks], scatter)
+    for place, k in enumerate(ks.tolist()):
+        gap = float(np.linalg.norm(base[k] - nominal[k]))
+        if order is not None and order[place] != place:
+            other = quoted(names[ks[order[place]]])
+            suspects.append((k, f"it is {other}, exchanged"))
+        elif is_gross(gap, scatter):
+            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
+            suspects.append((k, reason))
+    return suspects
 
 
 def _frame(
@@ -203,10 +220,10 @@ def _frame(
     )
     if order is not None:
         wrong = [k for k in range(len(names)) if order[k] != k]
-        said = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
+        order_text = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
         raise BadInput(
             f"{declared.file}: targets: they fit far better exchanged, in every row: "
-            f"{said}"
+            f"{order_text}"
         )
     return robust_frame(measured[read], nominal[read])
 

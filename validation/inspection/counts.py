@@ -29,7 +29,7 @@ def load_counts(c: Campaign) -> dict:
 
 def reading_counts(c: Campaign) -> dict:
     """Each component: cells, size, sigma."""
-    found = {}
+    counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
         entry: dict = {"measured": int(cells.sum()), "missing": int((~cells).sum())}
@@ -40,8 +40,8 @@ def reading_counts(c: Campaign) -> dict:
                 "largest": np.abs(values).max(),
                 "sigma": [sigma.min(), sigma.max()],
             }
-        found[name] = entry
-    return found
+        counts[name] = entry
+    return counts
 
 
 def covariate_counts(c: Campaign) -> dict:

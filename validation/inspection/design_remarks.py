@@ -33,25 +33,25 @@ def remarks_on(
     Returns:
         Remarks.
     """
-    found = [
+    remarks = [
         *_on_readings(campaign), *_on_configurations(campaign, visits),
         *_on_loads(campaign), *_on_temperature(campaign), *_on_approach(campaign),
         *_on_time(campaign), *_on_covariates(campaign),
         *on_repeats(campaign, repeats, noise),
     ]  # fmt: skip
-    return sorted(found, key=lambda r: (LOST, CAREFUL, FINE).index(r.weight))
+    return sorted(remarks, key=lambda r: (LOST, CAREFUL, FINE).index(r.weight))
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
     """Components never measured, stuck, rounded, or suspiciously large."""
-    found = []
+    remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = [n for n, c in zip(READING, campaign.cells.T, strict=True) if not c.any()]
     if absent:
         text = (
             f"Never measured: {', '.join(absent)}. What only they would show is lost."
         )
-        found.append(Remark("readings", LOST, text))
+        remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]
         if len(column) < 3 or np.isnan(sigma[campaign.cells[:, k], k]).all():
@@ -60,12 +60,12 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
         typical = float(np.median(sigma[campaign.cells[:, k], k]))
         if len(values) == 1:
             text = f"{name} reads the same in every row: is the device connected?"
-            found.append(Remark("readings", CAREFUL, text))
+            remarks.append(Remark("readings", CAREFUL, text))
         elif len(values) < len(column) / 2 and np.diff(values).min() > 2 * typical:
             step = np.diff(values).min()
             text = f"{name} is rounded to {step:.2g}, more than twice its sigma " \
                    f"{typical:.2g}: the noise is that of the rounding."  # fmt: skip
-            found.append(Remark("readings", CAREFUL, text))
+            remarks.append(Remark("readings", CAREFUL, text))
     extent = extent_of(campaign.transforms, np.zeros((1, 3)))
     largest = np.nanmax(np.abs(measured[:, 3:]), initial=0.0)
     if campaign.registration == "known" and largest > _UNIT * extent:
@@ -73,13 +73,13 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
             f"The largest deviation is {largest:.3g} m, the robot {extent:.3g} m "
             'across: is the unit m, and is the registration really "known"?'
         )
-        found.append(Remark("readings", CAREFUL, text))
-    return found
+        remarks.append(Remark("readings", CAREFUL, text))
+    return remarks
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
     """Joints that never moved, and configurations measured in one go."""
-    found = []
+    remarks = []
     robot = campaign.robot
     still = [
         f.name
@@ -92,18 +92,18 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
             "One configuration only: errors of geometry, offsets and a wrong "
             "registration all look alike."
         )
-        found.append(Remark("configurations", LOST, text))
+        remarks.append(Remark("configurations", LOST, text))
     elif still:
         text = f"Never moved: {', '.join(quoted(s) for s in still[:6])}. An offset " \
                "there looks like a link of another length or angle."  # fmt: skip
-        found.append(Remark("configurations", LOST, text))
+        remarks.append(Remark("configurations", LOST, text))
     if visits.order == "back to back" and count > 1:
         text = (
             "Every configuration was measured in one go: whatever changes with time "
             "looks like an effect of the configuration."
         )
-        found.append(Remark("configurations", LOST, text))
-    return found
+        remarks.append(Remark("configurations", LOST, text))
+    return remarks
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
@@ -111,11 +111,12 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was ever applied: compliance and play show at most through the "
-            "machine's own weight and inner forces, a wrong load not at all."
+            "No load was ever applied: compliance and clearances show at most "
+            "through the machine's own weight and inner forces, a wrong load not at "
+            "all."
         )
         return [Remark("load", LOST, text)]
-    found = []
+    remarks = []
     both = np.column_stack([campaign.configuration, campaign.repeat])
     kinds = np.unique(both, axis=0)[:, 0]
     twice = int((np.bincount(kinds) > 1).sum())
@@ -124,22 +125,22 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
             "One load in every row: what it does cannot be told from errors that are "
             "there without it, nor a compliance that hardens from one that does not."
         )
-        found.append(Remark("load", LOST, text))
+        remarks.append(Remark("load", LOST, text))
     elif twice == 0:
         text = (
             "No configuration was measured under two loads: what the load does and "
             "what the configuration does are told apart by the model alone."
         )
-        found.append(Remark("load", CAREFUL, text))
+        remarks.append(Remark("load", CAREFUL, text))
     else:
         rank = np.linalg.matrix_rank(loads[:, 3:], 1e-6 * np.abs(loads).max())
         if rank == 1:
             text = "The load always acts along one line: compliance is known along it."
-            found.append(Remark("load", CAREFUL, text))
+            remarks.append(Remark("load", CAREFUL, text))
         else:
             text = f"{twice} configurations were measured under more than one load."
-            found.append(Remark("load", FINE, text))
-    return found
+            remarks.append(Remark("load", FINE, text))
+    return remarks
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
@@ -210,7 +211,7 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
     columns = dict(campaign.covariates)
     for name, values in zip(LOAD, campaign.loads.T, strict=True):
         columns[f"load.{name}"] = values
-    found = []
+    remarks = []
     for (a, x), (b, y) in combinations(columns.items(), 2):
         together = correlation(x, y)
         if abs(together) > _TOGETHER:
@@ -218,8 +219,8 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
                 f"{a} and {b} vary together (correlation {together:+.2f}): what one "
                 "does looks much like what the other does."
             )
-            found.append(Remark("covariates", CAREFUL, text))
-    return found
+            remarks.append(Remark("covariates", CAREFUL, text))
+    return remarks
 
 
 def _in_both(configuration: NDArray, side: NDArray) -> int:

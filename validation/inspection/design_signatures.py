@@ -74,9 +74,9 @@ def design_signatures(
                 else "the robot has no place where it could act"
             )
         else:
-            found = _at_plausible_sizes(tangents, shown[name])
-            if np.isfinite(found).all():
-                columns[name] = found
+            column = _at_plausible_sizes(tangents, shown[name])
+            if np.isfinite(column).all():
+                columns[name] = column
             else:
                 untestable[name] = "the model has no answer in some rows"
     progress(len(LIBRARY), len(LIBRARY))
@@ -112,7 +112,7 @@ def changes_between_repeats(
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
     """One hypothesis for each effect; of shapes looked at, the middle one."""
-    found: dict[str, Hypothesis] = {}
+    hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
         most = max(len(h.slots) for h in of)
@@ -121,8 +121,8 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
             wide = max(len(h.where) for h in of)
             alike = [h for h in of if len(h.where) == wide]
             full = [min(alike, key=lambda h: len(h.slots))]
-        found[name] = full[len(full) // 2]
-    return found
+        hypotheses[name] = full[len(full) // 2]
+    return hypotheses
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:

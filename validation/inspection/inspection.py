@@ -85,13 +85,13 @@ class Inspection:
 
     def _effect_table(self) -> dict:
         """Each effect: how much of it would show."""
-        found: dict[str, dict] = {
+        table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
         }
         s = self.separability
         for i, name in enumerate(s.names):
-            found[name] = {
+            table[name] = {
                 "testable": bool(s.traced[i]),
                 "shows": bool(s.visible[i]),
                 "shows_at": s.shows_at[i],
@@ -100,7 +100,7 @@ class Inspection:
                 "unknowns": s.unknowns[i],
                 "rank": s.rank[i],
             }
-        return found
+        return table
 
 
 def inspect_campaign(

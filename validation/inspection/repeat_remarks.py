@@ -32,21 +32,21 @@ def on_repeats(
             "best model fits is judged by the stated sigma alone."
         )
         return [Remark("repeats", LOST, text)]
-    found = []
+    remarks = []
     if repeats.order == "back to back":
         text = (
             "Repeats were measured in a row: slow drift does not show in them, the "
             "noise looks too small and a sound model then looks wrong."
         )
-        found.append(Remark("repeats", CAREFUL, text))
+        remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "mixed":
         text = "Only some repeats are spread over the session: drift shows in part."
-        found.append(Remark("repeats", CAREFUL, text))
+        remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "interleaved":
-        found.append(Remark("repeats", FINE, "Repeats are spread over the session."))
+        remarks.append(Remark("repeats", FINE, "Repeats are spread over the session."))
     if noise.degrees < _FEW:
         text = f"Few repeats: {noise.degrees} degrees of freedom in all."
-        found.append(Remark("repeats", CAREFUL, text))
+        remarks.append(Remark("repeats", CAREFUL, text))
     low, high = noise.interval
     size = f"{noise.ratio:.2f} times the stated sigma ({low:.2f} ... {high:.2f})"
     squares = noise.degrees * noise.ratio**2
@@ -55,18 +55,18 @@ def on_repeats(
             f"Repeats scatter {size}: sigma is stated too small, or something changes "
             "in between that is neither time, temperature nor approach."
         )
-        found.append(Remark("repeats", CAREFUL, text))
+        remarks.append(Remark("repeats", CAREFUL, text))
     elif chi2.cdf(squares, noise.degrees) < _SELDOM:
         text = (
             f"Repeats scatter only {size}: sigma is stated too large, or repeats share "
             "an error."
         )
-        found.append(Remark("repeats", CAREFUL, text))
+        remarks.append(Remark("repeats", CAREFUL, text))
     for name, chance in noise.taken_out.items():
         if chance < _SELDOM:
             text = f"Repeats change with {name}, more than noise does."
-            found.append(Remark("repeats", CAREFUL, text))
-    return found + _on_suspects(campaign, noise)
+            remarks.append(Remark("repeats", CAREFUL, text))
+    return remarks + _on_suspects(campaign, noise)
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:

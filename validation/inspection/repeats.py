@@ -103,7 +103,7 @@ def repeat_noise(
         cells = _repeated_cells(campaign, out)
         if not cells.any():
             return None
-        fit = _Fit(campaign, cells, slow)
+        fit = _RepeatFit(campaign, cells, slow)
         suspect = fit.suspect()
         if suspect is None or len(suspects) == MOST:
             return fit.noise(suspects)
@@ -167,7 +167,7 @@ def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
     return kept & (count[sets] > 1)
 
 
-class _Fit:
+class _RepeatFit:
     """Set means and slow changes fitted to repeated cells."""
 
     def __init__(

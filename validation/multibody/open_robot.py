@@ -6,7 +6,7 @@ axes.  Passive joints without a spring turn or slide freely along their own z.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +23,7 @@ from validation.multibody.exudyn_solids import add_mesh
 from validation.multibody.motion import inverse, matrix, placement, shifted
 
 
-class Placed(Protocol):
+class PlacedRobot(Protocol):
     """The part of a posture that the simulation uses."""
 
     @property
@@ -52,7 +52,7 @@ class Case:
         couple: (3,) [N m] on the platform besides, base axes, by dead forces.
     """
 
-    posture: Placed
+    posture: PlacedRobot
     scale: float
     springs: Mapping[str, NDArray]
     meshes: Mapping[str, MeshBody]
@@ -104,9 +104,10 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """The built model.
+    """The built model, filled in frame by frame.
 
     Attributes:
+        platform: (4, 4) nominal platform, seen from the base.
         bodies: places of the frames on their bodies, before clearances and springs.
         before: places of the frames before their own motion.
         links: elastic bodies by frame.
@@ -114,17 +115,16 @@ class Tree:
         idle: the springs of free motions by frame.
         contacts: joints with clearance by frame.
         closures: in the robot's order.
-        platform: (4, 4) nominal platform, seen from the base.
     """
 
-    bodies: dict[str, Place]
-    before: dict[str, Place]
-    links: dict[str, Elastic]
-    joints: dict[str, Elastic]
-    idle: dict[str, Elastic]
-    contacts: dict[str, Contact]
-    closures: list[Closure]
     platform: NDArray
+    bodies: dict[str, Place] = field(default_factory=dict)
+    before: dict[str, Place] = field(default_factory=dict)
+    links: dict[str, Elastic] = field(default_factory=dict)
+    joints: dict[str, Elastic] = field(default_factory=dict)
+    idle: dict[str, Elastic] = field(default_factory=dict)
+    contacts: dict[str, Contact] = field(default_factory=dict)
+    closures: list[Closure] = field(default_factory=list)
 
 
 def build(model: Model, case: Case) -> Tree:
@@ -138,67 +138,59 @@ def build(model: Model, case: Case) -> Tree:
         Where everything is in the model.
     """
     posture, robot = case.posture, case.posture.robot
-    bodies: dict[str, Place] = {}
-    before: dict[str, Place] = {}
-    after = {BASE: model.ground}
-    links: dict[str, Elastic] = {}
-    joints: dict[str, Elastic] = {}
-    idle: dict[str, Elastic] = {}
-    contacts: dict[str, Contact] = {}
-    for frame, q in zip(robot.frames, posture.coordinates, strict=True):
-        error = case.scale * frame.geometric_error
-        place = after[frame.parent].moved(placement(frame.rotation, frame.translation))
-        place = place.moved(placement(error[:3], error[3:]))
-        if frame.name in case.meshes:
-            links[frame.name] = add_mesh(model, place, case.meshes[frame.name])
-            place = links[frame.name].far
-        elif frame.name in case.springs:
-            links[frame.name] = model.add_spring(place, case.springs[frame.name])
-            place = links[frame.name].far
-        elif isinstance(frame.link, BeamLink):
-            links[frame.name] = _add_beam(model, place, frame, case.elements)
-            place = links[frame.name].far
-        bodies[frame.name] = place
-        clearance = joint_clearance(frame, case.scale, case.bushes)
-        if case.clearances and clearance.cones:
-            contacts[frame.name] = model.add_contact(place, clearance)
-            place = contacts[frame.name].far
-        K = frame.springs
-        if K is not None and np.isfinite(np.diag(K)).any():
-            joints[frame.name] = model.add_spring(place, K)
-            place = joints[frame.name].far
-        if frame.passive and not frame.compliant and frame.name not in contacts:
-            idle[frame.name] = model.add_idle(place, frame.own_axis)
-            place = idle[frame.name].far
-        before[frame.name] = place
-        after[frame.name] = place.moved(_own_motion(frame, q))
     nominal = _nominal(posture)
-    closures = []
+    tree = Tree(platform=nominal[robot.platform])
+    after = {BASE: model.ground}
+    for frame, q in zip(robot.frames, posture.coordinates, strict=True):
+        place = _add_frame(model, case, frame, after[frame.parent], tree)
+        after[frame.name] = place.moved(_own_motion(frame, q))
     for a, b in robot.closures:
         # the rounding of files is not an error
         closed = inverse(nominal[a]) @ nominal[b]
-        closures.append(model.add_closure(before[a], before[b], closed))
-    platform = nominal[robot.platform]
-    tree = Tree(
-        bodies=bodies,
-        before=before,
-        links=links,
-        joints=joints,
-        idle=idle,
-        contacts=contacts,
-        closures=closures,
-        platform=platform,
-    )
+        closure = model.add_closure(tree.before[a], tree.before[b], closed)
+        tree.closures.append(closure)
     if case.load.any():
-        model.add_load(before[robot.platform], case.load)
+        model.add_load(tree.before[robot.platform], case.load)
     if case.couple.any():
-        _add_couple(model, before[robot.platform], platform, case.couple)
+        _add_couple(model, tree.before[robot.platform], tree.platform, case.couple)
     if case.gravity.any():
         _add_weights(model, robot, tree, case.gravity)
     return tree
 
 
-def _nominal(posture: Placed) -> dict[str, NDArray]:
+def _add_frame(
+    model: Model, case: Case, frame: Frame, parent: Place, tree: Tree
+) -> Place:
+    """A body with its error, its link and its joint; where its own motion begins."""
+    error = case.scale * frame.geometric_error
+    place = parent.moved(placement(frame.rotation, frame.translation))
+    place = place.moved(placement(error[:3], error[3:]))
+    if frame.name in case.meshes:
+        tree.links[frame.name] = add_mesh(model, place, case.meshes[frame.name])
+        place = tree.links[frame.name].far
+    elif frame.name in case.springs:
+        tree.links[frame.name] = model.add_spring(place, case.springs[frame.name])
+        place = tree.links[frame.name].far
+    elif isinstance(frame.link, BeamLink):
+        tree.links[frame.name] = _add_beam(model, place, frame, case.elements)
+        place = tree.links[frame.name].far
+    tree.bodies[frame.name] = place
+    clearance = joint_clearance(frame, case.scale, case.bushes)
+    if case.clearances and clearance.cones:
+        tree.contacts[frame.name] = model.add_contact(place, clearance)
+        place = tree.contacts[frame.name].far
+    K = frame.springs
+    if K is not None and np.isfinite(np.diag(K)).any():
+        tree.joints[frame.name] = model.add_spring(place, K)
+        place = tree.joints[frame.name].far
+    if frame.passive and not frame.compliant and frame.name not in tree.contacts:
+        tree.idle[frame.name] = model.add_idle(place, frame.own_axis)
+        place = tree.idle[frame.name].far
+    tree.before[frame.name] = place
+    return place
+
+
+def _nominal(posture: PlacedRobot) -> dict[str, NDArray]:
     """(4, 4) of every frame without imperfections, before its own motion."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}

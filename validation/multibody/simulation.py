@@ -21,7 +21,7 @@ import contextlib
 import io
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ from validation.multibody.exudyn_reading import (
 )
 from validation.multibody.exudyn_solver import largest_gap, solve
 from validation.multibody.motion import turn_of
-from validation.multibody.open_robot import Case, Placed, Tree, build, link_springs
+from validation.multibody.open_robot import Case, PlacedRobot, Tree, build, link_springs
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
@@ -58,6 +58,43 @@ _WITH_CLEARANCES = (
     Regularisation(1e11, 1e-6),
     Regularisation(1e11, HOLDING_STIFFNESS),
 )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationModel:
+    """How links and joints are modelled.
+
+    Attributes:
+        links: ``"beam"``: links with a section are geometrically exact beams, the
+            others 6 by 6 springs; ``"spring"``: all of them are springs.
+        stiffness: by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its axes, of
+            links that become springs and whose matrix the robot does not give.
+        meshes: by frame, links that are solids of finite elements in a floating frame.
+        elements: beam elements per link.
+        clearances: whether joints have their clearances, scaled like the errors.
+        bushes: whether joints with radial clearance and tilt are pins in two bushes,
+            see :func:`validation.multibody.contact.joint_clearance`, not a disc and a
+            cone.
+        hold: hold motions that nothing resists from the first; otherwise only where no
+            equilibrium is found without.
+    """
+
+    links: str = "beam"
+    stiffness: Mapping[str, ArrayLike] = field(default_factory=dict)
+    meshes: Mapping[str, MeshBody] = field(default_factory=dict)
+    elements: int = 4
+    clearances: bool = False
+    bushes: bool = False
+    hold: bool = False
+
+    def __post_init__(self) -> None:
+        if self.links not in LINKS:
+            raise BadInput(
+                f"simulate_assembly: links = {self.links!r}, expected one of {LINKS}"
+            )
+
+
+_STANDARD = SimulationModel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,73 +148,55 @@ class MultibodyAssembly:
 
 
 def simulate_assembly(
-    posture: Placed,
+    posture: PlacedRobot,
     scale: float = 1.0,
-    links: str = "beam",
-    stiffness: Mapping[str, ArrayLike] | None = None,
+    model: SimulationModel = _STANDARD,
+    *,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    elements: int = 4,
-    clearances: bool = False,
-    meshes: Mapping[str, MeshBody] | None = None,
-    bushes: bool = False,
-    time_limit: float = TIME_LIMIT,
     couple: ArrayLike | None = None,
-    hold: bool = False,
+    time_limit: float = TIME_LIMIT,
 ) -> MultibodyAssembly:
     """Force a robot together in Exudyn.
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
         scale: factor on the robot's geometric errors.
-        links: ``"beam"``: links with a section are geometrically exact beams, the
-            others 6 by 6 springs; ``"spring"``: all of them are springs.
-        stiffness: by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its axes, of
-            links that become springs and whose matrix the robot does not give.
+        model: how links and joints are modelled.
         load: (6,) [N m, N] on the platform at its origin, base axes; its direction
             stays.
         gravity: (3,) [m/s^2] base axes: bodies with a mass and beams with a density
             weigh; other links, whose mass is not known, do not.
-        elements: beam elements per link.
-        clearances: whether joints have their clearances, scaled like the errors.
-        meshes: by frame, links that are solids of finite elements in a floating frame.
-        bushes: whether joints with radial clearance and tilt are pins in two bushes,
-            see :func:`validation.multibody.contact.joint_clearance`, not a disc and a
-            cone.
-        time_limit: [s] after which the simulation fails.
         couple: (3,) [N m] on the platform besides, base axes, by forces whose direction
             stays on arms that turn with it: it has a potential, a moment has none.
-        hold: hold motions that nothing resists from the first; otherwise only where no
-            equilibrium is found without.
+        time_limit: [s] after which the simulation fails.
 
     Returns:
         The assembled robot.
 
     Raises:
-        BadInput: an unknown kind of link, or a spring's stiffness is missing.
+        BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
         OutOfTime: it was not found in time; a :class:`SimulationFailed`.
     """
-    if links not in LINKS:
-        raise BadInput(f"simulate_assembly: links = {links!r}, expected one of {LINKS}")
     started = time.monotonic()
-    given = {name: np.asarray(K, dtype=float) for name, K in (stiffness or {}).items()}
-    solids = dict(meshes or {})
-    springs = link_springs(posture.robot, links, given, solids)
+    given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
+    solids = dict(model.meshes)
+    springs = link_springs(posture.robot, model.links, given, solids)
     case = Case(
         posture=posture,
         scale=scale,
         springs=springs,
         meshes=solids,
-        elements=elements,
-        clearances=clearances,
-        bushes=bushes,
+        elements=model.elements,
+        clearances=model.clearances,
+        bushes=model.bushes,
         load=_vector(load, 6),
         gravity=_vector(gravity, 3),
         couple=_vector(couple, 3),
     )
-    *first, last = _WITH_CLEARANCES if clearances else _TIGHT
-    first = [] if hold else first
+    *first, last = _WITH_CLEARANCES if model.clearances else _TIGHT
+    first = [] if model.hold else first
     for regularisation in first:
         try:
             return _simulate(case, regularisation, started, time_limit)
@@ -209,7 +228,10 @@ def _simulate(
 
 
 def closing_sequence(
-    posture: Placed, steps: int = 8, scale: float = 1.0, load: ArrayLike | None = None
+    posture: PlacedRobot,
+    steps: int = 8,
+    scale: float = 1.0,
+    load: ArrayLike | None = None,
 ) -> NDArray:
     """Frames of a robot without clearances while its closures are closed.
 

@@ -200,8 +200,8 @@ def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
         values = campaign.measured[:, k]
         forward, backward = [], []
         for number in range(int(campaign.repeat.max()) + 1):
-            here = (campaign.repeat == number) & np.isfinite(values)
-            up, down = values[here & (side > 0)], values[here & (side < 0)]
+            rows = (campaign.repeat == number) & np.isfinite(values)
+            up, down = values[rows & (side > 0)], values[rows & (side < 0)]
             if len(up) > 1 and len(down) > 1:
                 forward.append(up)
                 backward.append(down)

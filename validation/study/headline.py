@@ -66,7 +66,7 @@ def _assembly_text(results: StudyResults) -> str:
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-        return "It goes together without force, and needs no play for it"
+        return "It goes together without force, and needs no clearance for it"
     if zone["assemblable"] or zone["assemblable_free"]:
         text = "It goes together by its clearances alone"
         return text + (
@@ -74,7 +74,7 @@ def _assembly_text(results: StudyResults) -> str:
         )
     text = f"It goes together only by force: {assembly.energy:.4g} J"
     if zone["margin_free"] is not None:
-        text += f", its play being {zone['margin_free']:.3g} times too small"
+        text += f", its clearances being {zone['margin_free']:.3g} times too small"
     return text
 
 
@@ -83,12 +83,14 @@ def _pose_error_text(results: StudyResults) -> str:
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-    at_rest = f"with play resting at least energy it is {_pose_text(turn, shift)} away."
+    at_rest = (
+        f"with clearances resting at least energy it is {_pose_text(turn, shift)} away."
+    )
     if worst["pose"] is None:
-        return f"How far play lets its platform go could not be bounded; {at_rest}"
+        return f"How far clearances let its platform go could not be bounded; {at_rest}"
     bound = _bound_text(worst["pose"])
     sentence = [
-        f"Wherever its play rests, its platform is {bound} from the nominal pose"
+        f"Wherever its clearances rest, its platform is {bound} from the nominal pose"
     ]
     if worst["map"] is not None:
         over = worst["map"]

@@ -4,32 +4,32 @@ from typing import Any
 
 import numpy as np
 
-from assembly.report.platform_stiffness import DIRECTIONS, draw_shares, share_rows
+from assembly.report.platform_stiffness import DIRECTIONS, plot_shares, share_rows
 from stiffness.screws import SCREW
 from validation.html import html_figure, html_table
 
 _SHOWN = 8  # parts in the table
 
 
-def platform_section(found: dict[str, Any]) -> str:
+def platform_section(stiffness: dict[str, Any]) -> str:
     """K_C at the study's pose, and which part gives way, as HTML.
 
     Args:
-        found: of :func:`assembly.report.platform_stiffness.stiffness_of`.
+        stiffness: of :func:`assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
         Headings, tables and the chart of shares.
     """
-    K = np.asarray(found["stiffness"])
+    K = np.asarray(stiffness["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
     rows = [
         [name, *(f"{v:.5g}" if np.isfinite(v) else "rigid" for v in row)]
         for name, row in zip(SCREW, K, strict=True)
     ]
-    eigen = ", ".join(f"{one['stiffness']:.4g}" for one in found["eigen"])
-    free = len(found["free_motions"])
-    shares = list(share_rows(found["shares"]).items())[:_SHOWN]
+    eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])
+    free = len(stiffness["free_motions"])
+    shares = list(share_rows(stiffness["shares"]).items())[:_SHOWN]
     blame = [
         [name, *(f"{100 * v:.3g}" if np.isfinite(v) else "-" for v in row)]
         for name, row in shares
@@ -42,9 +42,9 @@ def platform_section(found: dict[str, Any]) -> str:
         + ".</p>"
         + html_table(["", *SCREW], rows)
         + f"<p>Eigen-stiffnesses [N/m], angles times "
-        f"{found['characteristic_length']:.4g} m: {eigen}.</p>"
+        f"{stiffness['characteristic_length']:.4g} m: {eigen}.</p>"
         "<p>Which part gives way: shares in the compliance along each axis [%], the "
         "largest first.</p>"
         + html_table(["part", *DIRECTIONS], blame)
-        + html_figure(draw_shares(found), "Shares of links and joints.")
+        + html_figure(plot_shares(stiffness), "Shares of links and joints.")
     )

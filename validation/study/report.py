@@ -34,8 +34,8 @@ _MAPPED = (
     ("margin", "zone margin, eq. (21)", 1.0),
     ("margin_free", "zone margin, compliant joints free", 1.0),
     ("energy", "energy, eq. (22) [J]", 1.0),
-    ("rotation_error", "largest turn, eq. (27) [mrad], play anywhere", 1e3),
-    ("translation_error", "largest shift, eq. (27) [mm], play anywhere", 1e3),
+    ("rotation_error", "largest turn, eq. (27) [mrad], clearances anywhere", 1e3),
+    ("translation_error", "largest shift, eq. (27) [mm], clearances anywhere", 1e3),
 )
 
 
@@ -165,7 +165,7 @@ def _solution(results: StudyResults) -> str:
     if solution["status"] == "ok":
         rows.append(["energy, eq. (22) [J]", f"{solution['energy']:.9g}"])
         for name, value in zip(SCREW, solution["platform_screw"], strict=True):
-            quantity = f"platform error {name} [rad, m], play at least energy"
+            quantity = f"platform error {name} [rad, m], clearances at least energy"
             rows.append([quantity, f"{value:.6e}"])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {key}", f"{value:.2e}"])
@@ -202,7 +202,14 @@ def _pose_error(results: StudyResults) -> str:
         for key in ("rotation", "translation"):
             row += [f"{1e3 * bounds[key][side]:.6g}" for side in ("lower", "upper")]
         rows.append([*row, _CLEARANCE_OF[reading]])
-    head = ["reading", "rotation >=", "<= [mrad]", "translation >=", "<= [mm]", "play"]
+    head = [
+        "reading",
+        "rotation >=",
+        "<= [mrad]",
+        "translation >=",
+        "<= [mm]",
+        "clearances",
+    ]
     return (
         "<p>Largest error of the platform's pose, problem (27), between certified "
         "bounds.</p>" + html_table(head, rows)
@@ -305,8 +312,8 @@ def _maps(results: StudyResults) -> str:
     if len(axes) == 2:
         picture = html_figure(
             map_figure(results.maps),
-            "Maps over the grid; the platform's errors are the bounds of (27), play "
-            "anywhere.",
+            "Maps over the grid; the platform's errors are the bounds of (27), "
+            "clearances anywhere.",
         )
     return (
         f"<h2>Over the workspace</h2><p>{counts}. Assembles rigidly with "
@@ -324,8 +331,8 @@ def _picture(results: StudyResults) -> str:
     pixels = plotter.screenshot(return_img=True)
     plotter.close()
     caption = (
-        "Nominal (grey) and forced robot, its play at least energy; the exaggeration "
-        "is on the picture."
+        "Nominal (grey) and forced robot, its clearances at least energy; the "
+        "exaggeration is on the picture."
     )
     return "<h2>The forced robot</h2>" + html_image(png_bytes(pixels), caption)
 
@@ -349,7 +356,8 @@ def _crosscheck(results: StudyResults) -> str:
         f"slope 2. {_slope_text(check.slope)} {html.escape(verdict_text(check))}.</p>"
         + html_table(check.metric.header(), check.metric.rows())
         + html_figure(
-            slope_figure(check), "Difference of the platform's pose, without play."
+            slope_figure(check),
+            "Difference of the platform's pose, without clearances.",
         )
         + closing
     )

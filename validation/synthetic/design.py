@@ -35,6 +35,7 @@ class CampaignDesign:
             ``"constant"``: 6 K.
         command: ``"joints"`` or ``"pose"``, what is written as commanded.
         humidity: whether a covariate of that name is recorded [%].
+        reference_point: [m] the point measured, where loads act, platform axes.
     """
 
     configurations: int = 24
@@ -46,6 +47,7 @@ class CampaignDesign:
     temperature: str = "swing"
     command: str = "joints"
     humidity: bool = False
+    reference_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         choices = (

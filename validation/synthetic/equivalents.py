@@ -10,7 +10,7 @@ those of temperature, approach and contact follow from them: 600 solutions for a
 not 5000.  Clearance and geometric stiffening have no linear signature and are left out.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -100,15 +100,25 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     """(rows, 6, parameters) by effect."""
-    robot, rows = campaign.robot, campaign.plan.rows
     differences = _FiniteDifferences(campaign)
+    covariate = {
+        name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
+        for name in ("temperature", "time", "approach")
+    }
+    yield from _of_drives_and_lengths(campaign, differences, covariate)
+    yield from _of_loads(campaign, differences)
+    yield from _of_the_device(differences, covariate["time"])
+
+
+def _of_drives_and_lengths(
+    campaign: Synthetic, differences: "_FiniteDifferences",
+    covariate: Mapping[str, NDArray],
+) -> Iterator[tuple[str, NDArray]]:  # fmt: skip
+    """Effects that turn a drive or lengthen a beam, by the same derivatives."""
+    robot, rows = campaign.robot, campaign.plan.rows
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
-    covariate = {
-        name: np.array([row.covariates[name] for row in rows])[:, None]
-        for name in ("temperature", "time", "approach")
-    }
     offsets = {n: differences.unloaded("encoder_offset", n, _STEP) for n in drives}
     lengths = [differences.unloaded("link_length", f.name, _STEP) for f in beams]
     softer = {
@@ -116,55 +126,47 @@ def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
     }
     yield "encoder_offset", _columns(list(offsets.values()))
     angles = {n: np.array([[row.coordinates[n]] for row in rows]) for n in turning}
-    yield (
-        "encoder_eccentricity",
-        _columns([
-            wave(angles[n]) * offsets[n] for n in turning for wave in (np.sin, np.cos)
-        ]),
-    )
+    waves = [wave(angles[n]) * offsets[n] for n in turning for wave in (np.sin, np.cos)]
+    yield "encoder_eccentricity", _columns(waves)
     yield "link_length", _columns(lengths)
     warm = covariate["temperature"]
     yield "thermal_expansion", _columns([warm * length for length in lengths])
     yield "drive_compliance", _columns(list(softer.values()))
     elastic = [n for n in drives if own_compliance(robot.frame(n)) > 0]
-    yield (
-        "friction_hysteresis",
-        _columns([covariate["approach"] * offsets[n] for n in elastic]),
-    )
-    yield (
-        "contact_stiffening",
-        _columns([_stiffening(softer[n], offsets[n]) for n in drives]),
-    )
-    yield (
-        "base_compliance",
-        _columns([
-            differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
-            for k in SCREW
-        ]),
-    )
-    yield (
-        "modulus_scale",
-        _columns([
-            differences.loaded("modulus_scale", f.name, 0.99, 0.01) for f in beams
-        ]),
-    )
-    yield (
-        "self_weight",
-        _columns([differences.unloaded("self_weight", f"g.{k}", 1.0) for k in "xyz"]),
-    )
+    behind = [covariate["approach"] * offsets[n] for n in elastic]
+    yield "friction_hysteresis", _columns(behind)
+    stiffening = [_stiffening(softer[n], offsets[n]) for n in drives]
+    yield "contact_stiffening", _columns(stiffening)
+
+
+def _of_loads(
+    campaign: Synthetic, differences: "_FiniteDifferences"
+) -> Iterator[tuple[str, NDArray]]:
+    """Effects of what the machine carries: springs, weight, wrong loads."""
+    beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
+    base = [
+        differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
+        for k in SCREW
+    ]
+    yield "base_compliance", _columns(base)
+    moduli = [differences.loaded("modulus_scale", f.name, 0.99, 0.01) for f in beams]
+    yield "modulus_scale", _columns(moduli)
+    weights = [differences.unloaded("self_weight", f"g.{k}", 1.0) for k in "xyz"]
+    yield "self_weight", _columns(weights)
     unit_loads = [differences.unloaded("load_gain", f"offset.{k}", 1.0) for k in WRENCH]
-    loads = np.array([row.load for row in rows])
+    loads = np.array([row.load for row in campaign.plan.rows])
     recorded = [k for k in range(6) if loads[:, k].any()]
     gain = sum(loads[:, [k]] * unit_loads[k] for k in range(6))
     yield "load_gain", _columns([np.asarray(gain), *(unit_loads[k] for k in recorded)])
-    yield (
-        "registration",
-        _columns([
-            differences.unloaded("registration", key, _STEP)
-            for key in (*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz")
-        ]),
-    )
-    time = covariate["time"]
+
+
+def _of_the_device(
+    differences: "_FiniteDifferences", time: NDArray
+) -> Iterator[tuple[str, NDArray]]:
+    """Effects of the measuring device: where it stands, and how it drifts."""
+    keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
+    frame = [differences.unloaded("registration", key, _STEP) for key in keys]
+    yield "registration", _columns(frame)
     for share in _DRIFTS:
         rise = -np.expm1(-time / (share * time.max()))
         yield f"drift({share:g})", _columns([rise * axis for axis in np.eye(6)])

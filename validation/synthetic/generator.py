@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
@@ -103,7 +103,6 @@ def generate_campaign(
     wanted: Mapping[str, float] | Sequence[tuple[Hidden, float]],
     design: CampaignDesign | None = None,
     noise: Noise | None = None,
-    reference_point: ArrayLike = (0.0, 0.0, 0.0),
     seed: int = 0,
     program: str = "multibody",
     update: Progress | None = None,
@@ -116,7 +115,6 @@ def generate_campaign(
             parameters; with the multiple of the noise that each alone is to reach.
         design: what is measured.
         noise: errors of the readings.
-        reference_point: (3,) [m] measured point, platform axes.
         seed: of all draws.
         program: ``"multibody"`` or, much faster, ``"springs"``.
         update: called with a stage, the rows done and their total.
@@ -132,7 +130,7 @@ def generate_campaign(
     """
     design, noise = design or CampaignDesign(), noise or Noise()
     rng = np.random.default_rng(seed)
-    point = np.array(reference_point, dtype=float)
+    point = np.array(design.reference_point, dtype=float)
     plan = plan_campaign(robot, design, rng)
     duration = plan.rows[-1].covariates["time"]
     if isinstance(wanted, Mapping):

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from assembly.model.robot import Robot
 from validation.multibody.simulation import (
     SimulationFailed,
+    SimulationModel,
     simulate_assembly,
 )
 from validation.synthetic.effects import (
@@ -122,8 +123,10 @@ def _simulated(machines: Sequence[Machine]) -> Iterator[Rest]:
             _Placed(robot, q),
             load=machine.load,
             gravity=machine.gravity if machine.gravity.any() else None,
-            elements=_ELEMENTS,
-            clearances=any(f.clearance is not None for f in robot.frames),
+            model=SimulationModel(
+                elements=_ELEMENTS,
+                clearances=any(f.clearance is not None for f in robot.frames),
+            ),
         )
         yield Rest(assembly.transforms, assembly.joint_wrenches, assembly.joint_screws)
 

@@ -232,7 +232,7 @@ def test_what_the_compiled_road_does_not_cover_goes_the_slower_one():
     too_far = robot.errors * 100
     batch = minimise_energies(robot, T, too_far)
     assert batch.status[0] == "cannot assemble"
-    assert "no play within its bounds" in batch.reason[0]
+    assert "no clearance within its bounds" in batch.reason[0]
 
 
 def test_a_bound_on_a_joints_own_motion_goes_the_slower_road():

@@ -161,7 +161,7 @@ def campaign_of(times, **columns):
     )
     session = columns.pop("session", None)
     known = {"time": times, **columns}
-    return with_history(as_declared(rows, covariates=known, session=session))
+    return with_history(as_declared(rows, covariates=known | {"session": session}))
 
 
 def test_a_lag_settles_exponentially():

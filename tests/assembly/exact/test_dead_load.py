@@ -19,7 +19,11 @@ from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
-from validation.multibody.simulation import simulate_assembly, without_clearance
+from validation.multibody.simulation import (
+    SimulationModel,
+    simulate_assembly,
+    without_clearance,
+)
 
 G = 9.81
 
@@ -240,7 +244,7 @@ def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
     }
     answer = solve_exact(posture, gravity=gravity)
     other = simulate_assembly(
-        posture, links="spring", stiffness=stiffness, gravity=gravity
+        posture, model=SimulationModel("spring", stiffness), gravity=gravity
     )
     light = solve_exact(posture)
     sag = np.abs(answer.platform_screw - light.platform_screw)[3:].max()

@@ -21,7 +21,7 @@ from tests.robots_for_tests import (
     irsbot2_with,
     small_clearance,
 )
-from validation.multibody.simulation import without_clearance
+from validation.multibody.simulation import SimulationModel, without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
 A, B, D = 0.3, 0.25, 0.4  # [m] sides of the triangle of two hinged bars
@@ -316,7 +316,7 @@ def test_the_simulation_agrees_at_full_errors(case, place):
         if frame.link is not None
     }
     answer = solve_exact(posture)
-    other = simulate_assembly(posture, links="spring", stiffness=stiffness)
+    other = simulate_assembly(posture, model=SimulationModel("spring", stiffness))
     assert answer.linearisation_error.energy != pytest.approx(0, abs=0.1)  # [J]
     assert other.energy == pytest.approx(answer.energy, rel=1e-9)
     difference = np.abs(other.platform_screw - answer.platform_screw)
@@ -343,7 +343,7 @@ def test_the_simulation_agrees_with_clearances_at_full_errors(case):
     }
     answer = solve_exact(posture)
     other = simulate_assembly(
-        posture, links="spring", stiffness=stiffness, clearances=True
+        posture, model=SimulationModel("spring", stiffness, clearances=True)
     )
     energy = other.energy + 2 * other.contact_energy
     assert energy == pytest.approx(answer.energy, rel=5e-4)

@@ -139,7 +139,7 @@ def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row):
 def test_play_is_refused():
     robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
     assert virtual_joints(robot).cones.shape[1]
-    with pytest.raises(ValueError, match="has play, which is not linear"):
+    with pytest.raises(ValueError, match="has clearance, which is not linear"):
         flexibility(at_home(robot))
 
 

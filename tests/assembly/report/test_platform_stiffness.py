@@ -7,7 +7,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.report.platform_stiffness import (
     DIRECTIONS,
-    draw_shares,
+    plot_shares,
     stiffness_of,
     stiffness_text,
 )
@@ -57,6 +57,6 @@ def test_a_load_that_nothing_carries_is_said_to_be_one():
 
 def test_the_chart_has_a_bar_for_each_part_and_direction():
     results = stiffness_of(home_posture(load_robot("four_bar")))
-    (axes,) = draw_shares(results).axes
+    (axes,) = plot_shares(results).axes
     heights = [bar.get_height() for bar in axes.patches]
     np.testing.assert_allclose(sum(heights), 600.0)

@@ -237,7 +237,7 @@ def test_the_commands_from_files_to_figures(tmp_path):
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
         figure = histogram_figure(data)
         assert len(figure.axes) == 8
-        assert "pose errors: play worst: play anywhere" in figure.get_suptitle()
+        assert "pose errors: play worst: clearances anywhere" in figure.get_suptitle()
         assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
         assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
         assert len(tornado_figure(data).axes) == 6

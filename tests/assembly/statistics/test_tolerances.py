@@ -284,7 +284,7 @@ def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.ones(2), np.zeros(2),
                 np.array([0.05, 0.005]), {"translation": 2e-4}, asked_yield=0.9,
                 draws=200)  # fmt: skip
-    with pytest.raises(BadInput, match="even perfect parts reach 0.0003877 m by play"):
+    with pytest.raises(BadInput, match="even perfect parts reach 0.0003877 m by clear"):
         allocate([posture], plan, fresh=0)
     at_rest = allocate([posture], replace(plan, clearance_model="least"), fresh=0)
     assert at_rest.tolerances.min() > 0

@@ -12,7 +12,7 @@ from assembly.model.function import Function
 from assembly.robots import load_robot
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
-from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import sweep_in_memory
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
@@ -39,8 +39,16 @@ def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
     """M / k with M = F L cos q of a load, and m g L cos q / 2 of the beam's weight."""
     path = arm_with(tmp_path)
     grid = "q.drive=0:1.2:0.4"
-    asked = ask_sweep(str(path), grid=grid, reading="none", load=[0, 0, 0, 0, 10, 0],
-                      gravity=[0, -G, 0], wrench=["drive"])  # fmt: skip
+    asked = ask_sweep(
+        str(path),
+        SweepOptions(
+            grid=grid,
+            reading="none",
+            load=[0, 0, 0, 0, 10, 0],
+            gravity=[0, -G, 0],
+            wrench=["drive"],
+        ),
+    )
     data = sweep_in_memory(asked)
     q = data["q.drive"].values
     assert q.shape == (4,)
@@ -134,12 +142,16 @@ def test_a_load_that_nothing_resists_is_a_status():
 
 def test_bounds_of_a_loaded_robot_and_missing_covariates_are_refused(tmp_path):
     with pytest.raises(BadInput, match="--reading none"):
-        ask_sweep("irsbot2", grid=GRID, load=[0, 0, 0, 0, 0, 1.0])
+        ask_sweep("irsbot2", SweepOptions(grid=GRID, load=[0, 0, 0, 0, 0, 1.0]))
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
     path = str(arm_with(tmp_path, warm))
     with pytest.raises(BadInput, match="--under temperature=NUMBER"):
-        ask_sweep(path, grid="q.drive=0:1:0.5")
-    asked = ask_sweep(path, grid="q.drive=0:1:0.5", under={"temperature": 0.0})
+        ask_sweep(path, SweepOptions(grid="q.drive=0:1:0.5"))
+    asked = ask_sweep(
+        path, SweepOptions(grid="q.drive=0:1:0.5", under={"temperature": 0.0})
+    )
     assert "--under temperature=0" in asked.command
-    other = ask_sweep(path, grid="q.drive=0:1:0.5", under={"temperature": 3.0})
+    other = ask_sweep(
+        path, SweepOptions(grid="q.drive=0:1:0.5", under={"temperature": 3.0})
+    )
     assert asked.identity != other.identity

@@ -24,7 +24,7 @@ def run(name, *words):
 def test_the_papers_figure_is_drawn_in_both_conventions(tmp_path):
     """A coarse grid, part of the fine one: energies within the reference's."""
     said = run("paper_figure5.py", "--step", "0.2", "-o", tmp_path)
-    assert said.count("go together by play with compliant joints free") == 2
+    assert said.count("go together by clearances with compliant joints free") == 2
     for signs in ("literal", "signed"):
         assert (tmp_path / f"figure5_{signs}.png").read_bytes().startswith(b"\x89PNG")
     least, _, most = re.findall(r"energy \[J\] +(\S+) / (\S+) / (\S+)", said)[0]
@@ -37,11 +37,11 @@ def test_less_play_makes_a_hexapod_more_accurate(tmp_path):
     play, error = (
         [float(n) for n in re.findall(p, said)]
         for p in (
-            r"with (\S+) um of play",
+            r"with (\S+) um of clearance",
             r"translation 90 % below .* (\S+) um at the worst",
         )
     )
-    alone = [float(n) for n in re.findall(r"by play alone (\S+) um", said)]
+    alone = [float(n) for n in re.findall(r"by clearances alone (\S+) um", said)]
     assert sorted(play) == [4.0, 8.0]
     large, small = play.index(8.0), play.index(4.0)
     assert error[small] < error[large]

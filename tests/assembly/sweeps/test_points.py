@@ -14,7 +14,7 @@ from assembly.sweeps.maps import figure_of
 from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
-from assembly.sweeps.request import ask_sweep, summary_of
+from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
@@ -79,7 +79,9 @@ def test_play_alone_is_symmetric_where_the_robot_is(data):
 
 def test_a_design_that_varies_is_that_robot_bit_for_bit():
     path = "link_a.link.beam.radius"
-    asked = ask_sweep("irsbot2", grid=GRID, vary=[f"{path}=0.03,0.05"], reading="none")
+    asked = ask_sweep(
+        "irsbot2", SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], reading="none")
+    )
     data = sweep_in_memory(asked)
     assert data.energy.dims == (path, "tx", "tz")
     assert data[path].attrs["units"] == "m"
@@ -93,7 +95,8 @@ def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     asked = ask_sweep(
-        "five_bar", grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11
+        "five_bar",
+        SweepOptions(grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11),
     )
     data = sweep_in_memory(asked)
     assert data.energy.dims == ("tx", "ty", "draw")
@@ -120,7 +123,8 @@ def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
     ]
     (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
     asked = ask_sweep(
-        str(tmp_path / "robot.toml"), poses=tmp_path / "path.csv", reading="none"
+        str(tmp_path / "robot.toml"),
+        SweepOptions(poses=tmp_path / "path.csv", reading="none"),
     )
     found = sweep_in_memory(asked)
     assert found.energy.dims == ("posture",)
@@ -151,9 +155,11 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     path = "leg1.elbow_a.translation.y"
     y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])
     asked = ask_sweep(
-        "irsbot2", grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"],
-        reading="none",
-    )  # fmt: skip
+        "irsbot2",
+        SweepOptions(
+            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], reading="none"
+        ),
+    )
     data = sweep_in_memory(asked).squeeze()
     assert data.status.values.tolist() == [["ok", "ok"], ["invalid robot"] * 2]
     assert "does not hold in the home pose" in data.reason.values[1, 0]
@@ -208,7 +214,7 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
 )  # fmt: skip
 def test_a_sweep_asked_for_wrongly_is_one_message(options, message):
     with pytest.raises(BadInput) as error:
-        ask_sweep("irsbot2", **options)
+        ask_sweep("irsbot2", SweepOptions(**options))
     assert message in str(error.value)
 
 
@@ -216,13 +222,15 @@ def test_figures_need_only_the_data_set(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
-    asked = ask_sweep("five_bar", grid=grid, errors=path, draws=3, near=0.6,
-                      play_alone=True)  # fmt: skip
+    asked = ask_sweep(
+        "five_bar",
+        SweepOptions(grid=grid, errors=path, draws=3, near=0.6, play_alone=True),
+    )
     data = sweep_in_memory(asked)
     figure = figure_of(data)
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert len(titles) == 6
-    assert titles[-1] == "position error by play alone [mm]"
+    assert titles[-1] == "position error by clearances alone [mm]"
     assert "median of 3 draws" in {t.get_text() for t in figure.texts}
     assert "parallel: " in figure.get_suptitle()
     panel = next(a for a in figure.axes if "energy" in a.get_title())

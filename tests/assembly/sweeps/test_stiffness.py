@@ -7,15 +7,19 @@ from assembly.kinematics.posture import place_robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import ask_sweep
+from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import sweep_in_memory
 
 
 def test_each_point_has_the_stiffness_of_its_posture():
-    data = sweep_in_memory(ask_sweep(
-        "irsbot2", grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1", reading="none",
-        stiffness=True,
-    ))  # fmt: skip
+    data = sweep_in_memory(
+        ask_sweep(
+            "irsbot2",
+            SweepOptions(
+                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1", reading="none", stiffness=True
+            ),
+        )
+    )
     robot = load_robot("irsbot2")
     one = without_clearance(place_robot(robot, {"tx": 0.1, "tz": -0.4}))
     there = data.sel(tx=0.1, tz=-0.4, method="nearest")
@@ -38,9 +42,16 @@ def test_each_point_has_the_stiffness_of_its_posture():
 
 def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
     """Bending stiffness of a round bar grows with the radius to the fourth."""
-    data = sweep_in_memory(ask_sweep(
-        "irsbot2", grid="tx=0,tz=-0.5", vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
-        reading="none", stiffness=True,
-    ))  # fmt: skip
+    data = sweep_in_memory(
+        ask_sweep(
+            "irsbot2",
+            SweepOptions(
+                grid="tx=0,tz=-0.5",
+                vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
+                reading="none",
+                stiffness=True,
+            ),
+        )
+    )
     stiffness = data.stiffness.sel(wrench_component="FY").values.ravel()
     assert (np.diff(stiffness) > 0).all()

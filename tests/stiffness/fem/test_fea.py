@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.fea import Budget, interface_center, solve_link
+from stiffness.fem.fea import Budget, FemOptions, interface_center, solve_link
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.surface.interface import parse_interface
@@ -36,7 +36,7 @@ def test_the_papers_bar_from_its_surface(cache):
         *PLANES,
         [Material(E, NU, 2700.0)],
         point_masses=[PointMass(1.0, np.array([0, 0, 0.452]))],
-        cache=cache,
+        options=FemOptions(cache=cache),
     )
     link = solution.link
     true = link.stiffness[0, 0] / 1032277 - 1
@@ -61,9 +61,9 @@ def test_the_papers_bar_from_its_surface(cache):
 def test_a_bar_of_two_materials_end_to_end(cache):
     """Stretched: two springs in series, but for the end effect both have."""
     half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226)
-    budget = Budget(levels=2)
+    options = FemOptions(cache=cache, budget=Budget(levels=2))
     one, two = (
-        solve_link(bar_surface(), *PLANES, m, cache=cache, budget=budget).link
+        solve_link(bar_surface(), *PLANES, m, options=options).link
         for m in ([Material(E, NU)], [Material(E, NU), half])
     )
     assert two.stiffness[5, 5] / one.stiffness[5, 5] == pytest.approx(4 / 3, rel=0.02)
@@ -72,8 +72,8 @@ def test_a_bar_of_two_materials_end_to_end(cache):
 @pytest.mark.slow
 def test_a_budget_that_is_used_up_says_so(cache):
     solution = solve_link(
-        bar_surface(), *PLANES, [Material(E, NU)], accuracy=1e-5,
-        budget=Budget(levels=2), cache=cache,
+        bar_surface(), *PLANES, [Material(E, NU)],
+        options=FemOptions(accuracy=1e-5, budget=Budget(levels=2), cache=cache),
     )  # fmt: skip
     assert not solution.link.mesh["reached"]
     assert solution.link.mesh["meshes"] == 2
@@ -89,10 +89,10 @@ def test_a_budget_that_is_used_up_says_so(cache):
     ],
 )
 def test_options_that_are_none_are_refused(change, message, cache):
-    options = {"materials": [Material(E, NU)], "cache": cache} | change
-    materials = options.pop("materials")
+    given = {"materials": [Material(E, NU)], "cache": cache} | change
+    materials = given.pop("materials")
     with pytest.raises(BadInput) as caught:
-        solve_link(bar_surface(), *PLANES, materials, **options)
+        solve_link(bar_surface(), *PLANES, materials, options=FemOptions(**given))
     assert message in str(caught.value)
 
 

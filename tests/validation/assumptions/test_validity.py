@@ -114,12 +114,14 @@ def test_the_simulation_with_two_contacts_a_pin_finds_the_same_ratio(posture):
     At a sixteenth both models of contact differ from finite rotations by 0.2 per cent,
     their ratio by what separates linear from finite, some 1e-4.
     """
-    from validation.multibody.simulation import simulate_assembly
+    from validation.multibody.simulation import SimulationModel, simulate_assembly
 
     expected = solve_bushes(posture).energy / solve_assembly(posture).energy
     scale = 1 / 16
     disc, bushes = (
-        simulate_assembly(posture, scale, clearances=True, bushes=b).rigid_energy
+        simulate_assembly(
+            posture, scale, SimulationModel(clearances=True, bushes=b)
+        ).rigid_energy
         for b in (False, True)
     )
     assert expected > 1.02
@@ -159,10 +161,12 @@ def test_the_simulations_elements_store_it_too(elements):
 
     Scaled down to 1e-3 m/s^2, where bending is linear to 1e-8.
     """
-    from validation.multibody.simulation import simulate_assembly
+    from validation.multibody.simulation import SimulationModel, simulate_assembly
 
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
-    energy = simulate_assembly(at, gravity=g, elements=elements).energy
+    energy = simulate_assembly(
+        at, model=SimulationModel(elements=elements), gravity=g
+    ).energy
     expected = solve_assembly(at, gravity=g).energy
     expected += energy_between_ends(at, g, pieces=elements)
     assert energy == pytest.approx(expected, rel=1e-7)

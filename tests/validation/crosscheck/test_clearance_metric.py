@@ -21,7 +21,7 @@ from validation.multibody.contact import (
     joint_clearance,
 )
 from validation.multibody.exudyn_parts import OutOfTime
-from validation.multibody.simulation import simulate_assembly
+from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 
@@ -125,7 +125,8 @@ def test_axial_play_is_taken_off_the_misfit(misfit):
     """
     stiffness = E * AREA / 0.8
     check = simulate_assembly(
-        coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)), clearances=True
+        coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)),
+        model=SimulationModel(clearances=True),
     )
     expected = (misfit - 3e-5) ** 2 * stiffness / 2
     allowed = 2 * 9e-9 / (misfit - 3e-5)
@@ -149,7 +150,9 @@ def test_a_slow_simulation_ends_in_time_and_says_so(pause, monkeypatch):
     limit = 0.3 if pause else 0.03
     started = time.monotonic()
     with pytest.raises(OutOfTime, match="time limit was reached while") as error:
-        simulate_assembly(posture, clearances=True, time_limit=limit)
+        simulate_assembly(
+            posture, model=SimulationModel(clearances=True), time_limit=limit
+        )
     assert time.monotonic() - started < limit + 1.0
     assert error.value.robot == "coaxial"
 
@@ -158,8 +161,13 @@ def test_a_time_limit_stays_with_its_simulation():
     """Exudyn's timer is one for all models: the next one has its own."""
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(OutOfTime):
-        simulate_assembly(posture, clearances=True, time_limit=1e-3)
-    assert simulate_assembly(posture, clearances=True).rigid_energy > 0
+        simulate_assembly(
+            posture, model=SimulationModel(clearances=True), time_limit=1e-3
+        )
+    assert (
+        simulate_assembly(posture, model=SimulationModel(clearances=True)).rigid_energy
+        > 0
+    )
 
 
 def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
@@ -172,14 +180,14 @@ def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
     monkeypatch.setattr(validation.multibody.exudyn_model, "cone_forces", interrupted)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with pytest.raises(KeyboardInterrupt):
-        simulate_assembly(posture, clearances=True)
+        simulate_assembly(posture, model=SimulationModel(clearances=True))
 
 
 def test_play_swallows_a_smaller_misfit():
     """A lateral misfit of 20 um inside a disc of 30 um: nothing presses."""
     tight = coaxial([0, 0, 0, 2e-5, 0, 0], None)
     loose = coaxial([0, 0, 0, 2e-5, 0, 0], Clearance(radial=3e-5))
-    free = simulate_assembly(loose, clearances=True)
+    free = simulate_assembly(loose, model=SimulationModel(clearances=True))
     assert free.rigid_energy < 1e-5 * simulate_assembly(tight).energy
     assert np.linalg.norm(free.clearance_screws[0, 3:5]) < 3e-5
 

@@ -16,7 +16,7 @@ from validation.crosscheck.crosscheck import crosscheck
 from validation.crosscheck.link_models import link_models
 from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 from validation.multibody.motion import placement
-from validation.multibody.simulation import simulate_assembly
+from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 
@@ -53,7 +53,9 @@ def test_a_loaded_solid_deforms_by_our_stiffness(block):
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
     posture = home_posture(Robot("block", "tip", (frame,)))
     wrench = np.array([0.03, -0.02, 0.01, 0.3, 0.2, -0.4])
-    assembly = simulate_assembly(posture, load=wrench, meshes={"tip": body})
+    assembly = simulate_assembly(
+        posture, model=SimulationModel(meshes={"tip": body}), load=wrench
+    )
     screw = np.linalg.solve(K, wrench)
     scale = np.abs(screw[:3]).max() * np.array([1, 1, 1, 0.2, 0.2, 0.2])
     assert 1e-7 < scale[0] < 1e-5
@@ -79,7 +81,7 @@ def test_a_solid_between_two_walls_is_its_spring_to_first_order(block):
     posture = home_posture(Robot("walls", "a", frames, (("a", "b"),)))
     difference = []
     for scale in (1.0, 0.1):
-        solid = simulate_assembly(posture, scale, meshes={"a": body})
+        solid = simulate_assembly(posture, scale, SimulationModel(meshes={"a": body}))
         spring = simulate_assembly(posture, scale)
         gap = np.abs(solid.platform_screw - spring.platform_screw).max()
         assert solid.energy == pytest.approx(spring.energy, rel=1e-2 * scale)

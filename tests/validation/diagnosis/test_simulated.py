@@ -13,7 +13,10 @@ from validation.synthetic.generator import generate_campaign, write_campaign
 
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
-DESIGN = CampaignDesign(configurations=16, rows=80, load=40.0, reach=0.8)
+DESIGN = CampaignDesign(
+    configurations=16, rows=80, load=40.0, reach=0.8,
+    reference_point=(0.02, 0.05, 0.03),
+)  # fmt: skip
 WIDE = {"geometric_stiffening": 30.0}  # needs larger errors to show
 
 
@@ -34,10 +37,7 @@ def arm(wider=1.0):
 def understood(wanted, seed, tmp_path):
     """Diagnosis of a fresh campaign, and the sets that its truth allows."""
     robot = arm(max(WIDE.get(name, 1.0) for name in wanted))
-    made = generate_campaign(
-        robot, wanted, DESIGN, seed=seed, program="springs",
-        reference_point=[0.02, 0.05, 0.03],
-    )  # fmt: skip
+    made = generate_campaign(robot, wanted, DESIGN, seed=seed, program="springs")
     write_campaign(made, tmp_path / "campaign")
     same = [one for one in alternatives(made, len(wanted)) if one.residual < SAME]
     allowed = {tuple(sorted(n.partition("(")[0] for n in one.names)) for one in same}

@@ -20,9 +20,7 @@ from tests.multibody_for_tests import (
     tip_stiffness,
 )
 from validation.multibody.motion import placement
-from validation.multibody.simulation import (
-    simulate_assembly,
-)
+from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 pytestmark = pytest.mark.exudyn
 G = E / (2 * (1 + NU))
@@ -87,7 +85,7 @@ def test_the_corrected_element_bends_exactly(elements, theory):
     shear = 10 * (1 + NU) / (12 + 11 * NU) if theory == "timoshenko" else math.inf
     for axis, second in ((4, along), (5, across)):
         assembly = simulate_assembly(
-            posture, load=P * np.eye(6)[axis], elements=elements
+            posture, model=SimulationModel(elements=elements), load=P * np.eye(6)[axis]
         )
         expected = P * L**3 / (3 * E * second) + P * L / (G * 1e-3 * shear)
         assert assembly.platform_screw[axis] == pytest.approx(expected, rel=1e-8)
@@ -144,7 +142,7 @@ def test_a_cantilever_sags_under_its_weight(links, elements):
     expected += P * offset * L**2 / (2 * E * second)
     K = {"tip": tip_stiffness(posture.robot.frame("tip"))}
     assembly = simulate_assembly(
-        posture, links=links, stiffness=K, gravity=[0, -g, 0], elements=elements
+        posture, model=SimulationModel(links, K, elements=elements), gravity=[0, -g, 0]
     )
     assert assembly.platform_screw[4] == pytest.approx(-expected, rel=1e-6)
 
@@ -159,7 +157,9 @@ def test_a_heavy_beam_converges_with_the_fourth_order():
         Robot("wire", "tip", (Frame("tip", translation=[1.0, 0, 0], link=wire),))
     )
     screws = [
-        simulate_assembly(posture, gravity=[0, -30, 0], elements=n).platform_screw
+        simulate_assembly(
+            posture, model=SimulationModel(elements=n), gravity=[0, -30, 0]
+        ).platform_screw
         for n in (4, 8, 16, 64)
     ]
     assert abs(screws[-1][2]) > 0.04
@@ -219,7 +219,9 @@ def test_a_bearing_turns_freely_and_yields_otherwise(clearance):
         Frame("end", "wall"),
     )  # fmt: skip
     posture = home_posture(Robot("hub", "tip", frames, (("tip", "end"),)))
-    assembly = simulate_assembly(posture, clearances=clearance is not None)
+    assembly = simulate_assembly(
+        posture, model=SimulationModel(clearances=clearance is not None)
+    )
     linear = solve_assembly(posture)
     assert linear.energy > 0.1
     assert assembly.energy == pytest.approx(linear.energy, rel=2e-3)

@@ -23,6 +23,7 @@ from validation.multibody.exudyn_parts import OutOfTime
 from validation.multibody.motion import exponential, inverse, logarithm, placement
 from validation.multibody.simulation import (
     SimulationFailed,
+    SimulationModel,
     closing_sequence,
     simulate_assembly,
     without_clearance,
@@ -114,7 +115,7 @@ def test_spring_links_are_beam_links_to_first_order(rng):
     difference = []
     for scale in (1.0, 0.1):
         beams = simulate_assembly(posture, scale)
-        springs = simulate_assembly(posture, scale, links="spring", stiffness=K)
+        springs = simulate_assembly(posture, scale, SimulationModel("spring", K))
         difference.append(np.abs(beams.platform_screw - springs.platform_screw).max())
     slope = math.log10(difference[0] / difference[1])
     assert difference[0] > 1e-9
@@ -157,9 +158,9 @@ def test_nothing_is_printed(capfd, rng):
 
 def test_a_spring_needs_its_matrix():
     with pytest.raises(BadInput, match="link of frame 'a' is to be a spring"):
-        simulate_assembly(coaxial(np.zeros(6)), links="spring")
+        simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("spring"))
     with pytest.raises(BadInput, match="links = 'shell', expected one of"):
-        simulate_assembly(coaxial(np.zeros(6)), links="shell")
+        simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("shell"))
 
 
 def test_without_clearance_leaves_passive_joints_free():
@@ -247,9 +248,11 @@ def test_models_with_contacts_and_models_that_fail_leave_nothing_behind():
 
     def batch(count):
         for _ in range(count):
-            simulate_assembly(posture, clearances=True)
+            simulate_assembly(posture, model=SimulationModel(clearances=True))
             with pytest.raises(OutOfTime):
-                simulate_assembly(posture, clearances=True, time_limit=0.0)
+                simulate_assembly(
+                    posture, model=SimulationModel(clearances=True), time_limit=0.0
+                )
 
     batch(10)
     before = resident()

@@ -234,13 +234,13 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     assert f"at most {1e3 * bound:.3g} mm" in sentences
     assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in sentences
     assert "certified bounds of (27), reading frozen" in sentences
-    assert "with play resting at least energy it is 0 mm" in sentences
+    assert "with clearances resting at least energy it is 0 mm" in sentences
     lost = verdict(replace(results, error={}, maps=None))
-    assert "could not be bounded; with play resting at least energy" in lost
+    assert "could not be bounded; with clearances resting at least energy" in lost
     page = report_page(results)
-    assert page.count("play at least energy") >= 6  # a row for each component
+    assert page.count("clearances at least energy") >= 6  # a row for each component
     assert "anywhere while no deformation changes" in page
-    assert "[mm], play anywhere" in page
+    assert "[mm], clearances anywhere" in page
 
 
 def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path):

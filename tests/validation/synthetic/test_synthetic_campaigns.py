@@ -140,7 +140,8 @@ def test_springs_and_the_exact_equilibrium_agree_at_any_size(name):
 
 def test_what_is_written_is_read_and_gives_nothing_away(tmp_path):
     noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
-    campaign = quick({"drift": 5.0}, seed=7, noise=noise, reference_point=[0, 0, 0.1])
+    design = replace(SMALL, reference_point=(0, 0, 0.1))
+    campaign = quick({"drift": 5.0}, design=design, seed=7, noise=noise)
     write_campaign(campaign, tmp_path / "c")
     texts = [p.read_text() for p in (tmp_path / "c").iterdir()]
     assert len(texts) == 3
