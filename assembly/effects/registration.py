@@ -33,7 +33,11 @@ REGISTRATION = Effect(
     unit=_unit,
     frames=None,
     components=BASE + TOOL,
-    unknowns=lambda robot: tuple(Unknown(name, 1e-4) for name in BASE + TOOL),
+    unknowns=lambda robot: tuple(
+        Unknown(name, 1e-4, -most, most)
+        for name in BASE + TOOL
+        for most in [np.pi if _unit(robot, name) == "rad" else np.inf]
+    ),
     by_row=True,
     device=BASE,
 )

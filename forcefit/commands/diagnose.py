@@ -64,7 +64,7 @@ def diagnose(
 
         write_report(diagnosis, report, tally)
     if save is not None:
-        if diagnosis.verdict not in {"explained", "learned"}:
+        if not diagnosis.foretells:
             typer.echo(
                 f"{save}: not written, the verdict is {diagnosis.verdict}", err=True
             )

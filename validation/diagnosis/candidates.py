@@ -33,6 +33,7 @@ TURN, SHIFT = AXES[:3], AXES[3:]
 KNOTS = 7
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
+_NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 MANY = 150  # rows from which many waves a turn are looked for
 
 
@@ -178,22 +179,39 @@ class Sensitivities:
             std: (m,) their standard deviations, taken as independent.
 
         Returns:
-            One function for each of its parts.
+            One function for each of its parts that the readings see.
         """
         functions, at = [], 0
+        least = _NOTHING * np.abs(x).max(initial=0.0)
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variable, one.shape)
             numbers, spread = dict(one.shape.given), {}
+            shown = []  # components that the readings see
+            alone = len(part.components) == 1
             for component in part.components:
                 own = slice(at, at + mixed.shape[1])
                 at = own.stop
+                if not np.any(np.abs(x[own]) > least):
+                    continue
+                shown.append(component)
                 values = mixed @ x[own]
                 stds = np.sqrt(mixed**2 @ std[own] ** 2)
-                alone = len(part.components) == 1
                 for name, v, s in zip(one.shape.names, values, stds, strict=True):
                     key = name if alone else f"{component}.{name}"
                     numbers[key], spread[key] = float(v), float(s)
-            functions.append(replace(function, parameters=numbers, std=spread))
+            if len(shown) == 1 and not alone:
+                begin = f"{shown[0]}."
+                numbers = {k.removeprefix(begin): v for k, v in numbers.items()}
+                spread = {k.removeprefix(begin): v for k, v in spread.items()}
+            if shown:
+                functions.append(
+                    replace(
+                        function,
+                        components=tuple(shown),
+                        parameters=numbers,
+                        std=spread,
+                    )
+                )
         return functions
 
 

@@ -100,6 +100,15 @@ class Diagnosis:
         """The machine's geometric errors and springs."""
         return self.model.behind
 
+    @property
+    def foretells(self) -> bool:
+        """Whether the model foretells rows kept aside better, with sound numbers.
+
+        So it does where more than noise is left, too, if functions were learned.
+        """
+        claimed = self.verdict in {"explained", "learned"}
+        return claimed or bool(self.model.learned and not self.remarks)
+
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
         return self.wording(self)

@@ -201,6 +201,7 @@ class Evidence:
             np.where(t.group < 0, -1, 2 * i + t.group) for i, t in enumerate(terms)
         ]
         self._group = np.concatenate([np.zeros(0, int), *group])
+        self._most = np.array([size for t in terms for size in t.most])
         self._given = np.concatenate([np.zeros(0), *(t.given for t in terms)])
         J = np.hstack([np.zeros((cells, 0)), *(term.columns for term in terms)])
         norm = np.linalg.norm(J, axis=0)
@@ -265,7 +266,8 @@ class Evidence:
         asked = np.unique(group[group >= 0])
         shows = np.ones(2 * len(self.terms))  # sizes that show as much as noise does
         for g in asked:
-            shows[g] = 1 / np.sqrt(np.mean(norm[group == g]))
+            shown = float(np.mean(norm[group == g]))
+            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
 
         def sizes(logs: NDArray) -> NDArray:
             return np.where(group < 0, given, (shows * np.exp(logs))[group])
@@ -283,10 +285,12 @@ class Evidence:
 
         logs = start.copy()
         if len(asked):
-            bounds = [(_LEAST, _MOST)] * len(asked)
+            most = np.log(self._most[asked] / shows[asked])
+            bounds = [(_LEAST, float(np.clip(m, _LEAST, _MOST))) for m in most]
             options = {"ftol": 1e-7, "maxiter": 40}
+            begin = np.clip(start[asked], *np.transpose(bounds))
             logs[asked] = minimize(
-                against, start[asked], jac=True, method="L-BFGS-B", bounds=bounds,
+                against, begin, jac=True, method="L-BFGS-B", bounds=bounds,
                 options=options,
             ).x  # fmt: skip
         s = sizes(logs)

@@ -1,4 +1,4 @@
-"""Rows kept aside: whole configurations, so that no fold shares one with another."""
+"""Rows kept aside: whole configurations or spans of time, shared by no two folds."""
 
 from dataclasses import dataclass
 
@@ -33,12 +33,7 @@ def split(campaign: Campaign) -> Split:
     Returns:
         The split; the same for the same campaign.
     """
-    blocks, kind = campaign.configuration, "configurations"
-    if len(np.unique(blocks)) < _FEWEST:
-        time = campaign.covariates.get("time", np.arange(len(campaign)))
-        order = np.argsort(np.argsort(time, kind="stable"))
-        blocks = order * min(2 * _FEWEST, len(campaign)) // len(campaign)
-        kind = "spans of time"
+    blocks, kind = blocks_of(campaign)
     names = np.unique(blocks)
     kept = np.random.default_rng(0).permutation(names)[: max(1, len(names) // _SHARE)]
     if len(names) < 2:
@@ -49,3 +44,22 @@ def split(campaign: Campaign) -> Split:
         "kept aside from choosing and fitting"
     )
     return Split(~held, how)
+
+
+def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
+    """What rows that are foretold must not share with rows that are fitted.
+
+    Args:
+        campaign: of R rows.
+
+    Returns:
+        (R,) number of the configuration, or of a span of time where there are too few;
+        and which of the two, in words.
+    """
+    blocks = campaign.configuration
+    if len(np.unique(blocks)) >= _FEWEST:
+        return blocks, "configurations"
+    time = campaign.covariates.get("time", np.arange(len(campaign)))
+    order = np.argsort(np.argsort(time, kind="stable"))
+    count = min(2 * _FEWEST, len(campaign))
+    return order * count // len(campaign), "spans of time"

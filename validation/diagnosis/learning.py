@@ -33,6 +33,7 @@ from validation.diagnosis.candidates import (
     variables_of,
 )
 from validation.diagnosis.evidence import Evidence, Prior, background
+from validation.diagnosis.holdout import blocks_of
 from validation.diagnosis.small_terms import SmallTerm
 
 MOST = 4  # functions that are learned
@@ -266,7 +267,7 @@ def _worth(school: _School, one: Candidate) -> float:
 
 
 def _foretells(school: _School, one: Learned) -> bool:
-    """Whether a function foretells configurations it was not fitted to."""
+    """Whether a function foretells rows that it was not fitted to."""
     B = school.columns(one.changes)
     term = replace(_term(school, one, 0), columns=school.seen(B))
     prior = Evidence([term], len(school.residual)).best(school.whitened)
@@ -279,7 +280,7 @@ def _foretells(school: _School, one: Learned) -> bool:
     small = np.hstack([flat[:, :0], *(t.columns[:, u] for t, u in used)])
     known = np.hstack([flat, small * school.behind.size])
     rows = np.nonzero(school.fitting.cells)[0]
-    where = school.fitting.configuration[rows]
+    where = blocks_of(school.fitting)[0][rows]
     names = np.random.default_rng(1).permutation(np.unique(where))
     if len(names) < 2:
         return False
@@ -300,6 +301,7 @@ def _foretells(school: _School, one: Learned) -> bool:
 
 def _foretold(X: NDArray, z: NDArray, kept: NDArray) -> NDArray:
     """Squared errors of the cells kept out of a fit with unknowns of size one."""
-    A = X[~kept]
-    x = np.linalg.solve(np.eye(X.shape[1]) + A.T @ A, A.T @ z[~kept])
+    # the prior as rows: products of columns would lose what nearly equal ones tell
+    A = np.vstack([X[~kept], np.eye(X.shape[1])])
+    x = np.linalg.lstsq(A, np.append(z[~kept], np.zeros(X.shape[1])))[0]
     return (z[kept] - X[kept] @ x) ** 2

@@ -19,10 +19,13 @@ from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import Background
 from validation.diagnosis.refit import Fit
-from validation.diagnosis.small_terms import GEOMETRY, KINDS
+from validation.diagnosis.small_terms import (
+    GEOMETRY,
+    KINDS,
+    LARGEST_SHIFT,
+    LARGEST_TURN,
+)
 
-_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
-_SHIFT = 0.1  # of the robot's size, likewise
 _GIVES = 0.2  # [rad, sizes] that nothing gives under the largest load
 _HOT = 150.0  # [K] away from calibration: no machine is measured there
 _G = 9.81  # [m/s^2]
@@ -68,7 +71,7 @@ def implausible(campaign: Campaign, fit: Fit, behind: Background) -> tuple[str, 
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max(initial=0.0)) + force * size
     softest = {"N/m": force / (_GIVES * size), "N m/rad": moment / _GIVES}
-    largest = {"rad": _TURN, "m": _SHIFT * size}
+    largest = {"rad": LARGEST_TURN, "m": LARGEST_SHIFT * size}
     known = campaign.registration == "known"
 
     def wrong() -> Iterator[str]:

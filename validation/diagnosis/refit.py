@@ -4,7 +4,7 @@ Sources:
     Nocedal, Wright, Numerical Optimization, chapter 10 (least squares).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -21,7 +21,7 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import NOTHING, Background
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.scoring import FINITE
-from validation.diagnosis.signatures import whiten
+from validation.diagnosis.signatures import UNSEEN, whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
@@ -235,32 +235,39 @@ def _refit(
         model = whiten(campaign, predict(there(x)).deviation)
         return behind.whitened(np.where(np.isfinite(model), measured - model, _LOST))
 
-    def left(scaled: NDArray) -> NDArray:
-        return left_at(scaled.tobytes())
-
-    def slopes(scaled: NDArray) -> NDArray:
-        middle = left(scaled)
-        J = np.zeros((len(middle), len(scaled)))
-        for k in range(len(scaled)):
+    def slopes(scaled: NDArray, asked: Iterable[int]) -> NDArray:
+        middle = left_at(scaled.tobytes())
+        columns = [np.zeros((len(middle), 0))]
+        for k in asked:
             moved = scaled.copy()
             step = _STEP if (moved[k] + _STEP) * size[k] <= upper[k] else -_STEP
             moved[k] += step
-            J[:, k] = (left(moved) - middle) / step
-        return J
+            columns.append((left_at(moved.tobytes()) - middle)[:, None] / step)
+        return np.hstack(columns)
 
-    if not slots:
-        residual = left(x0)
-        return Fit(tuple(members), x0, np.zeros((0, 0)), residual, there(x0))
-    inside = np.clip(x0 / size, lower / size, upper / size)
+    scaled = np.clip(x0 / size, lower / size, upper / size)
     with np.errstate(over="ignore", invalid="ignore"):
-        fitted = least_squares(
-            left, inside, jac=slopes, bounds=(lower / size, upper / size),
-            max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED, gtol=1e-10,
-            x_scale="jac",
-        )  # fmt: skip
-    J = fitted.jac / size
+        J = slopes(scaled, range(len(scaled)))
+        # what the readings do not see stays where it is
+        seen = np.flatnonzero(np.linalg.norm(J, axis=0) > UNSEEN)
+
+        def with_seen(x: NDArray) -> NDArray:
+            moved = scaled.copy()
+            moved[seen] = x
+            return moved
+
+        if len(seen):
+            fitted = least_squares(
+                lambda x: left_at(with_seen(x).tobytes()), scaled[seen],
+                jac=lambda x: slopes(with_seen(x), seen),
+                bounds=(lower[seen] / size[seen], upper[seen] / size[seen]),
+                max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED, gtol=1e-10,
+                x_scale="jac",
+            )  # fmt: skip
+            scaled, J[:, seen] = with_seen(fitted.x), fitted.jac
+    J /= size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))
     scale[scale == 0] = 1.0
     C = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-12, hermitian=True)
-    x = fitted.x * size
-    return Fit(tuple(members), x, C / np.outer(scale, scale), fitted.fun, there(x))
+    x, residual = scaled * size, left_at(scaled.tobytes())
+    return Fit(tuple(members), x, C / np.outer(scale, scale), residual, there(x))

@@ -189,7 +189,7 @@ def corrected(diagnosis: Diagnosis) -> Robot:
     robot = with_small(diagnosis.campaign.robot, behind.terms, unknowns)
     merged = {name: dict(values) for name, values in robot.effects.items()}
     for name, values in diagnosis.fit.effects.items():
-        if name in diagnosis.claimed:
+        if name in diagnosis.best_by_score:
             merged[name] = {**merged.get(name, {}), **values}
     new = functions_of(diagnosis.campaign, diagnosis.model)
     functions = (*robot.functions, *(f for some in new for f in some))

@@ -29,6 +29,7 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 
 _PROBED = 4  # rows
 _HARDLY = 2.0  # squared whitened change of all readings together
+UNSEEN = 1e-3  # [sigma] over all readings, of an unknown's own size
 _STEP = 1e-3  # of an unknown's plausible size, for its first derivative
 
 
@@ -183,7 +184,8 @@ class Tangents:
             start = slot.unknown.start + step
             values = {**shapes, **dict.fromkeys(slot.names, start)}
             public = LIBRARY[effect].public(self.conditions.robot, values)
-            self._columns[key] = (self.model({effect: public}) - self.declared) / step
+            column = (self.model({effect: public}) - self.declared) / step
+            self._columns[key] = _seen(column, slot)
         return self._columns[key]
 
     def about(
@@ -212,5 +214,12 @@ class Tangents:
             there = x.copy()
             step = _STEP * max(slot.unknown.scale, abs(x[k]))
             there[k] += step if there[k] + step <= slot.unknown.upper else -step
-            columns[:, k] = (model(there) - middle) / (there[k] - x[k])
+            column = (model(there) - middle) / (there[k] - x[k])
+            columns[:, k] = _seen(column, slot)
         return Signature(hypothesis, middle - without - columns @ x, columns)
+
+
+def _seen(column: NDArray, slot: Slot) -> NDArray:
+    """(N,) a derivative, zero where its unknown's own size does not show."""
+    size = np.linalg.norm(column) * slot.unknown.scale
+    return np.zeros_like(column) if size < UNSEEN else column

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.nominal import size_of
 from assembly.measurement.conditions import Conditions
 from assembly.model.links import in_series
 from assembly.model.robot import Robot
@@ -20,6 +21,9 @@ from validation.diagnosis.responses import Responses
 
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
+LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
+LARGEST_SHIFT = 0.1  # of the robot's size, likewise
+_UNSEEN = 1e-3  # [sigma] over all readings, of an error of the largest size
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,8 @@ class SmallTerm:
         given: (k,) standard deviation of the prior, NaN where it is asked for.
         lower: the unknowns' lower bound: springs only add compliance.
         sure: whether it is there whatever the readings say.
+        most: of rotations and of translations, largest size that the readings may ask
+            for.
     """
 
     name: str
@@ -43,6 +49,7 @@ class SmallTerm:
     given: NDArray
     lower: float
     sure: bool = False
+    most: tuple[float, float] = (np.inf, np.inf)
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -90,7 +97,8 @@ def small_terms(
         np.full(6, np.nan) if frame.tolerance is None else frame.tolerance
         for frame in frames
     ])
-    geometry = _term(campaign, GEOMETRY, screws, given, -np.inf)
+    most = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
+    geometry = _term(campaign, GEOMETRY, screws, given, -np.inf, most)
     bent = screws * response.wrenches[:, None, own]
     # what closures meet at, and the platform, have no spring of their own
     bent[:, :, [not _may_give(campaign.robot, f.name) for f in frames]] = 0.0
@@ -104,8 +112,9 @@ def _may_give(robot: Robot, name: str) -> bool:
 
 
 def _term(
-    campaign: Campaign, name: str, changes: NDArray, given: NDArray, lower: float
-) -> SmallTerm:
+    campaign: Campaign, name: str, changes: NDArray, given: NDArray, lower: float,
+    most: tuple[float, float] = (np.inf, np.inf),
+) -> SmallTerm:  # fmt: skip
     """The unknowns of changes (R, 6, n, 6) that show at all."""
     whitened = changes[campaign.cells] / campaign.sigma[campaign.cells][:, None, None]
     count = whitened.shape[1]
@@ -116,6 +125,7 @@ def _term(
     known = given.reshape(-1)
     # a tolerance of zero says that a direction is exact
     shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
+    shown &= size > _UNSEEN / np.array(most)[axis // 3]
     frame = np.repeat(np.arange(count), 6)
     return SmallTerm(
         name=name,
@@ -125,6 +135,7 @@ def _term(
         given=known[shown],
         lower=lower,
         sure=bool(np.isfinite(known[shown]).any()),
+        most=most,
     )
 
 

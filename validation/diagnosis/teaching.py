@@ -15,6 +15,7 @@ from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.evidence import background
+from validation.diagnosis.holdout import blocks_of
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
 from validation.diagnosis.learning import Learned, learn, term_name
@@ -108,7 +109,7 @@ def _foretells(
         whiten(judged, model.residual(campaign)[held]) ** 2 for model in (before, after)
     ]
     rows = np.nonzero(judged.cells)[0]
-    where = judged.configuration[rows]
+    where = blocks_of(campaign)[0][held][rows]
     gains = np.array([
         float((squares[0] - squares[1])[where == name].sum()) for name in set(where)
     ])

@@ -140,3 +140,36 @@ def test_scatter_teaches_nothing(diagnosed):
     assert found.verdict == "outside_library"
     assert table(found)["learned"] == []
     assert found.after.normalised < 1.02 * found.before.normalised
+
+
+def test_one_configuration_teaches_by_spans_of_time(tmp_path):
+    """A printer's z axis that stands still while its bed warms: 1 um of noise.
+
+    The reading follows the square of a covariate, 80 um in all, which no effect of the
+    library can do; what cannot be seen, all but z, stays where it is.
+    """
+    frames = Frame("z", joint="prismatic", actuated=True), Frame("nozzle", "z")
+    write_robot(Robot("axis", "nozzle", frames), tmp_path / "robot.toml")
+    (tmp_path / "campaign.toml").write_text(
+        'robot = "robot.toml"\nmeasurements = "rows.csv"\nregistration = "known"\n'
+        "[noise]\nrotation = 1.0\nposition = 1e-6\n"
+    )
+    rng = np.random.default_rng(5)
+    warm = np.sin(np.linspace(0, 20, 160))
+    read = 80e-6 * warm**2 + 1e-6 * rng.standard_normal(160)
+    lines = ["id,q.z,meas.tz,cov.bed"]
+    lines += [
+        f"m{i},0,{r:.9g},{w:.9g}"
+        for i, (r, w) in enumerate(zip(read, warm, strict=True))
+    ]
+    (tmp_path / "rows.csv").write_text("\n".join(lines) + "\n")
+    diagnosis = diagnose(read_campaign(tmp_path))
+    assert "spans of time" in diagnosis.split.how
+    assert diagnosis.verdict == "learned"
+    assert diagnosis.foretells
+    # rows kept aside: 40 readings, four standard deviations of their rms
+    assert diagnosis.before.normalised > 20
+    assert diagnosis.after.normalised < 1 + 4 / np.sqrt(2 * 40)
+    (function,) = corrected(diagnosis).functions
+    assert function.variables == ("cov.bed",)
+    assert function.components == ("tz",)
