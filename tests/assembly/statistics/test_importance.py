@@ -163,7 +163,7 @@ def test_random_play_is_not_taken_for_importance():
 
 
 def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):
-    """Rigid parts that meet within a clearance of 0.1 mm: errors of 0.3 often do not."""
+    """Rigid parts that meet within clearances of 0.1 mm: errors of 0.3 may not."""
     frames = (
         Frame("one", translation=[0.5, 0, 0], clearance=Clearance(radial=1e-4)),
         Frame("two", translation=[0.5, 0, 0]),
