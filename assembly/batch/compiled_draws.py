@@ -13,7 +13,7 @@ from assembly.batch.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
-from assembly.solvers.vectors import copy, fill, inner
+from assembly.solvers.vectors import copy, fill, inner, matrix, vector
 
 SOLVED, UNCERTIFIED = range(2)
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
@@ -49,9 +49,9 @@ def least_energies(
         for i in range(r):
             squares += Gt[c, i] * Gt[c, i]
         norm = max(norm, np.sqrt(squares))
-    own, right = np.empty(nu), np.empty(r)
-    G = np.empty((nu, r))
-    own_y = np.empty(r)
+    own, right = vector(nu), vector(r)
+    G = matrix(nu, r)
+    own_y = vector(r)
     for point in range(len(h)):
         size = 0.0
         for i in range(r):
@@ -125,7 +125,7 @@ def _within(Gt: Matrix, starts: Indices, h: Vector, inverse: Matrix, u: Vector) 
         worth -= np.sqrt(size_of_cone)
     if worth > 0.0:
         return False
-    left = np.empty(r)
+    left = vector(r)
     for _ in range(_PROJECTIONS):
         for i in range(r):
             left[i] = h[i]

@@ -38,7 +38,15 @@ from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.dual_newton import dual_newton
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
-from assembly.solvers.vectors import copy, divide, inner, into_cones
+from assembly.solvers.vectors import (
+    copy,
+    divide,
+    indices,
+    inner,
+    into_cones,
+    matrix,
+    vector,
+)
 
 NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED = range(6)
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
@@ -96,7 +104,7 @@ def assemble_all(
         m, nq = 6 * closures, len(s.free_frame)
         # free motions: their columns are the rows of F
         F = free_columns(s, P, m)
-        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        turns, diagonal, order = vector(nq), vector(nq), indices(nq)
         free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
         if free < 0:
             out.outcome[point] = AMBIGUOUS
@@ -106,8 +114,8 @@ def assemble_all(
         L = grouped_springs(s, P)
         Y = spring_rows(s, Z, L)
         count = len(Z)
-        y_turns, y_diagonal = np.empty(count), np.empty(count)
-        y_order = np.empty(count, np.int64)
+        y_turns, y_diagonal = vector(count), vector(count)
+        y_order = indices(count)
         noise = NOISE * largest_spring(s, P)
         rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
         if rank < 0:
@@ -120,7 +128,7 @@ def assemble_all(
             continue
         # the reduced problem in the clearances
         Gt, h = small_problem(s, P, Z, rank, known)
-        u, v, y = np.zeros(len(Gt)), np.empty(rank), np.empty(rank)
+        u, v, y = vector(len(Gt)), vector(rank), vector(rank)
         outcome = _minimise(s, Gt, h, u, v, y)
         # back to the full problem
         multipliers = out.multipliers[point]
@@ -130,7 +138,7 @@ def assemble_all(
                 multipliers[a] += Z[i, a] * y[i]
         for c in range(len(u)):
             out.clearances[point, c] = u[c]
-        spring = np.zeros(Y.shape[1])
+        spring = vector(Y.shape[1])
         copy(v, spring)
         turn(Y, y_turns, rank, spring)
         out.energy[point] = 0.5 * inner(v, v)
@@ -193,8 +201,8 @@ def _complementary(
     """Wrenches times f prove f gain - f^2 cost / 2: (gain, cost)."""
     # the complementary energy of assembly.linear.assembled.Assembly.bound
     n = len(P)
-    wrenches = np.zeros((n, 6))
-    at_platform = np.zeros(6)
+    wrenches = matrix(n, 6)
+    at_platform = vector(6)
     total, cost = 0.0, 0.0
     for j in range(n):
         for a in range(6):
@@ -239,7 +247,7 @@ def _minimise(
         return outcome
     for c in range(nu):
         size = max(size, np.sqrt(inner(Gt[c], Gt[c])))
-    G, right = np.empty((nu, r)), divide(h, size)
+    G, right = matrix(nu, r), divide(h, size)
     for c in range(nu):
         for i in range(r):
             G[c, i] = Gt[c, i] / size
@@ -259,13 +267,13 @@ def small_answer(
     absolute: float, u: Vector, y: Vector,
 ) -> int:  # fmt: skip
     """Newton alone where all constraints are active, else after an interior point."""
-    r, d = len(h), np.zeros(len(u))
+    r, d = len(h), vector(len(u))
     if dual_newton(
         Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
     ) >= 0:  # fmt: skip
         return NEWTON
-    G, none = np.ascontiguousarray(Gt.T), np.zeros(0)
-    H = np.zeros((0, len(u)))
+    G, none = np.ascontiguousarray(Gt.T), vector(0)
+    H = matrix(0, len(u))
     near = _NEAR_WITHOUT_CLEARANCE * 0.5 * inner(h, h)
     # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (

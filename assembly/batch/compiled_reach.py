@@ -35,7 +35,7 @@ from assembly.solvers.householder import CLEAR, triangulate, turn_all
 from assembly.solvers.layers import LANES
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import ConvexBody
-from assembly.solvers.vectors import copy, into_cones
+from assembly.solvers.vectors import copy, indices, into_cones, matrix, vector
 
 SOLVED, FALLBACK = range(2)
 _APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
@@ -189,11 +189,11 @@ def body_of(
     P = paths_of(T, s)
     m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
     F = free_columns(s, P, m)
-    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+    turns, diagonal, order = vector(nq), vector(nq), indices(nq)
     rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
     centre = centre.copy()
     _shift(centre.reshape(6, 1), offset)
-    nothing = np.zeros((6, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(1, np.int64)
+    nothing = matrix(6, 0), matrix(0, 0), vector(0), indices(1)
     if rank < 0:
         return False, ConvexBody(centre, *nothing)
     bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
@@ -202,13 +202,13 @@ def body_of(
     ):
         return False, ConvexBody(centre, *nothing)
     Z = orthogonal_rows(F, turns, rank, m)
-    columns, _ = small_problem(s, P, Z, len(Z), np.zeros(m))
+    columns, _ = small_problem(s, P, Z, len(Z), vector(m))
     kept = 0
     for c in range(len(s.starts) - 1):
         if not loaded[c]:
             kept += s.starts[c + 1] - s.starts[c]
-    X, rows, start = np.zeros((6, kept)), np.zeros((len(Z), kept)), np.zeros(kept)
-    starts = np.zeros(len(s.starts), np.int64)
+    X, rows, start = matrix(6, kept), matrix(len(Z), kept), vector(kept)
+    starts = indices(len(s.starts))
     at, cones = 0, 0
     for c in range(len(s.starts) - 1):
         if loaded[c]:
@@ -224,7 +224,7 @@ def body_of(
     starts = starts[: cones + 1].copy()
     into_cones(starts, start)
     _shift(X, offset)
-    decided, B, _ = orthonormal_rows(rows, np.zeros(len(Z)), largest_clearance(s, P))
+    decided, B, _ = orthonormal_rows(rows, vector(len(Z)), largest_clearance(s, P))
     return decided, ConvexBody(centre, X, B, start, starts)
 
 
@@ -239,9 +239,9 @@ def _follow(
         False where free motions move the platform and no closure; the screws.
     """
     nq = len(s.free_frame)
-    follow, largest = np.zeros((m, LANES)), 0.0
+    follow, largest = matrix(m, LANES), 0.0
     for a in range(6):
-        drive = np.zeros(nq)
+        drive = vector(nq)
         for i in range(nq):
             j = s.free_frame[order[i]]
             drive[i] = s.on_path[j] * P[j, s.free_axis[order[i]], a]
@@ -267,12 +267,12 @@ def _within_bounds(
         bounded = bounded or s.free_bound[q] < np.inf
     if not bounded:
         return True
-    middle, most = motions.copy(), np.zeros(nq)
-    moved, step = np.zeros(m), np.zeros(nq)
+    middle, most = motions.copy(), vector(nq)
+    moved, step = vector(m), vector(nq)
     for c in range(len(s.starts) - 1):
         if loaded[c]:
             continue
-        squares = np.zeros(nq)
+        squares = vector(nq)
         for i in range(s.starts[c], s.starts[c + 1]):
             j = s.cone_frame[i]
             for k in range(m // 6):

@@ -27,7 +27,15 @@ from assembly.linear.thresholds import NOISE
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import CLEAR, triangulate, turn, turn_all, turn_back
 from assembly.solvers.layers import LANES
-from assembly.solvers.vectors import copy, divide, fill
+from assembly.solvers.vectors import (
+    copy,
+    divide,
+    fill,
+    indices,
+    matrices,
+    matrix,
+    vector,
+)
 
 
 class Structure(NamedTuple):
@@ -78,7 +86,7 @@ class Structure(NamedTuple):
 def paths_of(T: Matrices, s: Structure) -> Matrices:
     """Unit screws of every frame at the platform, see ``P``."""
     n = len(T)
-    P = np.zeros((n, 6, 6))
+    P = matrices(n, 6, 6)
     for j in range(n):
         x = (T[j, 0, 3] - T[s.platform, 0, 3]) / s.size
         y = (T[j, 1, 3] - T[s.platform, 1, 3]) / s.size
@@ -96,7 +104,7 @@ def paths_of(T: Matrices, s: Structure) -> Matrices:
 @part
 def free_columns(s: Structure, P: Matrices, m: int) -> Matrix:
     """Closure columns of the free motions, as rows."""
-    F = np.zeros((len(s.free_frame), m))
+    F = matrix(len(s.free_frame), m)
     for c in range(len(F)):
         j = s.free_frame[c]
         for k in range(m // 6):
@@ -111,7 +119,7 @@ def free_columns(s: Structure, P: Matrices, m: int) -> Matrix:
 def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
     """Orthonormal rows orthogonal to all triangulated ones."""
     count = m - rank
-    Zt = np.zeros((m, count + -count % LANES))
+    Zt = matrix(m, count + -count % LANES)
     for i in range(count):
         Zt[rank + i, i] = 1.0
     turn_all(F, turns, rank, Zt)
@@ -122,12 +130,12 @@ def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
 def grouped_springs(s: Structure, P: Matrices) -> Matrices:
     """Springs that act together, combined into six with the same sum of squares."""
     count = len(s.groups) - 1
-    L = np.zeros((count, 6, 6))
-    turns, diagonal = np.empty(6), np.empty(6)
-    order = np.empty(6, np.int64)
+    L = matrices(count, 6, 6)
+    turns, diagonal = vector(6), vector(6)
+    order = indices(6)
     for g in range(count):
         a, b = s.groups[g], s.groups[g + 1]
-        rows = np.zeros((6, max(b - a, 6)))
+        rows = matrix(6, max(b - a, 6))
         for c in range(a, b):
             j = s.spring_frame[c]
             for axis in range(6):
@@ -148,7 +156,7 @@ def grouped_springs(s: Structure, P: Matrices) -> Matrices:
 def largest_spring(s: Structure, P: Matrices) -> float:
     """Largest entry of the springs' closure columns, for the noise floor."""
     largest = 0.0
-    column = np.empty(6)
+    column = vector(6)
     for c in range(len(s.springs)):
         fill(column, 0.0)
         for axis in range(6):
@@ -175,8 +183,8 @@ def pattern_part(Z: NDArray, i: int, pattern: NDArray, part: NDArray) -> None:
 @part
 def spring_rows(s: Structure, Z: Matrix, L: Matrices) -> Matrix:
     """Rows of Z times the closure columns of the grouped springs."""
-    Y = np.zeros((len(Z), 6 * len(L)))
-    part = np.empty(6)
+    Y = matrix(len(Z), 6 * len(L))
+    part = vector(6)
     for i in range(len(Z)):
         for g in range(len(L)):
             pattern_part(Z, i, s.patterns[s.group_pattern[g]], part)
@@ -206,8 +214,8 @@ def eliminate_springs(
 def misfit_of(s: Structure, P: Matrices, errors: Matrix) -> Vector:
     """(m,) closure error that the geometric errors cause."""
     closures = s.patterns.shape[1]
-    known = np.zeros(6 * closures)
-    moved = np.empty(6)
+    known = vector(6 * closures)
+    moved = vector(6)
     for j in range(len(P)):
         fill(moved, 0.0)
         for axis in range(6):
@@ -228,8 +236,8 @@ def rigid_rows(
 ) -> bool:  # fmt: skip
     """Whether clearances or errors enter rows that no spring enters."""
     count, cones = len(Z) - rank, len(s.cone_frame)
-    parts, most = np.empty((len(s.patterns), count, 6)), np.zeros(len(s.patterns))
-    entering = np.zeros(len(s.patterns))
+    parts, most = matrices(len(s.patterns), count, 6), vector(len(s.patterns))
+    entering = vector(len(s.patterns))
     for g in range(len(s.patterns)):
         for k in range(s.patterns.shape[1]):
             entering[g] = max(entering[g], abs(s.patterns[g, k]))
@@ -237,7 +245,7 @@ def rigid_rows(
             pattern_part(Z, rank + i, s.patterns[g], parts[g, i])
             for a in range(6):
                 most[g] = max(most[g], abs(parts[g, i, a]))
-    sizes, largest, worst = np.zeros(cones), 0.0, 0.0
+    sizes, largest, worst = vector(cones), 0.0, 0.0
     for c in range(cones):
         j = s.cone_frame[c]
         for a in range(6):
@@ -276,9 +284,9 @@ def small_problem(
 ) -> tuple[Matrix, Vector]:
     """G, its columns as rows, and h: strains by clearances and by errors."""
     nu = len(s.cone_frame)
-    Gt, h = np.zeros((nu, rank)), np.zeros(rank)
-    parts = np.zeros((len(s.patterns), 6, rank))
-    part = np.empty(6)
+    Gt, h = matrix(nu, rank), vector(rank)
+    parts = matrices(len(s.patterns), 6, rank)
+    part = vector(6)
     for i in range(rank):
         for a in range(len(known)):
             h[i] -= Z[i, a] * known[a]
@@ -334,7 +342,7 @@ def least_motions(
     nq = len(F)
     right = divide(moved, -1.0)
     turn_back(F, turns, rank, right)
-    least = np.zeros(nq)
+    least = vector(nq)
     if rank == nq:
         for i in range(nq - 1, -1, -1):
             total = right[i]
@@ -343,13 +351,13 @@ def least_motions(
             least[i] = total / diagonal[i]
     else:
         # the triangle's columns, as rows, triangulated once more
-        R = np.zeros((rank, nq))
+        R = matrix(rank, nq)
         for i in range(rank):
             R[i, i] = diagonal[i]
             for l in range(i + 1, nq):
                 R[i, l] = F[l, i]
-        own_turns, own_diagonal = np.empty(rank), np.empty(rank)
-        own_order = np.empty(rank, np.int64)
+        own_turns, own_diagonal = vector(rank), vector(rank)
+        own_order = indices(rank)
         row_rank = triangulate(R, own_turns, own_diagonal, own_order, 0.0, 0.0, -1.0)
         for i in range(row_rank):
             total = right[own_order[i]]

@@ -32,7 +32,7 @@ from assembly.linear.thresholds import (
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import interior_point
-from assembly.solvers.vectors import divide, inner
+from assembly.solvers.vectors import divide, indices, inner, matrices, matrix, vector
 
 SOLVED, FALLBACK = range(2)
 _STOP = 1e-9  # of the margin: gap at which the solver stops
@@ -60,7 +60,7 @@ def all_margins(
         P = paths_of(T[i], s)
         m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
         F = free_columns(s, P, m)
-        turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+        turns, diagonal, order = vector(nq), vector(nq), indices(nq)
         free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
         if free < 0:
             continue
@@ -84,11 +84,11 @@ def all_margins(
         if not reach > 0.0:
             continue
         # motions of passive joints must stay within their ranges
-        none, screw = np.zeros((0, 6, 6)), np.empty(6)
+        none, screw = matrices(0, 6, 6), vector(6)
         for c in range(len(u)):
             u[c] *= size / reach
-        moved = moved_by(s, P, none, u, np.zeros(0), known, screw)
-        motions = np.empty(nq)
+        moved = moved_by(s, P, none, u, vector(0), known, screw)
+        motions = vector(nq)
         least_motions(F, turns, diagonal, order, free, moved, motions)
         within = True
         for c in range(nq):
@@ -131,12 +131,12 @@ def orthonormal_rows(
         Whether ranks are unambiguous and nothing contradicts; B and w.
     """
     p, nu = rows.shape
-    turns, diagonal = np.empty(p), np.empty(p)
-    order = np.empty(p, np.int64)
+    turns, diagonal = vector(p), vector(p)
+    order = indices(p)
     rank = triangulate(rows, turns, diagonal, order, ROWS_RANK, NOISE * largest, -1.0)
     if rank < 0:
-        return False, np.zeros((0, nu)), np.zeros(0)
-    B, w = np.zeros((rank, nu)), np.zeros(rank)
+        return False, matrix(0, nu), vector(0)
+    B, w = matrix(rank, nu), vector(rank)
     for i in range(p):
         total = right[order[i]]
         for l in range(min(i, rank)):
@@ -173,7 +173,7 @@ def farthest(B: Matrix, starts: Indices) -> tuple[Vector, Vector]:
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])
     u, n, _ = interior_point(
-        np.zeros((0, nu)), np.zeros(0), B[0].copy(), rest, np.zeros(len(rest)), starts,
+        matrix(0, nu), vector(0), B[0].copy(), rest, vector(len(rest)), starts,
         _STOP, 0.0,
     )  # fmt: skip
     gradient = B[0].copy()

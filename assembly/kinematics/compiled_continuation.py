@@ -20,6 +20,7 @@ from assembly.solvers.compiled import (
     kernel,
     part,
 )
+from assembly.solvers.vectors import indices, matrices, matrix, vector
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
 _ROUNDED = 1e-5  # scaled residual accepted where it cannot be made smaller
@@ -54,8 +55,8 @@ def follow_all(
         (k, n) coordinates where each track ends and (k,) progress, 1 where reached.
     """
     count, n = held.shape
-    ends, progress = np.empty((count, n)), np.empty(count)
-    pose = np.empty(6)
+    ends, progress = matrix(count, n), vector(count)
+    pose = vector(6)
     for i in range(count):
         for k in range(6):
             pose[k] = poses[i, k] if len(poses) else np.nan
@@ -82,11 +83,11 @@ def _follow(
     for j in range(len(q)):
         q[j] = start[j]
     R, p = forward(parents, kinds, fixed, q)
-    home_pose, turn = np.empty(6), rotation_log(R[platform])
+    home_pose, turn = vector(6), rotation_log(R[platform])
     for k in range(3):
         home_pose[k], home_pose[3 + k] = p[platform, k], turn[k]
     done, step = 0.0, 1.0 / steps
-    part, part_held = np.empty(6), np.empty(len(q))
+    part, part_held = vector(6), vector(len(q))
     farthest = _JUMP * max(1.0, size)
     while done < 1.0 and step > _SMALLEST_STEP:
         goal = min(1.0, done + step)
@@ -123,7 +124,7 @@ def _newton(
 ) -> tuple[Vector, bool]:  # fmt: skip
     """Damped Gauss-Newton of least norm on closures and pose; whether it converged."""
     n, count = len(begin), 0
-    q, free, unit = np.empty(n), np.empty(n, np.int64), np.empty(n)
+    q, free, unit = vector(n), indices(n), vector(n)
     for j in range(n):
         given = np.isfinite(held[j])
         q[j] = held[j] if given else begin[j]
@@ -132,7 +133,7 @@ def _newton(
             count += 1
     free, unit = free[:count], unit[:count]
     rows = 6 * len(pairs) + 6
-    r, J = np.empty(rows), np.empty((rows, count))
+    r, J = vector(rows), matrix(rows, count)
     fine, before = False, np.inf
     for _ in range(_NEWTON):
         R, p = forward(parents, kinds, fixed, q)
@@ -160,8 +161,8 @@ def forward(
 ) -> tuple[Matrices, Matrix]:
     """Rotations (n, 3, 3) and origins (n, 3) of all frames before their own motion."""
     n = len(q)
-    R, p = np.empty((n, 3, 3)), np.empty((n, 3))
-    after_R, after_p = np.empty((n, 3, 3)), np.empty((n, 3))
+    R, p = matrices(n, 3, 3), matrix(n, 3)
+    after_R, after_p = matrices(n, 3, 3), matrix(n, 3)
     for i in range(n):
         j = parents[i]
         for k in range(3):
@@ -265,8 +266,8 @@ def _largest(v: Vector) -> float:
 def _least_step(J: Matrix, r: Vector) -> Vector:
     """Least-squares solution of J x = r, of least norm by damping at rounding level."""
     n = J.shape[1]
-    N, x = np.empty((n, n)), np.zeros(n)
-    Jt = np.empty((n, len(r)))
+    N, x = matrix(n, n), vector(n)
+    Jt = matrix(n, len(r))
     for i in range(n):
         for l in range(len(r)):
             Jt[i, l] = J[l, i]
@@ -302,7 +303,7 @@ def _least_step(J: Matrix, r: Vector) -> Vector:
 @part
 def _times_transposed(A: Matrix, B: Matrix) -> Matrix:
     """A B^T of 3 by 3 matrices."""
-    C = np.zeros((3, 3))
+    C = matrix(3, 3)
     for i in range(3):
         for j in range(3):
             for k in range(3):
@@ -321,7 +322,7 @@ def rotation_log(R: Matrix) -> Vector:
     for i in range(3):
         if R[i, i] > largest:
             best, largest = i, R[i, i]
-    q = np.empty(4)  # x, y, z, w
+    q = vector(4)  # x, y, z, w
     if best == 3:
         q[0] = R[2, 1] - R[1, 2]
         q[1] = R[0, 2] - R[2, 0]
@@ -334,7 +335,7 @@ def rotation_log(R: Matrix) -> Vector:
         q[k] = R[k, i] + R[i, k]
         q[3] = R[k, j] - R[j, k]
     sine = math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
-    turn = np.zeros(3)
+    turn = vector(3)
     if sine >= 1e-300:
         # q and -q are the same rotation: the one of at most half a turn
         factor = 2.0 * math.atan2(sine, abs(q[3])) / sine
@@ -368,7 +369,7 @@ def _inverse_left_jacobian(r: Vector) -> Matrix:
 @part
 def _turned(x: float, y: float, z: float, a: float, b: float) -> Matrix:
     """1 + a S + b S S with S the matrix of the cross product with (x, y, z)."""
-    A = np.empty((3, 3))
+    A = matrix(3, 3)
     A[0, 0] = 1.0 - b * (y * y + z * z)
     A[1, 1] = 1.0 - b * (x * x + z * z)
     A[2, 2] = 1.0 - b * (x * x + y * y)

@@ -14,8 +14,9 @@ frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,9 +77,52 @@ class Posture:
         offsets = self.transforms[..., :3, 3] - self.platform[..., None, :3, 3]
         return screw_map(offsets, self.transforms[..., :3, :3])
 
+    @property
+    def distinct(self) -> "tuple[Posture, NDArray]":
+        """Of R postures the c distinct ones, and (R,) which of them each is."""
+        coordinates, transforms, which = _distinct(
+            _Array(self.coordinates), _Array(self.transforms)
+        )
+        distinct = replace(self, coordinates=coordinates, transforms=transforms)
+        return distinct, which
+
+    @property
+    def digest(self) -> bytes:
+        """Of the transforms: postures of one digest stand alike."""
+        return _digest(_Array(self.transforms))
+
     def pose(self) -> dict[str, float]:
         """Nominal platform pose by component, rotation vector in base axes."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class _Array:
+    """An array that nobody changes, so that what is made of it is made once."""
+
+    numbers: NDArray
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Array) and other.numbers is self.numbers
+
+    def __hash__(self) -> int:
+        return id(self.numbers)
+
+
+@lru_cache(maxsize=8)
+def _distinct(
+    coordinates: _Array, transforms: _Array
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Rows with distinct coordinates of both, and which of them each row has."""
+    q = coordinates.numbers
+    _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
+    return q[first], transforms.numbers[first], which.reshape(-1)
+
+
+@lru_cache(maxsize=8)
+def _digest(array: _Array) -> bytes:
+    """Of an array's numbers."""
+    return blake2b(np.ascontiguousarray(array.numbers).tobytes()).digest()
 
 
 def pose_components(T: NDArray) -> NDArray:

@@ -78,6 +78,9 @@ def loads_on_frames(
         after += np.asarray(carried, dtype=float)
     if load is not None:
         on_body[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
+    flat = (*T.shape[:-3], 6 * len(robot.frames))
+    if not (on_body.any() or after.any()):
+        return FrameLoads(*np.zeros((2, *flat)))
     # all read at the platform's origin, then summed over what each frame carries
     read = screw_map(posture.platform[..., None, :3, 3] - T[..., :3, 3])
     own = np.einsum("...ij,...i->...j", read, on_body)
@@ -85,7 +88,6 @@ def loads_on_frames(
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
     joint = below @ (own + after) + after
     paths = posture.paths
-    flat = (*T.shape[:-3], 6 * len(robot.frames))
     return FrameLoads(
         np.einsum("...ji,...j->...i", paths, joint + own).reshape(flat),
         np.einsum("...ji,...j->...i", paths, joint).reshape(flat),

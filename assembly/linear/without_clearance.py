@@ -20,7 +20,7 @@ w       ``joint_wrenches``    (R,6n)       through every joint
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from hashlib import blake2b
 
@@ -88,9 +88,18 @@ class Flexibility:
         Returns:
             The assemblies; rows where :attr:`FlexibleAssembly.solved` is false are not.
         """
-        unclosed = errors + _each(self.body_compliances, loads.body)
-        unclosed += _each(self.joint_compliances, loads.joint)
+        unclosed = errors
+        if loads:
+            unclosed = errors + _each(self.body_compliances, loads.body)
+            unclosed += _each(self.joint_compliances, loads.joint)
         J, size, times = self.rows, self.softness, at_postures(posture)
+        if not self.system.size:  # an open chain
+            return FlexibleAssembly(
+                platform_screw=times(self.platform, unclosed),
+                joint_wrenches=loads.joint,
+                multipliers=np.zeros((len(errors), 0)),
+                solved=~self.ambiguous[posture],
+            )
         on_free = loads.joint @ self.free * size
         b = -np.concatenate([times(J, unclosed), on_free], axis=1)
         x = times(self.inverse, b)
@@ -193,26 +202,6 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     return times
 
 
-def in_groups(postures: Posture) -> tuple[Posture, NDArray]:
-    """Distinct postures among many.
-
-    Args:
-        postures: R of them, in one.
-
-    Returns:
-        c distinct ones, and (R,) which of them each row has.
-    """
-    _, first, which = np.unique(
-        postures.coordinates, axis=0, return_index=True, return_inverse=True
-    )
-    distinct = replace(
-        postures,
-        coordinates=postures.coordinates[first],
-        transforms=postures.transforms[first],
-    )
-    return distinct, which.reshape(-1)
-
-
 def flexibility(postures: Posture) -> Flexibility:
     """Factorise the closures of a robot without clearances.
 
@@ -233,9 +222,9 @@ def flexibility(postures: Posture) -> Flexibility:
         bodies,
         joints,
         clearance_bounds(robot),
-        postures.transforms,
     ):
         digest.update(np.ascontiguousarray(numbers).tobytes())
+    digest.update(postures.digest)
     return _factorise(_FlexibilityKey(digest.digest(), postures, bodies, joints))
 
 

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from assembly.kinematics.pieces import cut_beams
 from assembly.linear.without_clearance import (
     flexibility,
-    in_groups,
 )
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.row_state import Rows, RowState
@@ -56,7 +55,7 @@ def solve_rows(
         np.full((len(conditions), 6), np.nan),
         np.zeros(len(conditions), dtype=bool),
     )
-    distinct, posture_of_row = in_groups(conditions.postures)
+    distinct, posture_of_row = conditions.postures.distinct
     flexible = flexibility(distinct)
     own_axes = [
         6 * i + f.own_axis for i, f in enumerate(conditions.robot.frames) if f.passive

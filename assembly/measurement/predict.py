@@ -21,7 +21,7 @@ from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.contacts import (
     CONVERGED,
@@ -169,7 +169,7 @@ def with_second_order(conditions: Conditions) -> Conditions:
     if virtual_joints(conditions.robot).cones.shape[1]:
         return conditions  # the rest position without load is undetermined
     zero = np.zeros_like(conditions.load)
-    _, which = in_groups(conditions.postures)
+    _, which = conditions.postures.distinct
     _, first = np.unique(which, return_index=True)
     unloaded = replace(
         conditions, load=zero, gravity=np.zeros_like(conditions.gravity), laws=()
@@ -328,7 +328,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
     )
     if conditions.exact:
         return unsolved  # row by row, under the wrenches of finite motions
-    distinct, which = in_groups(conditions.postures)
+    distinct, which = conditions.postures.distinct
 
     def solve(held: Conditions) -> tuple[tuple[NDArray, NDArray], NDArray]:
         screws, wrenches, solved = _linear(held)
@@ -351,7 +351,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
         whether solved.
     """
-    distinct, which = in_groups(conditions.postures)
+    distinct, which = conditions.postures.distinct
     flexible = flexibility(distinct)
     forces = loads_with_weight(
         conditions.postures, conditions.load_at_origin(), conditions.gravity

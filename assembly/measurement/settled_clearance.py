@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.model.clearance import (
     CONES,
@@ -37,7 +37,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         position is undetermined; it is then centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
-    distinct, posture_of_row = in_groups(tight.postures)
+    distinct, posture_of_row = tight.postures.distinct
     errors = conditions.errors.reshape(len(conditions), -1)
     loads = loads_with_weight(tight.postures, tight.load_at_origin(), tight.gravity)
     through = flexibility(distinct).solve(posture_of_row, errors, loads).joint_wrenches

@@ -10,7 +10,6 @@ C = sum of y y' (Castigliano).  Built from :mod:`assembly.batch.compiled_reducti
 problem (22) is, and as exact: no compliances are added before anything is eliminated.
 """
 
-import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.compiled_reduction import (
@@ -24,7 +23,7 @@ from assembly.batch.compiled_reduction import (
 )
 from assembly.solvers.compiled import kernel
 from assembly.solvers.householder import triangulate, turn, turn_back
-from assembly.solvers.vectors import fill
+from assembly.solvers.vectors import fill, indices, matrix, vector
 
 SOLVED, FREE, RANK = range(3)  # FREE: a motion of the platform that nothing resists
 _RANK = 1e-10  # as in assembly.linear.reduction, and so is the noise floor
@@ -110,7 +109,7 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     P = paths_of(T, s)
     m, nq, groups = 6 * s.patterns.shape[1], len(s.free_frame), len(s.groups) - 1
     F = free_columns(s, P, m)
-    turns, diagonal, order = np.empty(nq), np.empty(nq), np.empty(nq, np.int64)
+    turns, diagonal, order = vector(nq), vector(nq), indices(nq)
     free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
     if free < 0:
         return RANK
@@ -118,14 +117,14 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     L = grouped_springs(s, P)
     Y = spring_rows(s, Z, L)
     count = len(Z)
-    y_turns, y_diagonal = np.empty(count), np.empty(count)
-    y_order = np.empty(count, np.int64)
+    y_turns, y_diagonal = vector(count), vector(count)
+    y_order = indices(count)
     noise = _NOISE * largest_spring(s, P)
     rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
     if rank < 0:
         return RANK
-    closing, bent, mu = np.empty(m), np.empty(6 * groups), np.empty(count)
-    pull = np.zeros((len(s.patterns) + 1, 6))
+    closing, bent, mu = vector(m), vector(6 * groups), vector(count)
+    pull = matrix(len(s.patterns) + 1, 6)
     for row in range(6):
         if not hold_free_motions(s, P, F, turns, diagonal, order, free, row, closing):
             return FREE

@@ -30,6 +30,7 @@ from assembly.solvers.compiled import (
     part,
 )
 from assembly.solvers.layers import LANES, add, dot, layers_of
+from assembly.solvers.vectors import matrix, vector
 
 FAST = {"contract", "reassoc"}
 _HALVINGS = 12
@@ -67,13 +68,13 @@ def dual_newton(
     order, layers = layers_of(starts)
     # as in the interior-point method: rows of G, columns in layers, padded with zeros
     width = nu + -nu % LANES
-    M, B, columns = np.zeros((r, width)), np.zeros((r, width)), np.zeros((4, width))
+    M, B, columns = matrix(r, width), matrix(r, width), matrix(4, width)
     old, own, linear, z = columns[0], columns[1], columns[2], columns[3]
     for j in range(nu):
         old[j], linear[j] = u[order[j]], -d[order[j]]
         for i in range(r):
             M[i, j] = Gt[order[j], i]
-    g, S, step, start = np.empty(r), np.empty((r, r)), np.zeros(r), np.empty(r)
+    g, S, step, start = vector(r), matrix(r, r), vector(r), vector(r)
     for i in range(springs):
         y[i] = h[i] + dot(M[i], old)
     for j in range(width):
@@ -148,7 +149,7 @@ def _slopes(
     discs = layers[2] - layers[1] if len(layers) > 2 else 0
     cones = layers[1]
     # the weights of both columns in each row of B: first a, b, then e
-    weights = np.zeros((3, cones))
+    weights = matrix(3, cones)
     root = np.sqrt(sigma)
     smooth, kink = 0.0, 0.0
     for c in range(discs):

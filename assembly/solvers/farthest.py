@@ -39,7 +39,7 @@ from assembly.solvers.polytope import (
     start_box,
 )
 from assembly.solvers.support import ConvexBody, screw_at, support, symmetric, within
-from assembly.solvers.vectors import copy, divide, fill, inner
+from assembly.solvers.vectors import copy, divide, fill, indices, inner, matrix, vector
 
 DONE, NEEDED, GAVE_UP = range(3)
 _CLIMBING, _BOXING, _CUTTING = range(3)
@@ -114,8 +114,8 @@ def begin(body: ConvexBody, part: int, tolerance: float, outer: Polytope) -> Sea
         size += best[part + a] ** 2
     size = np.sqrt(size)
     search = Search(
-        part, tolerance, np.empty(2), best, np.zeros(3), np.zeros((3, 3)),
-        np.empty((2, 3)), np.empty((32, 4)), np.zeros(4, np.int64), outer,
+        part, tolerance, vector(2), best, vector(3), matrix(3, 3),
+        matrix(2, 3), matrix(32, 4), indices(4), outer,
     )  # fmt: skip
     search.bounds[0], search.bounds[1] = size, np.inf
     fill(search.heights[0], np.nan)
@@ -137,14 +137,14 @@ def _first_direction(body: ConvexBody, search: Search) -> None:
             along = inner(free[a], body.rows[i])
             for j in range(nv):
                 free[a, j] -= along * body.rows[i, j]
-    Q = np.zeros((3, 3))
+    Q = matrix(3, 3)
     for a in range(3):
         for b in range(3):
             Q[a, b] = inner(free[a], free[b])
     _, vectors = eigenvectors(Q)
     most = -1.0
     for candidate in range(4):
-        d = np.empty(3)
+        d = vector(3)
         for a in range(3):
             d[a] = body.centre[search.part + a]
             if candidate < 3:

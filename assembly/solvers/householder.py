@@ -12,6 +12,7 @@ import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, part
 from assembly.solvers.layers import LANES
+from assembly.solvers.vectors import matrix, vector
 
 CLEAR = 10.0  # within this factor of the threshold the rank is ambiguous
 
@@ -38,7 +39,7 @@ def triangulate(
     """
     p, m = F.shape
     # the rows still to be reduced, zero in the triangle and beyond m: see LANES
-    rest, sizes = np.zeros((p, m + -m % LANES)), np.empty(p)
+    rest, sizes = matrix(p, m + -m % LANES), vector(p)
     for i in range(p):
         order[i] = i
         size = 0.0
@@ -91,7 +92,7 @@ def triangulate(
 def turn_all(F: Matrix, turns: Vector, rank: int, X: Matrix) -> None:
     """Every column x of X becomes Q x."""
     m, count = X.shape
-    dots = np.empty(count)
+    dots = vector(count)
     for step in range(rank - 1, -1, -1):
         own = F[step]
         for i in range(count):

@@ -31,6 +31,7 @@ from assembly.solvers.compiled import (
 )
 from assembly.solvers.layers import FAST, LANES, add, cone_sums, dot, layers_of
 from assembly.solvers.nesterov_todd import corrected, scalings, square_scaled
+from assembly.solvers.vectors import matrix, vector
 
 _ITERATIONS = 60
 _BACK_OFF = 0.99  # of the step to the nearest boundary of a cone
@@ -65,7 +66,7 @@ def interior_point(
     order, layers = layers_of(starts)
     # rows are padded with zeros to a multiple of the vector registers
     width = nu + -nu % LANES
-    M, linear = np.zeros((m, width)), np.zeros(width)
+    M, linear = matrix(m, width), vector(width)
     for j in range(nu):
         linear[j] = -d[order[j]]
         for i in range(r):
@@ -73,20 +74,20 @@ def interior_point(
         for i in range(p):
             M[r + i, j] = H[i, order[j]]
     # one number a column: u, z and their steps, scalings, right sides
-    columns = np.zeros((9, width))
+    columns = matrix(9, width)
     u, z1, w1, l1, t1, f, du, dz1, e = (
         columns[0], columns[1], columns[2], columns[3], columns[4], columns[5],
         columns[6], columns[7], columns[8],
     )  # fmt: skip
     # one number a cone; the last six are sums within it
-    heads = np.empty((15, cones))
+    heads = matrix(15, cones)
     z0, eta, w0, l0, t0, r0, dz0 = (
         heads[0], heads[1], heads[2], heads[3], heads[4], heads[5], heads[6]
     )  # fmt: skip
     across, along, sums = heads[7], heads[8], heads[9:]
-    B, S = np.zeros((m, width)), np.empty((m, m))
+    B, S = matrix(m, width), matrix(m, m)
     # multipliers of all rows: springs' own, v = G u + h, and n
-    y, right, residual = np.zeros(m), np.empty(m), np.empty(p)
+    y, right, residual = vector(m), vector(m), vector(p)
     for i in range(r):
         y[i] = h[i]
     _dual(M, y, linear, z1)
@@ -145,7 +146,7 @@ def interior_point(
         for i in range(r, m):
             y[i] += step * right[i]
         _dual(M, y, linear, z1)
-    minimiser = np.empty(nu)
+    minimiser = vector(nu)
     for j in range(nu):
         minimiser[order[j]] = u[j]
     return minimiser, y[r:].copy(), taken

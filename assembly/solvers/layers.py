@@ -5,10 +5,10 @@ that has one, and so on, the largest cones first: loops over the cones run along
 layer, several cones at once in the processor's vector registers.
 """
 
-import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solvers.compiled import GivenIndices, Indices, kernel, part
+from assembly.solvers.vectors import indices
 
 LANES = 16  # rows are padded with zeros to a multiple of it
 FAST = {"contract", "reassoc", "nsz", "arcp"}
@@ -27,7 +27,7 @@ def layers_of(starts: GivenIndices) -> tuple[Indices, Indices]:
     cones, widest = len(starts) - 1, 0
     for c in range(cones):
         widest = max(widest, starts[c + 1] - starts[c])
-    order, layers = np.empty(starts[-1], np.int64), np.empty(widest + 1, np.int64)
+    order, layers = indices(starts[-1]), indices(widest + 1)
     place = 0
     for layer in range(widest):
         layers[layer] = place

@@ -20,6 +20,7 @@ Sources:
 import numpy as np
 
 from assembly.solvers.compiled import GivenVector, Indices, Matrix, Vector, part
+from assembly.solvers.vectors import matrix, vector
 
 _LEAST_SIZE = 1e-9  # of a cone with zero gradient, relative to the largest
 _SWEEPS, _STEPS = 12, 60
@@ -43,7 +44,7 @@ def majorant_bound(
         The bound; infinite where the gradient is zero, or rounding dominates.
     """
     p, nv = H.shape
-    sizes, largest, total = np.empty(nv), 0.0, 0.0
+    sizes, largest, total = vector(nv), 0.0, 0.0
     for c in range(len(starts) - 1):
         size = 0.0
         for j in range(starts[c], starts[c + 1]):
@@ -58,13 +59,13 @@ def majorant_bound(
         for j in range(starts[c], starts[c + 1]):
             sizes[j] = size
     # n minimises w.w/(2s) - w.start:  H (w/s - start) = 0, w = A d + fixed
-    A, fixed = np.empty((nv, 3)), np.zeros(nv)
+    A, fixed = matrix(nv, 3), vector(nv)
     for j in range(nv):
         for a in range(3):
             A[j, a] = X[a, j]
     if p and not _follow_rows(H, X, start, sizes, A, fixed):
         return np.inf
-    Q, linear, constant = np.zeros((3, 3)), centre.copy(), total / 2
+    Q, linear, constant = matrix(3, 3), centre.copy(), total / 2
     for j in range(nv):
         slope = fixed[j] / sizes[j] - start[j]
         constant += fixed[j] * (fixed[j] / (2 * sizes[j]) - start[j])
@@ -81,8 +82,8 @@ def _follow_rows(
 ) -> bool:
     """Subtract the terms of the best n from A and fixed; whether that succeeded."""
     p, nv = H.shape
-    S, right = np.zeros((p, p)), np.zeros((p, 4))
-    scaled = np.empty(nv)
+    S, right = matrix(p, p), matrix(p, 4)
+    scaled = vector(nv)
     for i in range(p):
         for j in range(nv):
             scaled[j] = H[i, j] / sizes[j]
@@ -132,7 +133,7 @@ def largest_on_sphere(Q: Matrix, g: Vector) -> float:
         The value, from above by at most rounding.
     """
     values, vectors = eigenvectors(Q)
-    along, length = np.zeros(3), 0.0
+    along, length = vector(3), 0.0
     for i in range(3):
         for a in range(3):
             along[i] += vectors[a, i] * g[a]
@@ -164,7 +165,7 @@ def largest_on_sphere(Q: Matrix, g: Vector) -> float:
 @part
 def eigenvectors(Q: Matrix) -> tuple[Vector, Matrix]:
     """Eigenvalues (3,) of a symmetric matrix, and vectors as columns (3, 3)."""
-    D, V, values = Q.copy(), np.zeros((3, 3)), np.empty(3)
+    D, V, values = Q.copy(), matrix(3, 3), vector(3)
     for i in range(3):
         V[i, i] = 1.0
     for _ in range(_SWEEPS):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assembly.solvers.compiled import IndexRows, Indices, Matrix, Vector, part
+from assembly.solvers.vectors import indices, matrix, vector
 
 _MOST = 4096  # corners; 400 planes make 800
 
@@ -32,9 +33,7 @@ class Polytope(NamedTuple):
 @part
 def empty_polytope() -> Polytope:
     """Memory for a polytope."""
-    return Polytope(
-        np.empty((_MOST, 3)), np.empty((_MOST, 3), np.int64), np.zeros(2, np.int64)
-    )
+    return Polytope(matrix(_MOST, 3), np.empty((_MOST, 3), np.int64), indices(2))
 
 
 @part
@@ -74,7 +73,7 @@ def cut(body: Polytope, normal: Vector, height: float) -> bool:
     corners, planes = body.corners, body.planes
     count, plane = body.used[0], body.used[1]
     body.used[1] += 1
-    above, size = np.empty(count), 0.0
+    above, size = vector(count), 0.0
     for i in range(count):
         above[i] = -height
         for a in range(3):

@@ -15,7 +15,7 @@ import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
 from assembly.solvers.interior import interior_point
-from assembly.solvers.vectors import divide, inner
+from assembly.solvers.vectors import divide, inner, matrix, vector
 
 _SYMMETRIC = 1e-14  # H start counts as zero
 _ROUNDING = 1e-14  # by which a cone may be exceeded
@@ -70,8 +70,8 @@ def support(
         n; height and point may be farther apart where the solver broke down.
     """
     p, nv = body.rows.shape
-    gradient, height, size = np.zeros(nv), 0.0, 0.0
-    n = np.zeros(p)
+    gradient, height, size = vector(nv), 0.0, 0.0
+    n = vector(p)
     for a in range(3):
         height += direction[a] * body.centre[part + a]
         for j in range(nv):
@@ -84,12 +84,12 @@ def support(
         return height, body.start.copy(), gradient, n
     v = body.start.copy()
     if p:
-        right = np.zeros(p)
+        right = vector(p)
         for i in range(p):
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
         v, n, _ = interior_point(
-            np.zeros((0, nv)), np.zeros(0), divide(gradient, size), body.rows, right,
+            matrix(0, nv), vector(0), divide(gradient, size), body.rows, right,
             body.starts, tolerance / size, 0.0,
         )  # fmt: skip
         for i in range(p):
@@ -112,7 +112,7 @@ def support(
 @part
 def within(body: ConvexBody, v: Vector) -> Vector:
     """A nearby v that satisfies rows and cones to rounding."""
-    step = np.empty(len(v))
+    step = vector(len(v))
     for j in range(len(v)):
         step[j] = v[j] - body.start[j]
     for i in range(len(body.rows)):

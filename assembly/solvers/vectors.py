@@ -7,7 +7,31 @@ and its error messages into every kernel that calls it: ten times the code to co
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import kernel
+from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
+
+
+@part
+def vector(n: int) -> Vector:
+    """(n,) zeros."""
+    return np.zeros(n)
+
+
+@part
+def matrix(rows: int, columns: int) -> Matrix:
+    """(rows, columns) zeros."""
+    return np.zeros((rows, columns))
+
+
+@part
+def matrices(count: int, rows: int, columns: int) -> Matrices:
+    """(count, rows, columns) zeros."""
+    return np.zeros((count, rows, columns))
+
+
+@part
+def indices(n: int) -> Indices:
+    """(n,) zeros."""
+    return np.zeros(n, np.int64)
 
 
 @kernel

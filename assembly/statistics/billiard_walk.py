@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solvers.compiled import kernel
+from assembly.solvers.vectors import vector
 
 FLIGHT = 2.0  # mean time; Dikin's ellipsoid is crossed in about one
 REFLECTIONS = 20  # of a trajectory at most, for each dimension
@@ -97,7 +98,7 @@ def _move(
 def _direction(M: NDArray, rng: np.random.Generator) -> NDArray:
     """(nu,) random direction, normal with the covariance of Dikin's ellipsoid."""
     nu, n = M.shape
-    w = np.zeros(nu)
+    w = vector(nu)
     for i in range(n):
         speed = rng.standard_normal()
         for c in range(nu):

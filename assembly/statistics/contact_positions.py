@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.compiled import kernel
 from assembly.solvers.interior import interior_point
+from assembly.solvers.vectors import matrix, vector
 
 
 @kernel
@@ -24,10 +25,10 @@ def move_to_contact(
             method fails, as it may in a set with empty interior.
     """
     nu = positions.shape[1]
-    no_springs, no_offset = np.zeros((0, nu)), np.zeros(0)
+    no_springs, no_offset = matrix(0, nu), vector(0)
     constraints = len(rows)
     for i in range(len(positions)):
-        direction, size = np.empty(nu), 0.0
+        direction, size = vector(nu), 0.0
         for c in range(nu):
             ends[i, c] = positions[i, c]
             direction[c] = directions[i, c] if free[c] else 0.0
@@ -37,7 +38,7 @@ def move_to_contact(
             continue
         for c in range(nu):
             direction[c] /= size
-        right_side = np.zeros(constraints)
+        right_side = vector(constraints)
         for l in range(constraints):
             for c in range(nu):
                 if free[c]:

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from assembly.model.robot import Frame, Robot
 from assembly.robots.placing import (
-    Placed,
+    PlacedFrame,
     at,
     ball_joint,
     cardan_joint,
@@ -72,7 +72,7 @@ def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
         The robot at the origin; the coordinate of ``A.line`` is that line's length.
         The platform, a point, may turn: give its rotation with its place.
     """
-    placed: list[Placed] = []
+    placed: list[PlacedFrame] = []
     for line, anchor in zip(LINES, anchors, strict=True):
         placed += _line(line, anchor)
     closures = tuple((f"{LINES[0]}.tip", f"{line}.tip") for line in LINES[1:])
@@ -80,7 +80,7 @@ def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
     return Robot("hangprinter", "A.tip", place_frames(placed), closures, text)
 
 
-def _line(name: str, anchor: NDArray) -> Sequence[Placed]:
+def _line(name: str, anchor: NDArray) -> Sequence[PlacedFrame]:
     """A line from its anchor to the origin, between a cardan and a ball joint."""
     length = float(np.linalg.norm(anchor))
     along = -anchor / length

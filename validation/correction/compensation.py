@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import place_many_joints
-from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -276,7 +276,7 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
     columns = np.zeros((6 * len(robot.frames), drives))
     for k, i in enumerate(_driven(robot)):
         columns[6 * i : 6 * i + 6, k] = own_screw(robot.frames[i])
-    distinct, which = in_groups(replace(conditions.postures, robot=robot))
+    distinct, which = replace(conditions.postures, robot=robot).distinct
     J = flexibility(distinct).platform_of(columns)[which]
     arms = conditions.measured_arms[:, :, None]
     J[:, 3:] += np.cross(J[:, :3], arms, axisa=1, axisb=1, axisc=1)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -54,7 +54,7 @@ def _of_errors(conditions: Conditions, robot: Robot) -> NDArray:
     chosen = np.flatnonzero(sigma)
     if not chosen.size:
         return np.zeros((len(conditions), 6))
-    distinct, which = in_groups(replace(conditions.postures, robot=tight))
+    distinct, which = replace(conditions.postures, robot=tight).distinct
     columns = np.eye(sigma.size)[:, chosen] * sigma.ravel()[chosen]
     moved = flexibility(distinct).platform_of(columns)[which]
     moved[:, 3:] += np.cross(

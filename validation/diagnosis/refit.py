@@ -6,7 +6,7 @@ Sources:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from validation.diagnosis.signatures import whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
 _LOST = 1e3  # [sigma] a reading that the model has no answer for
@@ -233,9 +234,14 @@ def _refit(
         effects: dict[str, Values] = dict(_public(members, x, conditions.robot))
         return apply_effects(conditions, effects)
 
-    def left(scaled: NDArray) -> NDArray:
-        model = whiten(campaign, predict(there(scaled * size)).deviation)
+    @lru_cache(maxsize=1)  # for the slopes, which are taken where the residual was
+    def left_at(scaled: bytes) -> NDArray:
+        x = np.frombuffer(scaled) * size
+        model = whiten(campaign, predict(there(x)).deviation)
         return behind.whitened(np.where(np.isfinite(model), measured - model, _LOST))
+
+    def left(scaled: NDArray) -> NDArray:
+        return left_at(scaled.tobytes())
 
     def slopes(scaled: NDArray) -> NDArray:
         middle = left(scaled)
@@ -254,7 +260,8 @@ def _refit(
     with np.errstate(over="ignore", invalid="ignore"):
         fitted = least_squares(
             left, inside, jac=slopes, bounds=(lower / size, upper / size),
-            max_nfev=_MOST_CALLS, xtol=1e-8, ftol=1e-8, gtol=1e-10, x_scale="jac",
+            max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED, gtol=1e-10,
+            x_scale="jac",
         )  # fmt: skip
     J = fitted.jac / size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))

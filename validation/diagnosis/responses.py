@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import flexibility, in_groups
+from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import read
 from assembly.measurement.settled_clearance import (
@@ -60,7 +60,7 @@ def responses(conditions: Conditions) -> Responses:
         The answers; rows that do not close have zeros.
     """
     tight = _without_clearance(conditions)
-    distinct, which = in_groups(tight.postures)
+    distinct, which = tight.postures.distinct
     R, n = len(tight), len(tight.robot.frames)
     platform = np.zeros((len(distinct.transforms), 6, 6 * n))
     wrenches = np.zeros((R, 6 * n))
