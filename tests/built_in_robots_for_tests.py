@@ -47,7 +47,7 @@ def joints_of(posture):
 
 
 def only_drives_give(robot):
-    """The robot with rigid bodies and no play."""
+    """The robot with rigid bodies and no clearance."""
     bare = (replace(f, link=None, clearance=None) for f in robot.frames)
     return replace(robot, frames=tuple(bare))
 

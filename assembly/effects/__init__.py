@@ -1,7 +1,8 @@
 """Effects that a declared model may lack; each in a file of its own.
 
-They are applied in the order of :data:`LIBRARY`.  Friction acts on a joint's spring, so
-drive compliance comes before it; the foundation adds a frame, so it comes last.
+Begin at ``effect.py``, what an effect is.  They are applied in the order of
+:data:`LIBRARY`.  Friction acts on a joint's spring, so drive compliance comes before
+it; the foundation adds a frame, so it comes last.
 """
 
 from collections.abc import Mapping

@@ -322,13 +322,13 @@ def solve_exact(
             "solve_exact: start is the linear answer of another posture or load, "
             "expected that of these; leave it out to have it computed"
         )
-    there = posture
+    placed = posture
     if cut.robot is not posture.robot:
-        there, start = cut.cut(posture), None
+        placed, start = cut.cut(posture), None
         bodies = None if bodies is None else cut.spread(np.asarray(bodies))
-    loads = dead_loads(there, load, bodies, gravity, point)
+    loads = dead_loads(placed, load, bodies, gravity, point)
     if start is None:
-        start = solve_assembly(there, wrench, bodies, gravity)
+        start = solve_assembly(placed, wrench, bodies, gravity)
 
     def search(joints: VirtualJoints) -> ExactAssembly:
         known = near is not None and len(near.placement.x) == _count(joints)

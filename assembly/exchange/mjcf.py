@@ -214,7 +214,7 @@ def _freedoms(
             if key not in {"name", "type", "pos", "axis", "ref", "class"}:
                 reading.extra.setdefault(f"joint {key}", []).append(name)
         anchor = given.numbers("pos", 3, "m", _ZERO)
-        there, back = placed(anchor, np.eye(3)), placed(-anchor, np.eye(3))
+        placement, back = placed(anchor, np.eye(3)), placed(-anchor, np.eye(3))
         if kind == "ball":
             turns = ball()
             reading.parts[name] = [f"{name}.{part}" for part, _, _ in turns]
@@ -223,7 +223,7 @@ def _freedoms(
                 first, last = i == 0, i == len(turns) - 1
                 yield Joint(
                     f"{name}.{part}", turn, "", "",
-                    placement=there if first else np.eye(4), axis=axis,
+                    placement=placement if first else np.eye(4), axis=axis,
                     after=back if last else np.eye(4),
                 )  # fmt: skip
             continue
@@ -237,12 +237,12 @@ def _freedoms(
             kind=kind,
             parent="",
             child="",
-            placement=there,
+            placement=placement,
             axis=axis,
             after=back,
         )
         # the coordinate at rest is ref: the joint's own zero lies before it
-        yield replace(joint, placement=there @ motion(joint, -ref), position=ref)
+        yield replace(joint, placement=placement @ motion(joint, -ref), position=ref)
 
 
 def _pose(node: Node, reading: _Reading) -> NDArray:

@@ -289,13 +289,13 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
         compliances = secants(linear, conditions.laws)
     assembly: Assembly | ExactAssembly
     for _ in range(ITERATIONS):
-        there = softened(posture, conditions.laws, compliances)
+        softer = softened(posture, conditions.laws, compliances)
         if conditions.exact:
             assembly = solve_exact(
-                there, conditions.load[row], gravity=gravity, point=conditions.point
+                softer, conditions.load[row], gravity=gravity, point=conditions.point
             )
         else:
-            assembly = solve_assembly(there, load, gravity=gravity)
+            assembly = solve_assembly(softer, load, gravity=gravity)
         before, compliances = compliances, secants(assembly, conditions.laws)
         tolerance = _CONVERGED_FINITE if conditions.exact else CONVERGED
         if np.all(np.abs(compliances - before) <= tolerance * compliances):

@@ -45,7 +45,7 @@ def plot_assembly(
         if reach.unbounded(PARTS[errors].start):
             raise BadInput(
                 f"{assembly.posture.robot.name}: its platform moves freely, so its "
-                f"{errors} error has no bound; expected none to be drawn"
+                f"{errors} error has no bound; expected none to be plotted"
             )
         body = error_body(reach, errors)
         size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())

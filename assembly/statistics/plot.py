@@ -46,11 +46,11 @@ def figure_of_draws(data: "xarray.Dataset", kind: str | None) -> "Figure | None"
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
         kinds = [name for key, name in own.items() if key in (*data, *data.attrs)]
         kind = kinds[0] if kinds else None
-    drawings = {
+    figures = {
         "histogram": histogram_figure, "tornado": tornado_figure,
         "allocation": allocation_figure,
     }  # fmt: skip
-    return drawings[kind](data) if kind is not None else None
+    return figures[kind](data) if kind is not None else None
 
 
 def histogram_figure(data: "xarray.Dataset") -> "Figure":

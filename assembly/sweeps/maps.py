@@ -80,7 +80,7 @@ def check_axes(sizes: Mapping[str, int]) -> None:
         named = ", ".join(f"{name} ({n})" for name, n in long.items())
         raise BadInput(
             f"figure: found axes {named}, expected one or two; forcefit assembly plot "
-            "draws a part of the file, with --at AXIS=VALUE"
+            "plots a part of the file, with --at AXIS=VALUE"
         )
     if not long:
         raise BadInput("figure: found a single point; expected an axis or two")
@@ -283,7 +283,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Title and axes; lengths beside lengths are drawn to one scale."""
+    """Title and axes; lengths beside lengths have one scale."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5

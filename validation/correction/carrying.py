@@ -282,9 +282,9 @@ def _tangent(
     middle = read(x)
     slopes = np.empty((*middle.shape, len(x)))
     for k in range(len(x)):
-        there = x.copy()
-        there[k] += _STEP
-        slopes[:, :, k] = (read(there) - middle) / _STEP
+        moved = x.copy()
+        moved[k] += _STEP
+        slopes[:, :, k] = (read(moved) - middle) / _STEP
     return middle, slopes
 
 

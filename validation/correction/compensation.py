@@ -103,12 +103,12 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     goal = targets.transforms[:, robot.index(robot.platform)]
     machine = _Machine(targets, goal, as_read)
     q = targets.coordinates[:, driven].copy()
-    there, reason = machine.at(q, targets)
-    before = there.error
+    standing, reason = machine.at(q, targets)
+    before = standing.error
     going = np.array([not r for r in reason])
     limits = _limits(robot, driven)
     for _ in range(_STEPS):
-        step = _step(there, weights, q, limits)
+        step = _step(standing, weights, q, limits)
         moving = going & (np.abs(step).max(axis=1, initial=0.0) > _STILL)
         if not moving.any():
             break
@@ -117,14 +117,14 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
             tried = np.clip(q + share[:, None] * step, *limits)
             next_, missed = machine.at(tried, targets)
             worse = moving & (share > 0)
-            worse &= (missed != "") | ~(next_.size(weights) < there.size(weights))
+            worse &= (missed != "") | ~(next_.size(weights) < standing.size(weights))
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
         going &= moving & ~worse  # what is left is rounding, or as near as limits allow
         q = np.where(going[:, None], tried, q)
-        there = next_ if going[moving].all() else machine.at(q, targets)[0]
-    last = there.campaign
+        standing = next_ if going[moving].all() else machine.at(q, targets)[0]
+    last = standing.campaign
     spread = deviation_spread(
         robot, lambda other: machine.conditions(replace(last, robot=other))
     )
@@ -133,10 +133,10 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
         targets=targets,
         drives=tuple(robot.frames[i].name for i in driven),
         commands=q,
-        transforms=there.conditions.transforms,
+        transforms=standing.conditions.transforms,
         coordinates=last.coordinates,
         before=before,
-        after=there.error,
+        after=standing.error,
         spread=spread,
         limited=np.asarray(at_limit.any(axis=1)),
         reason=reason,
@@ -284,11 +284,11 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
 
 
 def _step(
-    there: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
+    standing: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
 ) -> NDArray:
     """(R, d) least squares' step; drives that would leave their limits stay there."""
-    A = there.jacobian * weights[:, None]
-    b = np.nan_to_num(there.error) * weights
+    A = standing.jacobian * weights[:, None]
+    b = np.nan_to_num(standing.error) * weights
     held = np.zeros(q.shape, dtype=bool)
     step = np.zeros_like(q)
     for _ in range(q.shape[1] + 1):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _POINTS = 181
 _SHOWN = 13  # of them in a text
-_LATE = 4.0  # time constants, periods that are drawn
+_LATE = 4.0  # time constants, periods that are plotted
 _RANGES = {"temperature": 10.0, "approach": 1.0}  # to either side
 _LOAD = 100.0  # [N, N m]
 _TRAVEL = 0.5  # [m]
@@ -39,7 +39,7 @@ class Curve:
     Attributes:
         function: whose.
         component: which.
-        variable: along which it is drawn; the other, if there is one, is ``beside``.
+        variable: along which it is plotted; the other, if there is one, is ``beside``.
         beside: (name, value) of the other variable, None where there is none.
         x: (k,) in its unit.
         values: (k,) [rad, m, N m, N], or per wrench for a compliance.
@@ -89,7 +89,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Along which variable a function is drawn, and the other if there is one."""
+    """Along which variable a function is plotted, and the other if there is one."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""

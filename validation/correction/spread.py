@@ -39,8 +39,8 @@ def deviation_spread(
         value = function.parameters[name] + function.std[name]
         changed = replace(function, parameters={**function.parameters, name: value})
         others = tuple(changed if f is function else f for f in robot.functions)
-        there = conditions_for(replace(robot, functions=others))
-        variance += np.nan_to_num(predict(there).deviation - middle) ** 2
+        other = conditions_for(replace(robot, functions=others))
+        variance += np.nan_to_num(predict(other).deviation - middle) ** 2
     return np.sqrt(variance)
 
 

@@ -1,4 +1,5 @@
 """From measured deviations to the effect that a declared model lacks.
 
-Begin at ``diagnose.py``: candidates, scores, verdict, errors before and after.
+Begin at ``diagnose.py``: selection of effects, learning, ``judge.py`` the verdict;
+``diagnosis.py`` is what comes of it.
 """

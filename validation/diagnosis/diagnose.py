@@ -131,9 +131,9 @@ def _with_errors(
         errors = screws_of(campaign, behind.terms, values)
         if not errors.any():
             break
-        there = conditions.errors.copy()
-        there[:, own] += errors
-        bent = complete(replace(conditions, errors=there))
+        errors_added = conditions.errors.copy()
+        errors_added[:, own] += errors
+        bent = complete(replace(conditions, errors=errors_added))
         bent = replace(conditions, second_order=bent.second_order)
         change = (
             predict(bent.take(used)).deviation

@@ -106,7 +106,7 @@ def vector_figure(diagnosis: Diagnosis) -> "Figure":
             panel.set_aspect("equal", adjustable="datalim")
             panel.margins(0.2)
     figure.suptitle(
-        f"residual displacements, drawn {1 / factor:.0f} times larger", fontsize=10
+        f"residual displacements, shown {1 / factor:.0f} times larger", fontsize=10
     )
     return figure
 

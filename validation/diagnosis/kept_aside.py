@@ -116,13 +116,13 @@ class FittedModel:
 
     def residual(self, campaign: Campaign) -> NDArray:
         """(R, 6) [rad, m] readings minus the model; NaN where not measured."""
-        there = apply_effects(self.conditions, self.fit.effects)
+        fitted = apply_effects(self.conditions, self.fit.effects)
         small = added(
             campaign, self.response, self.conditions, self.behind.terms,
             self.behind.values(self.fit.residual),
             {term_name(k + 1): one.changes for k, one in enumerate(self.learned)},
         )  # fmt: skip
-        return campaign.measured - predict(there).deviation - small
+        return campaign.measured - predict(fitted).deviation - small
 
 
 def ladder(

@@ -71,12 +71,12 @@ def next_measurement(
     Returns:
         The measurement, None if none of those tried tells any rival from the fit.
     """
-    there = _situations(conditions)
+    tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
-    size = np.abs(there.load).sum(axis=1)
-    a, Ja = _model(there, fit, sigma)
+    size = np.abs(tried.load).sum(axis=1)
+    a, Ja = _model(tried, fit, sigma)
     for rival in rivals:
-        b, Jb = _model(there, rival, sigma)
+        b, Jb = _model(tried, rival, sigma)
         powers = np.minimum(
             _power(a - b, Jb, rival.covariance), _power(b - a, Ja, fit.covariance)
         )
@@ -85,78 +85,78 @@ def next_measurement(
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
-            return _measurement(campaign, there, best, float(powers[best]), fit, rival)
+            return _measurement(campaign, tried, best, float(powers[best]), fit, rival)
     return None
 
 
 def _measurement(
-    campaign: Campaign, there: Conditions, best: int, power: float, fit: Fit, rival: Fit
+    campaign: Campaign, tried: Conditions, best: int, power: float, fit: Fit, rival: Fit
 ) -> NextMeasurement:
     """One of the conditions tried, in words and numbers."""
     names = [" + ".join(sorted(one.effects)) for one in (fit, rival)]
     covariates = {
-        name: float(getattr(there, name)[best])
+        name: float(getattr(tried, name)[best])
         for name in ("temperature", "approach")
-        if np.isfinite(getattr(there, name)[best])
+        if np.isfinite(getattr(tried, name)[best])
     }
     why = (
         f"{names[0]} and {names[1]} then differ by {np.sqrt(power):.1f} "
         "standard deviations in one reading"
     )
     return NextMeasurement(
-        why, _configuration(campaign, there, best),
-        tuple(there.load[best].tolist()), covariates, power,
+        why, _configuration(campaign, tried, best),
+        tuple(tried.load[best].tolist()), covariates, power,
     )  # fmt: skip
 
 
-def _situations(conditions: Conditions) -> Conditions:
+def _conditions_tried(conditions: Conditions) -> Conditions:
     """Conditions to choose from: within reach, loads and covariates wider."""
     rng = np.random.default_rng(0)
-    there = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
+    tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
     corner = rng.choice([-1.0, 0.0, 1.0], (_TRIED, 6))
-    temperature = there.temperature
+    temperature = tried.temperature
     if np.isfinite(temperature).all():
         low, high = conditions.temperature.min(), conditions.temperature.max()
         # a campaign at one temperature: ten kelvin are within reach of a workshop
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
-    approach = there.approach
+    approach = tried.approach
     if np.isfinite(approach).all():
         approach = rng.choice([-1.0, 1.0], _TRIED)
     return replace(
-        there,
+        tried,
         load=_FURTHER * corner * largest,
         temperature=temperature,
         approach=approach,
     )
 
 
-def _between(there: Conditions, rng: np.random.Generator) -> Conditions:
+def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     """Half of the configurations moved towards others, where the robot can follow."""
-    if there.rest is not None:  # where clearances rest is known for measured ones only
-        return there
-    actuated = np.array([frame.actuated for frame in there.robot.frames])
-    q = np.where(actuated, there.coordinates, np.nan)
-    count = len(there) // 2
+    if measured.rest is not None:  # it is known for measured configurations only
+        return measured
+    actuated = np.array([frame.actuated for frame in measured.robot.frames])
+    q = np.where(actuated, measured.coordinates, np.nan)
+    count = len(measured) // 2
     part = rng.uniform(0.0, 1.0, (count, 1))
     q[:count] += part * (q[-count:] - q[:count])
-    postures, _ = place_many_joints(there.robot, q[:count])
-    coordinates, transforms = there.coordinates.copy(), there.transforms.copy()
+    postures, _ = place_many_joints(measured.robot, q[:count])
+    coordinates, transforms = measured.coordinates.copy(), measured.transforms.copy()
     for i, posture in enumerate(postures):
         if posture is not None:
             coordinates[i], transforms[i] = posture.coordinates, posture.transforms
     # second orders of the declared errors are in both models, and not known elsewhere
     return replace(
-        there, coordinates=coordinates, transforms=transforms, second_order=0.0
+        measured, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
 
 
-def _model(there: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArray]:
+def _model(tried: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArray]:
     """(S, 6) whitened predictions of a fit, and (S, 6, k) their derivatives."""
 
     def read(values: NDArray, finite: bool) -> NDArray:
-        conditions = apply_effects(there, fit.at(values))
+        conditions = apply_effects(tried, fit.at(values))
         return predict(replace(conditions, exact=finite)).deviation / sigma
 
     model = read(fit.values, fit.conditions.exact)
@@ -179,15 +179,15 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
     return np.einsum("si,si->s", d, np.linalg.solve(S, d[..., None])[..., 0])
 
 
-def _configuration(campaign: Campaign, there: Conditions, row: int) -> dict[str, float]:
+def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
     """The command of some conditions, by the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
-            f"q.{frame.name}": float(there.coordinates[row, i])
+            f"q.{frame.name}": float(tried.coordinates[row, i])
             for i, frame in enumerate(campaign.robot.frames)
             if frame.actuated
         }
-    pose = there.take([row]).postures.platform[0]
+    pose = tried.take([row]).postures.platform[0]
     return {
         f"pose.{name}": float(v)
         for name, v in zip(POSE, pose_components(pose), strict=True)

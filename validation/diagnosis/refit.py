@@ -4,7 +4,7 @@ Sources:
     Nocedal, Wright, Numerical Optimization, chapter 10 (least squares).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -91,9 +91,9 @@ class Fit:
             step = _STEP * max(abs(x[i]), 1e-3 * slot.unknown.scale)
             ends = []
             for sign in (1.0, -1.0):
-                there = x.copy()
-                there[i] += sign * step
-                moved = h.public(robot, there)
+                moved_values = x.copy()
+                moved_values[i] += sign * step
+                moved = h.public(robot, moved_values)
                 ends.append(np.array([moved.get(name, np.nan) for name in value]))
             J[:, i] = (ends[0] - ends[1]) / (2 * step)
         std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
@@ -132,11 +132,16 @@ def resting(
     Returns:
         (R, n, 6) in units of its bounds; a foundation's frame is left out.
     """
-    there = with_rest_positions(
-        apply_effects(conditions, dict(_public(members, x, conditions.robot)))
-    )
-    assert there.rest is not None
-    return there.rest[:, -len(conditions.robot.frames) :]
+    return rest_under(conditions, dict(_public(members, x, conditions.robot)))
+
+
+def rest_under(conditions: Conditions, effects: Mapping[str, Values]) -> NDArray:
+    """(R, n, 6) of its bounds: where clearances rest under effects, by least energy."""
+    loose = with_rest_positions(apply_effects(conditions, effects))
+    assert loose.rest is not None
+    # effects may add frames, as the foundation's
+    own = [loose.robot.index(frame.name) for frame in conditions.robot.frames]
+    return loose.rest[:, own]
 
 
 def with_clearance_held(conditions: Conditions, fit: Fit) -> Conditions:
@@ -168,11 +173,11 @@ def in_full(
     Returns:
         The same numbers with the full model's residual.
     """
-    there = apply_effects(conditions, fit.effects)
-    model = whiten(campaign, predict(there).deviation)
+    settled = apply_effects(conditions, fit.effects)
+    model = whiten(campaign, predict(settled).deviation)
     left = whiten(campaign, campaign.measured) - model
     left = np.where(np.isfinite(left), left, _LOST)
-    return replace(fit, conditions=there, residual=behind.whitened(left))
+    return replace(fit, conditions=settled, residual=behind.whitened(left))
 
 
 def refit(
@@ -198,9 +203,9 @@ def refit(
     # finite motions take a hundred times longer: their defect is fitted, not they
     for _ in range(_MOST_DEFECTS):
         fit = _refit(campaign, conditions, linear, start, defect, behind)
-        there = replace(fit.conditions, exact=True)
+        exact = replace(fit.conditions, exact=True)
         read = [
-            whiten(campaign, predict(at).deviation) for at in (fit.conditions, there)
+            whiten(campaign, predict(at).deviation) for at in (fit.conditions, exact)
         ]
         last, defect = defect, np.nan_to_num(read[1] - read[0])
         start = fit.values
@@ -208,7 +213,7 @@ def refit(
             break
     left = whiten(campaign, campaign.measured) - read[1]
     left = behind.whitened(np.where(np.isfinite(left), left, _LOST))
-    return replace(fit, hypotheses=tuple(members), residual=left, conditions=there)
+    return replace(fit, hypotheses=tuple(members), residual=left, conditions=exact)
 
 
 def _refit(

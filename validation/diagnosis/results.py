@@ -125,8 +125,8 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
     """
     behind = diagnosis.behind
     values, stds = behind.values(diagnosis.fit.residual), behind.deviations()
-    everyone = zip(behind.terms, values, stds, behind.identified(), strict=True)
-    for term, value, std, share in everyone:
+    unknowns = zip(behind.terms, values, stds, behind.identified(), strict=True)
+    for term, value, std, share in unknowns:
         if term.name != name:
             continue
         frames = diagnosis.campaign.robot.frames

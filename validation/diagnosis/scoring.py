@@ -184,18 +184,18 @@ class Screen:
             Sets, best score first.
         """
         scored: dict[tuple[int, ...], Scored] = {(): self.fit(())}
-        everyone = range(len(self.signatures))
-        for i in everyone:
+        indices = range(len(self.signatures))
+        for i in indices:
             scored[(i,)] = self.fit((i,))
-        alone = sorted(everyone, key=lambda i: -scored[(i,)].score)
+        alone = sorted(indices, key=lambda i: -scored[(i,)].score)
         ways: dict[str, list[int]] = {}
-        for i in everyone:  # the first way of every effect is its most general
+        for i in indices:  # the first way of every effect is its most general
             ways.setdefault(self.effects[i], []).append(i)
         chosen = {own[0] for own in ways.values()}
         for own in ways.values():
             chosen.update(sorted(own, key=alone.index)[:_WAYS])
         pairs: set[tuple[int, ...]] = {*combinations(sorted(chosen), 2)}
-        pairs |= {(i, j) for i in alone[:_BEST] for j in everyone if i != j}
+        pairs |= {(i, j) for i in alone[:_BEST] for j in indices if i != j}
         self._enlarge(scored, pairs)
         for size in range(3, largest + 1):
             best = [s for s in scored.values() if len(s.members) == size - 1]

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
+from assembly.effects import LIBRARY
 from assembly.effects.effect import Values
 from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
@@ -20,7 +20,7 @@ from assembly.measurement.predict import with_rest_positions
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import Background, background
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
-from validation.diagnosis.refit import Fit, adds_clearance, in_full, refit
+from validation.diagnosis.refit import Fit, adds_clearance, in_full, refit, rest_under
 from validation.diagnosis.refitting import Refits, names_of
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -106,11 +106,7 @@ def _select_settled(
     if not clearance:
         return _select(campaign, conditions, update)
     selected = _select(campaign, with_rest_positions(conditions), update)
-    loose = with_rest_positions(apply_effects(conditions, selected.fit.effects))
-    assert loose.rest is not None
-    # effects may add frames, as the foundation's
-    own = [loose.robot.index(frame.name) for frame in conditions.robot.frames]
-    rest = loose.rest[:, own]
+    rest = rest_under(conditions, selected.fit.effects)
     return _select(campaign, replace(conditions, rest=rest), update)
 
 
@@ -133,8 +129,8 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
     for turn in range(_ROUNDS):
         behind = background(screens.terms, prior)
         screen = screens.screen(signatures, prior)
-        told = partial(update, f"fits, round {turn + 1}")
-        sets, fits = refits.round(screen, behind, told)
+        update_fits = partial(update, f"fits, round {turn + 1}")
+        sets, fits = refits.round(screen, behind, update_fits)
         chosen = fits[sets[0].members]
         again = screens.evidence.best(project(behind.raw(chosen.residual)))
         now = sets[0].score + prior.cost

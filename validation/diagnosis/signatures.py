@@ -128,11 +128,11 @@ class Tangents:
         Returns:
             (N,) whitened; NaN where the model has no answer.
         """
-        there = apply_effects(self.conditions, effects)
+        changed = apply_effects(self.conditions, effects)
         settles = any(LIBRARY[name].clearance for name in effects)
-        if settles and there.rest is None and not there.exact:
-            there, _ = with_clearances_taken_up(there)
-        return whiten(self.campaign, predict(there).deviation)
+        if settles and changed.rest is None and not changed.exact:
+            changed, _ = with_clearances_taken_up(changed)
+        return whiten(self.campaign, predict(changed).deviation)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
         """A hypothesis to first order where it begins to differ from what is declared.
@@ -147,9 +147,9 @@ class Tangents:
             nothing = np.zeros(len(self.declared))
             return Signature(hypothesis, nothing, np.zeros((len(nothing), 0)))
         if not hypothesis.slots:
-            there = self.model({hypothesis.effect: {}})
+            started = self.model({hypothesis.effect: {}})
             return Signature(
-                hypothesis, there - self.declared, np.zeros((len(there), 0))
+                hypothesis, started - self.declared, np.zeros((len(started), 0))
             )
         shapes = {
             name: slot.start for slot in hypothesis.slots if slot.shape
@@ -169,8 +169,8 @@ class Tangents:
         size = np.linalg.norm(predict(self.conditions).deviation[:, :3], axis=1)
         rows = np.unique([*np.argsort(-load)[:_PROBED], *np.argsort(-size)[:_PROBED]])
         some, part = self.campaign.take(rows), self.conditions.take(rows)
-        there = apply_effects(part, {hypothesis.effect: {}})
-        change = predict(there).deviation - predict(part).deviation
+        changed = apply_effects(part, {hypothesis.effect: {}})
+        change = predict(changed).deviation - predict(part).deviation
         size = whiten(some, change)
         if not np.isfinite(size).all():
             return True
@@ -211,10 +211,10 @@ class Tangents:
         without = self.model(others) if others else self.declared
         columns = np.zeros((len(middle), len(x)))
         for k, slot in enumerate(hypothesis.slots):
-            there = x.copy()
+            moved = x.copy()
             step = _STEP * max(slot.unknown.scale, abs(x[k]))
-            there[k] += step if there[k] + step <= slot.unknown.upper else -step
-            column = (model(there) - middle) / (there[k] - x[k])
+            moved[k] += step if moved[k] + step <= slot.unknown.upper else -step
+            column = (model(moved) - middle) / (moved[k] - x[k])
             columns[:, k] = _seen(column, slot)
         return Signature(hypothesis, middle - without - columns @ x, columns)
 

@@ -130,8 +130,8 @@ def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]
     behind = model.behind
     sensitivities = Sensitivities(model.conditions, campaign.robot, model.response)
     values = behind.values(model.fit.residual)
-    everyone = zip(behind.terms, values, behind.deviations(), strict=True)
-    known = {term.name: (x, std) for term, x, std in everyone}
+    terms = zip(behind.terms, values, behind.deviations(), strict=True)
+    known = {term.name: (x, std) for term, x, std in terms}
     return [
         sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
         for k, one in enumerate(model.learned)

@@ -146,16 +146,16 @@ def calibrate(
     tally: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
     right = wrong = 0
     for k in range(2 * count):
-        there = k % 2 == 1
+        present = k % 2 == 1
         noise = rng.standard_normal(screen.count)
-        trial = screen.with_residual(signal + noise if there else noise)
+        trial = screen.with_residual(signal + noise if present else noise)
         sets = trial.search()
         freedom = screen.count - sets[0].rank
         more = float(chi2.sf(sets[0].rss, freedom)) < SIGNIFICANT
         decision, claimed = verdict(by_names(trial, sets), inclusion(trial, sets), more)
-        tally[there][decision] += 1
-        expected = truth if there else ()
-        right += there and decision == "explained" and claimed == truth
+        tally[present][decision] += 1
+        expected = truth if present else ()
+        right += present and decision == "explained" and claimed == truth
         wrong += decision == "explained" and claimed != expected
         update(k + 1, 2 * count)
     return Calibration(

@@ -102,12 +102,12 @@ def import_readings(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadInput(f"{folder}: found something there, expected a new folder")
     declared = read_targets(targets)
-    told = read_commands(commands, declared.robot, declared.writing)
+    commands_read = read_commands(commands, declared.robot, declared.writing)
     readings = [r for file in files for r in read_device_table(file, declared.writing)]
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
-    joined = match(readings, told, declared.places, declared.window)
-    imported = _campaign(declared, told, joined, folder, len(readings))
+    joined = match(readings, commands_read, declared.places, declared.window)
+    imported = _campaign(declared, commands_read, joined, folder, len(readings))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -119,15 +119,15 @@ def import_readings(
     return imported
 
 
-def _nominal(declared: TargetsFile, told: Commands, command: int, target: str
+def _nominal(declared: TargetsFile, commands: Commands, command: int, target: str
              ) -> NDArray:  # fmt: skip
     """(3,) [m] where a target should stand, base axes."""
-    T = told.postures[command].platform
+    T = commands.postures[command].platform
     return np.asarray(T[:3, :3] @ declared.places[target] + T[:3, 3])
 
 
 def _campaign(
-    declared: TargetsFile, told: Commands, joined: Match, folder: Path, total: int
+    declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
     """Frame, suspects, and the campaign's two texts."""
     names = list(declared.places)
@@ -135,7 +135,7 @@ def _campaign(
     nominal = np.empty(measured.shape)
     for i, (command, readings) in enumerate(joined.rows):
         for k, name in enumerate(names):
-            nominal[i, k] = _nominal(declared, told, command, name)
+            nominal[i, k] = _nominal(declared, commands, command, name)
             if name in readings:
                 measured[i, k] = readings[name].position
     read = np.isfinite(measured).all(axis=2)
@@ -147,7 +147,7 @@ def _campaign(
     left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
     for i, (command, readings) in enumerate(joined.rows):
         for k, reason in _suspects(base[i], nominal[i], read[i], scatter, names):
-            label, place = told.ids[command], readings[names[k]].place
+            label, place = commands.ids[command], readings[names[k]].place
             left_out.append(f"{place}: command {quoted(label)}: {reason}")
             read[i, k] = False
     total -= len(joined.strangers)
@@ -164,10 +164,10 @@ def _campaign(
     rows = [joined.rows[i] for i in kept]
     gaps = np.where(read[..., None], base - nominal, np.nan)[kept]
     spread = [[_sigma(r.get(n), frame) for n in names] for _, r in rows]
-    columns = _columns(told, rows, gaps, np.array(spread), names, declared)
+    columns = _columns(commands, rows, gaps, np.array(spread), names, declared)
     header = ("id", *columns)
     values = zip(*columns.values(), strict=True)
-    labels = _labels(told, rows)
+    labels = _labels(commands, rows)
     cells = tuple((a, *map(_cell, row)) for a, row in zip(labels, values, strict=True))
     text = _declaration(declared, folder, np.array(spread)[read[kept]])
     return Import(
@@ -236,12 +236,12 @@ def _sigma(reading: Reading | None, frame: DeviceFrame) -> NDArray:
 
 
 def _columns(
-    told: Commands, rows: list[tuple[int, dict[str, Reading]]], gaps: NDArray,
+    commands: Commands, rows: list[tuple[int, dict[str, Reading]]], gaps: NDArray,
     sigma: NDArray, names: list[str], declared: TargetsFile,
 ) -> dict[str, NDArray]:  # fmt: skip
     """Columns of the campaign's table, SI."""
     at = [command for command, _ in rows]
-    columns = {name: values[at] for name, values in told.columns.items()}
+    columns = {name: values[at] for name, values in commands.columns.items()}
     times = np.array([
         np.nanmin([r.time for r in readings.values()] + [np.inf])
         for _, readings in rows
@@ -258,14 +258,16 @@ def _columns(
     return columns
 
 
-def _labels(told: Commands, rows: list[tuple[int, dict[str, Reading]]]) -> list[str]:
+def _labels(
+    commands: Commands, rows: list[tuple[int, dict[str, Reading]]]
+) -> list[str]:
     """Ids of the rows: the command's, numbered where it is there again."""
     seen: dict[int, int] = {}
     labels = []
     for command, _ in rows:
         seen[command] = seen.get(command, 0) + 1
         again = f".{seen[command]}" if seen[command] > 1 else ""
-        labels.append(told.ids[command] + again)
+        labels.append(commands.ids[command] + again)
     return labels
 
 

@@ -23,7 +23,7 @@ from validation.multibody.exudyn_solids import add_mesh
 from validation.multibody.motion import inverse, matrix, placement, shifted
 
 
-class PlacedRobot(Protocol):
+class PostureLike(Protocol):
     """The part of a posture that the simulation uses."""
 
     @property
@@ -52,7 +52,7 @@ class Case:
         couple: (3,) [N m] on the platform besides, base axes, by dead forces.
     """
 
-    posture: PlacedRobot
+    posture: PostureLike
     scale: float
     springs: Mapping[str, NDArray]
     meshes: Mapping[str, MeshBody]
@@ -190,7 +190,7 @@ def _add_frame(
     return place
 
 
-def _nominal(posture: PlacedRobot) -> dict[str, NDArray]:
+def _nominal(posture: PostureLike) -> dict[str, NDArray]:
     """(4, 4) of every frame without imperfections, before its own motion."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}

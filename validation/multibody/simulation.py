@@ -43,7 +43,7 @@ from validation.multibody.exudyn_reading import (
 )
 from validation.multibody.exudyn_solver import largest_gap, solve
 from validation.multibody.motion import turn_of
-from validation.multibody.open_robot import Case, PlacedRobot, Tree, build, link_springs
+from validation.multibody.open_robot import Case, PostureLike, Tree, build, link_springs
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
@@ -148,7 +148,7 @@ class MultibodyAssembly:
 
 
 def simulate_assembly(
-    posture: PlacedRobot,
+    posture: PostureLike,
     scale: float = 1.0,
     model: SimulationModel = _STANDARD,
     *,
@@ -228,7 +228,7 @@ def _simulate(
 
 
 def closing_sequence(
-    posture: PlacedRobot,
+    posture: PostureLike,
     steps: int = 8,
     scale: float = 1.0,
     load: ArrayLike | None = None,

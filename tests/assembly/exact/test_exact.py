@@ -178,7 +178,7 @@ def test_a_pin_with_play_presses_on_its_rim(longer):
 
 
 def test_within_the_play_nothing_is_forced():
-    """4 mm too long, 5 mm of play: closed without energy."""
+    """4 mm too long, 5 mm of clearance: closed without energy."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
     assert answer.energy < 1e-12  # [J], of 0.04 J without play
     assert answer.closure_residual() < 1e-12
@@ -282,7 +282,7 @@ def test_too_few_steps_are_said_to_be_too_few(monkeypatch):
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_paper_robot_converges_at_full_errors(case):
-    """Easy points, flat valleys of play, the rim of the workspace."""
+    """Easy points, flat valleys of clearance, the rim of the workspace."""
     places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
     poses = np.full((len(places), 6), np.nan)
     poses[:, [0, 2]] = places

@@ -58,7 +58,7 @@ def with_errors_times(factor, posture):
 
 
 def assert_proved(answer):
-    """The promise of the batch, 1e-8 E + 1e-12 E(no play), not asking the answer."""
+    """The promise of the batch, 1e-8 E + 1e-12 E(tight), not asking the answer."""
     assert unproved(answer) == ""
     gap = answer.potential - answer.bound
     assert gap <= 1e-8 * answer.energy + 1e-12 * answer.energy_without_clearance

@@ -149,7 +149,7 @@ def test_under_a_load_springs_stay_and_what_is_loose_goes_nearest(name, margin):
 
 @pytest.mark.parametrize("play", [2e-5, 8e-5])
 def test_two_pins_side_by_side_by_hand(play):
-    """Two rigid chains to one platform, 0.1 mm off, their pins with play c.
+    """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
 
     The platform stands where both pins reach it: nearest to nominal it is off by
     what the first pin's play does not make good, 0.1 mm - c.
@@ -171,7 +171,7 @@ def test_two_pins_side_by_side_by_hand(play):
 
 
 def test_a_pose_that_nothing_leaves_free_is_not_marked():
-    """A load that presses all play; no play at all."""
+    """A load that presses all play; no clearance at all."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4)

@@ -35,7 +35,7 @@ CASES = [
 
 
 def serial(*clearances, arm=0.3):
-    """Fixed joints with play, ``arm`` apart along x."""
+    """Fixed joints with clearance, ``arm`` apart along x."""
     frames, above = [], "base"
     for i, play in enumerate(clearances):
         shift = [arm * bool(i), 0, 0]
@@ -131,7 +131,7 @@ def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
 
 
 def hinged_frame(spin):
-    """A four-bar with play in its pins, two of them bounded to +-spin."""
+    """A four-bar with clearance in its pins, two of them bounded to +-spin."""
     play = small_clearance(spin=spin)
     robot = planar_four_bar()
     limited = {"pin_a": play, "rocker": play, "pin_b": small_clearance()}
@@ -141,7 +141,7 @@ def hinged_frame(spin):
 
 
 def feasible(posture, cp):
-    """Screws of play within every bound that close the perfect robot, for cvxpy."""
+    """Clearance screws within every bound that close the perfect robot, for cvxpy."""
     robot, lin = posture.robot, linearise(posture)
     c = cp.Variable((len(robot.frames), 6))
     moved = 1e-4 * cp.reshape(c, (6 * len(robot.frames),), order="C")
@@ -185,7 +185,7 @@ def test_the_largest_error_grows_with_the_bound_and_begins_where_it_is_zero():
         assert np.all(low[:-1] <= high[1:])
         assert high[1] - low[0] <= 3e-9
         assert low[-1] > 1.1 * high[0]
-        # a bound that no play comes near changes nothing
+        # a bound that no clearance comes near changes nothing
         assert low[-1] == pytest.approx(low[-2], rel=1e-5)
 
 

@@ -25,7 +25,7 @@ PLAY = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3, spin=2e-3)
 @pytest.mark.parametrize(
     ("gap", "margin"),
     [
-        ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # 5e-5 m across, 2e-5 m of play
+        ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # 5e-5 m across, 2e-5 m of clearance
         ([0, 0, 0, 0, 0, -7e-6], 0.7),  # along
         ([6e-4, 8e-4, 0, 0, 0, 0], 1.0),  # tilt
         ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin, play on a fixed joint

@@ -52,7 +52,7 @@ def robot(name):
     return BUILT_IN[name]()
 
 
-# joints with play, each counted once: all that are not driven, and the arm's drives
+# joints with clearance, counted once: all that are not driven, and the arm's drives
 PLAYING = {
     "irsbot2": 8, "four_bar": 3, "five_bar": 3, "3rrr": 6,
     "hexapod": 12, "delta": 12, "orthoglide": 18, "arm6": 6,

@@ -139,9 +139,9 @@ def test_the_table_says_how_far_the_platform_moves_for_each_um_of_error(stiff):
 
 
 def test_random_play_is_not_taken_for_importance():
-    """A free disc of 0.1 mm of play at a driven arm's pin; the tip follows its error.
+    """A free disc of clearance 0.1 mm at a driven arm's pin; the tip follows its error.
 
-    One um for each um whatever is assumed of play, which alone moves it by up to 100.
+    One um for each um whatever is assumed of it; alone it moves the tip by up to 100.
     """
     frames = (
         Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=1e-4)),
@@ -163,7 +163,7 @@ def test_random_play_is_not_taken_for_importance():
 
 
 def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):
-    """Rigid parts that meet within 0.1 mm of play: errors of 0.3 mm often do not."""
+    """Rigid parts that meet within clearances of 0.1 mm: errors of 0.3 may not."""
     frames = (
         Frame("one", translation=[0.5, 0, 0], clearance=Clearance(radial=1e-4)),
         Frame("two", translation=[0.5, 0, 0]),

@@ -191,7 +191,7 @@ def test_yields_and_limits_add_up(experiment):
     )  # fmt: skip
     assert said["within_limits"]["probability"] == float(met.mean())
     free = said["assembles"]["rigid_compliant_free"]["probability"]
-    # where it goes together by play alone it does so without energy
+    # where it goes together by clearance alone it does so without energy
     assert float((data["energy"] <= 1e-12).mean()) <= free
     assert said["assembles"]["forced"]["probability"] == 1.0
     with pytest.raises(BadInput, match="limit torque"):

@@ -124,7 +124,7 @@ def test_wrenches_of_random_robots_have_slopes(seed):
 )
 @pytest.mark.parametrize("pose", POSES)
 def test_limited_quantities_of_the_papers_robot_have_slopes(pose, key, rng):
-    """Along random directions, at errors so large that no play is left undecided."""
+    """Along random directions, at errors so large that no clearance is undecided."""
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     frames = tuple(f.name for f in robot.frames if f.link is not None)

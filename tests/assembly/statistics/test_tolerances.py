@@ -279,7 +279,7 @@ def largest_share(posture, limits):
 
 
 def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
-    """The paper's play alone moves the platform by 0.39 mm: 0.2 mm cannot be had."""
+    """The paper's clearances alone move the platform by 0.39 mm: 0.2 cannot be had."""
     posture, sources, _ = paper
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.ones(2), np.zeros(2),
                 np.array([0.05, 0.005]), {"translation": 2e-4}, asked_yield=0.9,

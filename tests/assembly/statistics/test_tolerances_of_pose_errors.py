@@ -67,7 +67,7 @@ def test_with_a_yield_pose_errors_add_up_as_squares():
 
 
 def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
-    """A serial arm: errors e and a disc of play r reach e + r, so e <= limit - r."""
+    """A serial arm: errors e and a clearance disc r reach e + r, so e <= limit - r."""
     frames = (
         Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
         Frame("tip", "pin", [0.4, 0, 0]),

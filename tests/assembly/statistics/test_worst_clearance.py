@@ -1,4 +1,4 @@
-"""The worst play: closed forms, other readings of play, slopes against differences."""
+"""The worst clearance: closed forms, other readings, slopes against differences."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ POSE = {"tx": 0.1, "tz": -0.5}
 
 
 def chain(radial=RADIAL, tilt=0.0):
-    """One driven joint with play, and an arm of 0.4 m across its axis."""
+    """One driven joint with clearance, and an arm of 0.4 m across its axis."""
     play = Clearance(radial=radial, tilt=tilt)
     frames = (
         Frame("pin", joint="revolute", actuated=True, clearance=play),
@@ -78,7 +78,7 @@ def test_no_other_play_is_worse_in_any_draw(share, play):
 
 
 def test_more_play_is_never_better_where_play_alone_suffices():
-    """Sets of play that close without energy are nested; brackets are 1e-6 wide."""
+    """Clearances that close without energy are nested sets; brackets are 1e-6 wide."""
     robot, before = load_robot("irsbot2"), None
     sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
     values = sources.draw(0, 40, seed=3)
@@ -107,7 +107,7 @@ def replace_robot(sources, robot):
 
 
 def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
-    """Parts so good that play alone suffices: 0.1 mm is met at rest only."""
+    """Parts so good that clearance alone suffices: 0.1 mm is met at rest only."""
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(

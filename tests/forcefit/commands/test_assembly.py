@@ -76,8 +76,8 @@ def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
 
 
 def test_the_error_under_a_load_is_the_sag_and_what_play_adds(run, tmp_path):
-    """A pin with play on an elastic post, pushed down: the axial play is pressed, so
-    only the radial one is left; the post gives F / k. By hand.
+    """A pin with clearance on an elastic post, loaded downwards: the axial one is taken
+    up, so only the radial one is left; the post gives F / k. By hand.
     """
     (tmp_path / "post.toml").write_text("""
 platform = "tip"

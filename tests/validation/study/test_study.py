@@ -65,7 +65,7 @@ def test_a_study_answers_as_the_reference_does(results):
     assert outcome.passed
     assert ("maps", 6, 6) in steps
     assert verdict(outcome).startswith(
-        "It goes together only by force: 1.926 J, its play"
+        "It goes together only by force: 1.926 J, its clearances"
     )
 
 
