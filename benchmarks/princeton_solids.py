@@ -221,7 +221,7 @@ def root_link() -> MatrixLink:
 
 
 def in_pieces(size: float, angle: float, root: MatrixLink | None = None) -> NDArray:
-    """(2,) [m] the same of one beam link in 8 pieces, its first another link if given."""
+    """(2,) [m] the same of one beam link in 8 pieces, the first another link."""
     section, up, piece = {"width": WIDTH, "height": HEIGHT}, (0, 1, 0), LENGTH / 8
     if root is None:
         link = BeamLink(section, E, NU, up=up, pieces=8)
@@ -252,11 +252,9 @@ def main() -> None:
         for size, solid in solid_rows(counts, orders, angle).items():
             ours, rooted = in_pieces(size, angle), in_pieces(size, angle, root)
             beam, brick = (np.array([v[k] for v in rows]) for rows in PUBLISHED[size])
-            print(
-                f"{size:7.3f}{degrees:4d} {1e3 * solid[0]:9.4f}{1e3 * solid[1]:10.4f}"
-                f"{off(ours, solid)}  {off(rooted, solid)}  {off(beam, solid)}  {off(brick, solid)}",
-                flush=True,
-            )
+            others = "  ".join(off(v, solid) for v in (ours, rooted, beam, brick))
+            moved = f"{1e3 * solid[0]:9.4f}{1e3 * solid[1]:10.4f}"
+            print(f"{size:7.3f}{degrees:4d} {moved}{others}", flush=True)
 
 
 def off(values: NDArray, arbiter: NDArray) -> str:

@@ -1,4 +1,4 @@
-r"""What the platform's stiffness loses by links as beams, and by links that act at ends.
+r"""What links as beams, and links that act at ends, cost the platform's stiffness.
 
 Four models of one robot, clearances at zero, without errors:
 

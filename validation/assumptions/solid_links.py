@@ -177,7 +177,8 @@ def prism(section: dict[str, float]) -> Surface:
     flat = np.vstack([outer, inside])
     points = np.vstack([np.column_stack([flat, np.full(len(flat), z)]) for z in (0, 1)])
     i, j = np.arange(count), np.roll(np.arange(count), -1)
-    a, b = (count + (k if inner else 0 * k) for k in (i, j))  # on the hole, or its axis
+    # on the hole's edge, or the axis of a full section
+    a, b = (count + (k if inner else 0 * k) for k in (i, j))
     up = count + within
     triangles = [
         (i, j, j + up),

@@ -23,6 +23,7 @@ from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
+from benchmarks.princeton_solids import in_pieces, root_link
 from validation.multibody.simulation import simulate_assembly
 
 ANGLES = np.radians([0, 15, 30, 45, 60, 75, 90])
@@ -130,6 +131,24 @@ def test_the_princeton_beam_bends_as_ansys_beams_do(force):
     linear = solve_assembly(posture, [0, 0, 0, 0, 0, force]).platform_screw[5]
     off = {8.896: 0.09, 13.345: 0.195}[force]
     assert linear / across[-1] - 1 == pytest.approx(off, abs=0.006)
+
+
+# [m] of a solid with large rotations: python -m benchmarks.princeton_solids
+SOLID = {
+    (8.896, 15): (0.0106000, 0.0419811), (8.896, 45): (0.0088268, 0.1087360),
+    (13.345, 45): (0.0151716, 0.1561285), (13.345, 75): (0.0062418, 0.1956991),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_root_that_cannot_warp_makes_the_princeton_beam_a_solid():
+    """8 pieces: 0.6 %; without it 1.5 % along the height, where twist counts most."""
+    root = root_link()
+    for (force, degrees), solid in SOLID.items():
+        moved = in_pieces(force, np.radians(degrees), root)
+        np.testing.assert_allclose(moved, solid, rtol=0.006)
+    free = in_pieces(13.345, np.radians(75))
+    assert free[0] / SOLID[13.345, 75][0] - 1 == pytest.approx(0.015, abs=0.001)
 
 
 def curved_cantilever(chords, pieces):
