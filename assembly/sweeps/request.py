@@ -13,6 +13,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
+from assembly.platform_stiffness.vibration import check_masses
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
@@ -30,6 +31,8 @@ from stiffness.screws import WRENCH
 
 if TYPE_CHECKING:
     import xarray
+
+_MODES = 100  # natural frequencies at most
 
 
 def ask_sweep(
@@ -51,6 +54,7 @@ def ask_sweep(
     gravity: Sequence[float] = (0.0,) * 3,
     under: Mapping[str, float | str] | None = None,
     stiffness: bool = False,
+    frequencies: int | None = None,
 ) -> Sweep:
     """The sweep of the options of ``forcefit assembly sweep``, by their names.
 
@@ -72,6 +76,7 @@ def ask_sweep(
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
         stiffness: also K_C and the shares of its parts, clearances held at zero.
+        frequencies: how many natural frequencies.
 
     Returns:
         The sweep, everything in it checked.
@@ -105,6 +110,12 @@ def ask_sweep(
                 f"--yield-strength: no link of {machine.name} has a shape from which "
                 "its stress follows"
             )
+    if frequencies is not None:
+        if not 1 <= frequencies <= _MODES:
+            raise BadInput(
+                f"--frequencies: found {frequencies}, expected 1 to {_MODES}"
+            )
+        check_masses(machine)
     design = load_design(robot) if vary else None
     varied = _vary(design, vary) if design is not None else {}
     sources = None
@@ -135,6 +146,7 @@ def ask_sweep(
         gravity=tuple(gravity),
         under=under,
         stiffness=stiffness,
+        frequencies=frequencies or 0,
     )
     _check_readings(question)
     return Sweep(

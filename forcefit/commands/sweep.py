@@ -67,6 +67,9 @@ def sweep(
         bool,
         typer.Option("--stiffness", help="K_C, and which part gives way."),
     ] = False,
+    frequencies: Annotated[
+        int | None, typer.Option(help="Natural frequencies, so many.")
+    ] = None,
     near: Annotated[
         float, typer.Option(help="Distance below which a singularity is named.")
     ] = 0.02,
@@ -111,7 +114,7 @@ def sweep(
             seed=seed, reading=reading, play_alone=play_alone, wrench=wrench_of or (),
             linearisation=linearisation, near=near, yield_strength=yield_strength,
             load=wrench or (0.0,) * 6, gravity=g or (0.0,) * 3, under=covariates,
-            stiffness=stiffness,
+            stiffness=stiffness, frequencies=frequencies,
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
