@@ -1,6 +1,5 @@
 """Natural frequencies as quantities of sweeps."""
 
-import numpy as np
 import pytest
 
 from assembly.kinematics.posture import place_robot
