@@ -237,11 +237,17 @@ def _beam_mass(frame: Frame) -> NDArray:
     for rows, size in (((3, 9), mass), ((0, 6), turning)):
         M[np.ix_(rows, rows)] += size / 6 * np.array([[2, 1], [1, 2]])
     a, b, c, d = 22 * length, 13 * length, 4 * length**2, 3 * length**2
-    for plane, sign in (((4, 2, 10, 8), 1), ((5, 1, 11, 7), -1)):
+    e, f, g = 3 * length, 4 * length**2, length**2
+    bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
+    for plane, sign, second in bends:
         # a turn about y lowers what lies ahead along x
         s = np.array([1, sign, 1, sign])
-        block = np.array([
+        shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]
         ])  # fmt: skip
-        M[np.ix_(plane, plane)] += mass / 420 * block * np.outer(s, s)
+        turn = np.array([
+            [36, e, -36, e], [e, f, -e, -g], [-36, -e, 36, -e], [e, -g, -e, f]
+        ])  # fmt: skip
+        block = mass / 420 * shift + link.density * second / (30 * length) * turn
+        M[np.ix_(plane, plane)] += block * np.outer(s, s)
     return M
