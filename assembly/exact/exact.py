@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-_STEPS = 80  # at most; 3 to 5 are usual
+_STEPS = 160  # at most; 3 to 5 are usual, metres of travel take 80
 _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
 _DECREMENT = 1e-14  # relative energy left to gain before the last step
 _STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped

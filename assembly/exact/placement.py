@@ -189,8 +189,7 @@ class Placement:
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
         """Second derivative of multipliers . residual + load . platform screw.
 
-        Exact where the closures hold; elsewhere off by the order of the residual, and
-        of the square of the platform's turn if the load has a moment.
+        Exact where the closures hold; elsewhere off by the order of the residual.
 
         Args:
             multipliers: (6 K,) of the scaled residual.
@@ -246,10 +245,12 @@ class Placement:
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
         # a turn by w moves the origin, itself moving by v, by w x v / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
-        # log(exp(w) exp(turn)) has w x (w x turn) / 12 beside what is linear in w
-        outer = np.outer(load[:3], turn)
-        of_moment = (outer + outer.T) / 2 - (load[:3] @ turn) * np.eye(3)
-        return H + (of_force + of_force.T) / 2 + W[:3].T @ of_moment @ W[:3] / 6
+        H += (of_force + of_force.T) / 2
+        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn): h for a given turn before it
+        along, zero = np.linalg.solve(turn_jacobian(turn), W[:3]), np.zeros(3)
+        moment = np.linalg.solve(turn_jacobian(turn).T, load[:3])
+        form = second_form(np.append(turn, zero), np.append(moment, zero))
+        return H - along.T @ form[:3, :3] @ along
 
 
 def place(model: FiniteRobot, x: NDArray) -> Placement:

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffness.screws import rotation_vector, skew, transform
 
 _SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
-_ORDERS = 6  # of the brackets in the second derivative of the exponential
+_ROUNDING = 1e-16  # [-] below which the series of the second derivative ends
 
 
 def exponential(screw: ArrayLike) -> NDArray:
@@ -105,10 +105,10 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     """Work of a wrench on the second-order part of a change of a screw.
 
     To second order ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``; this is the matrix
-    of ``w.D(h, h)``, from the series of J in brackets.
+    of ``w.D(h, h)``, from the series of J in brackets, to rounding.
 
     Args:
-        screw: (..., 6) s [rad, m], of a turn of about 1 at most.
+        screw: (..., 6) s [rad, m].
         wrench: (..., 6) w [N m, N], in the axes before the motion.
 
     Returns:
@@ -116,19 +116,29 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     """
     ad = bracket(screw)
     w = np.asarray(wrench, dtype=float)[..., None]
+    orders = _orders(np.asarray(screw, dtype=float))
     powers = [np.broadcast_to(np.eye(6), ad.shape)]
-    for _ in range(_ORDERS):
+    for _ in range(orders):
         powers.append(powers[-1] @ ad)
     Z = np.zeros(ad.shape)
-    for k in range(_ORDERS - 1):
+    for k in range(orders - 1):
         # w.ad^k [h, ad^(n-1-k) h] / (n+1)! summed over n >= k + 2
         rest = sum(
-            powers[n - 1 - k] / math.factorial(n + 1)
-            for n in range(k + 2, _ORDERS + 1)
+            powers[n - 1 - k] / math.factorial(n + 1) for n in range(k + 2, orders + 1)
         )  # fmt: skip
         on_power = (np.swapaxes(powers[k], -1, -2) @ w)[..., 0]
         Z = Z + bracket_form(on_power) @ rest
     return (Z + np.swapaxes(Z, -1, -2)) / 2
+
+
+def _orders(screws: NDArray) -> int:
+    """How many orders of brackets count, beside the first: turns make a power each."""
+    most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
+    order, size = 2, most
+    while size > _ROUNDING:
+        order += 1
+        size *= most / (order + 1)
+    return order
 
 
 def bracket(screw: ArrayLike) -> NDArray:

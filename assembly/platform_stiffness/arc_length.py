@@ -12,6 +12,10 @@ with Z the motions that keep the closures, H the true second derivative of the
 potential, q the work of a unit load, tau the direction of the step.  Stable or not,
 every equilibrium of the path is met.  Clearances are held at zero.
 
+Where an eigenvalue of Z'HZ changes its sign the load is critical: at a limit point it
+turns there, else another path branches off, as a buckled column's, which is named and
+not followed.
+
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
     problems; Crisfield (1991), Non-linear Finite Element Analysis of Solids and
@@ -25,16 +29,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.dead_load import dead_loads, work_gradient
 from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
-from assembly.exact.exact import solve_exact
+from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.placement import place
 from assembly.kinematics.posture import Posture
-from assembly.platform_stiffness.deflection import DeflectionCurve, Event
+from assembly.platform_stiffness.deflection import DeflectionCurve, Event, mode_text
+from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
+from assembly.platform_stiffness.matrices import Part
 
 _STEPS = 400  # of the path at most
 _CORRECTIONS = 8  # of a step
 _CLOSED = 1e-10  # [-] size of a last correction, of a step
 _SMALLEST = 1e-6  # of the first step
-_PARTS = 20  # of the range of loads is the first step
+_HALVINGS = 20  # of a step, to bracket a critical load in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +52,22 @@ class _Place:
         local: the expansion there.
         motion: (N,) along the path, per unit of arc.
         rise: [N or N m] of the load per unit of arc.
+        curvatures: (k,) second derivatives of the potential along its modes, lowest
+            first; their signs count.
+        modes: (N, k) along which.
     """
 
     load: float
     local: Expansion
     motion: NDArray
     rise: float
+    curvatures: NDArray
+    modes: NDArray
+
+    @property
+    def unstable(self) -> int:
+        """How many modes the potential falls along."""
+        return int((self.curvatures < 0).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +81,7 @@ class _Path:
         gravity: (3,) [m/s^2] or None.
         weight: of squared motions, in squared parts of the largest load.
         range: [N or N m] the largest load.
+        parts: whose springs they are.
     """
 
     posture: Posture
@@ -73,6 +90,7 @@ class _Path:
     gravity: ArrayLike | None
     weight: float
     range: float
+    parts: tuple[Part, ...]
 
     def expand(self, x: NDArray, load: float, model: Expansion) -> Expansion:
         """The problem near a placement, under a load."""
@@ -99,6 +117,7 @@ def follow_load(
     last: float,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    count: int = 20,
 ) -> DeflectionCurve:
     """Follow the path of equilibria until the load leaves a range.
 
@@ -109,9 +128,11 @@ def follow_load(
         last: [N m or N] load beyond which it ends, on its own side.
         load: (6,) [N m, N] the rest of the load.
         gravity: (3,) [m/s^2] base axes.
+        count: of steps of the first one's length from first to last load; steps grow
+            to twice that where the path is straight.
 
     Returns:
-        The curve; limit points are its events, ``"critical"``.
+        The curve; its events are ``"critical"`` loads, with the mode.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
@@ -125,37 +146,51 @@ def follow_load(
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity)
     span = abs(last - first)
-    path = _Path(start.cut.cut(tight), component, rest, gravity, 1.0, span)
-    place, path = _begin(path, start.expansion, first, last)
-    places, step, longest = [place], 1.0 / _PARTS, 2.0 / _PARTS
+    cut = start.cut.cut(tight)
+    path = _Path(cut, component, rest, gravity, 1.0, span, part_owners(start))
+    place, path = _begin(path, start, first, last)
+    places, events, step, longest = [place], [], 1.0 / count, 2.0 / count
     while len(places) < _STEPS and abs(places[-1].load - first) <= span:
-        there, count = _advance(path, places[-1], step)
+        there, corrections = _advance(path, places[-1], step)
         if there is None:
             step /= 2
-            if step < _SMALLEST / _PARTS:
+            if step < _SMALLEST / count:
                 raise NotConverged(
                     f"path of {posture.robot.name}",
                     f"no equilibrium follows that at {places[-1].load:.6g}",
                 )
             continue
+        if there.unstable != places[-1].unstable:
+            events.append(_critical(path, places[-1], there, step))
         places.append(there)
-        step = min(longest, step * (1.5 if count <= 3 else 0.7 if count > 5 else 1.0))
-    return _curve(path, tight, places)
+        grown = 1.5 if corrections <= 3 else 0.7 if corrections > 5 else 1.0
+        step = min(longest, step * grown)
+    return _curve(path, tight, places, events)
 
 
 def _begin(
-    path: _Path, local: Expansion, first: float, last: float
+    path: _Path, start: ExactAssembly, first: float, last: float
 ) -> tuple[_Place, _Path]:
     """The first equilibrium, its tangent, and the weight that balances both lengths."""
+    local = start.expansion
     B, q = local.basis, path.pull(local)
     motion = B @ np.linalg.solve(B.T @ local.hessian @ B, B.T @ q)
-    size = np.linalg.norm(motion / local.placement.model.units)
-    weight = 1.0 / (size * path.range) ** 2
+    size = np.linalg.norm(motion / local.placement.model.units) * path.range
+    weight = 1.0 / (size or 1.0) ** 2  # nothing gives way along a rigid bar
     # half of the length is the load's
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
-    return _Place(first, local, motion * rise, float(rise)), replace(
-        path, weight=float(weight)
-    )
+    place = _Place(first, local, motion * rise, float(rise), *_modes(local))
+    return place, replace(path, weight=float(weight))
+
+
+def _modes(local: Expansion) -> tuple[NDArray, NDArray]:
+    """Second derivatives of the potential, lowest first, and their motions."""
+    units = local.placement.model.units
+    Q, R = np.linalg.qr(local.basis / units[:, None])
+    back = np.linalg.inv(R)
+    H = back.T @ local.basis.T @ local.hessian @ local.basis @ back
+    values, vectors = np.linalg.eigh((H + H.T) / 2)
+    return values, units[:, None] * (Q @ vectors)
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
@@ -216,11 +251,38 @@ def _oriented(
     length = np.sqrt(
         path.covector(local, motion) @ motion + (way[-1] / path.range) ** 2
     )
-    return _Place(load, local, motion / length, float(way[-1] / length))
+    rise = float(way[-1] / length)
+    return _Place(load, local, motion / length, rise, *_modes(local))
 
 
-def _curve(path: _Path, posture: Posture, places: list[_Place]) -> DeflectionCurve:
-    """What was met, with its limit points."""
+def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
+    """Where between two places an eigenvalue passes zero, and its mode."""
+    start, short, long_ = low, 0.0, step
+    for _ in range(_HALVINGS):
+        middle, _ = _advance(path, start, (short + long_) / 2)
+        if middle is None:
+            break  # as at a branch, where the equations are singular
+        if middle.unstable == start.unstable:
+            low, short = middle, (short + long_) / 2
+        else:
+            high, long_ = middle, (short + long_) / 2
+    turns = low.rise * high.rise < 0
+    # the mode that changes: the last of the falling ones on the side with more of them
+    more = high if high.unstable > low.unstable else low
+    mode = more.modes[:, more.unstable - 1]
+    what = "limit point, the load turns" if turns else "branch point, buckles"
+    model = more.local.placement.model
+    words = mode_text(
+        platform_moves(more.local) @ mode, mode[model.springs], path.parts, model.size
+    )
+    moved = float(high.local.placement.platform_screw[path.component])
+    return Event(high.load, "critical", f"{what}: {words}", moved)
+
+
+def _curve(
+    path: _Path, posture: Posture, places: list[_Place], events: list[Event]
+) -> DeflectionCurve:
+    """What was met."""
     screws = np.array([p.local.placement.platform_screw for p in places])
     moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
     with np.errstate(divide="ignore"):
@@ -229,20 +291,5 @@ def _curve(path: _Path, posture: Posture, places: list[_Place]) -> DeflectionCur
         posture, path.component, np.array([p.load for p in places]), screws,
         np.array([energy_of(p.local.placement) for p in places]), slopes,
         (frozenset(),) * len(places), np.zeros(len(places), dtype=bool),
-        tuple(_limits(places)),
+        tuple(events),
     )  # fmt: skip
-
-
-def _limits(places: list[_Place]) -> list[Event]:
-    """Where the load turns, by the cubic through both sides."""
-    events = []
-    for one, other in zip(places, places[1:], strict=False):
-        if one.rise * other.rise < 0:
-            share = one.rise / (one.rise - other.rise)
-            # the load's slope falls linearly over the step: a parabola's top
-            step = 2 * (other.load - one.load) / (one.rise + other.rise)
-            top = one.load + one.rise * share * step / 2
-            if not np.isfinite(top) or step <= 0:
-                top = max((one.load, other.load), key=abs)
-            events.append(Event(float(top), "critical", "limit point: the load turns"))
-    return events

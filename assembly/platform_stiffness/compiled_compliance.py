@@ -41,18 +41,23 @@ def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
         pull: (np + 1, 6) the closures' wrench on each pattern, and the platform's.
         out: (ny,) to fill.
     """
+    wrench = vector(6)
+    last = -1
     for c in range(len(s.springs)):
         j = s.spring_frame[c]
-        total = 0.0
-        for axis in range(6):
-            weight = s.springs[c, axis]
-            if weight != 0.0:
+        if j != last:
+            # through the frame, in its axes: the same for all its springs
+            for axis in range(6):
                 work = 0.0
                 for a in range(6):
                     through = pull[s.pattern_of[j], a]
                     through += s.on_path[j] * pull[len(pull) - 1, a]
                     work += P[j, axis, a] * through
-                total += weight * work
+                wrench[axis] = work
+            last = j
+        total = 0.0
+        for axis in range(6):
+            total += s.springs[c, axis] * wrench[axis]
         out[c] = total
 
 

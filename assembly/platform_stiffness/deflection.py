@@ -8,7 +8,7 @@ potential passes zero, the equilibrium is lost or branches: a critical load; whe
 lost, the platform jumps to another.  These loads are bracketed by bisection.
 
 The load is what is prescribed: of a path that turns back, only what is stable from one
-side is met, and the jump past the rest is named.
+side is met, and the jump past the rest is named.  :mod:`.arc_length` follows the rest.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import contacts, in_contact
-from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, numbers, short_repr
 
@@ -43,11 +43,13 @@ class Event:
         load: [N or N m] at which, or right after which.
         kind: ``"contact"``, ``"release"``, ``"critical"`` or ``"jump"``.
         what: in words: which clearances, which mode, how far.
+        deflection: [rad or m] of the platform there, along the load's component.
     """
 
     load: float
     kind: str
     what: str
+    deflection: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +214,7 @@ def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[
             ("release", low.pressed - high.pressed),
         )
         events = [
-            Event(high.load, kind, ", ".join(sorted(names)))
+            _event(high, kind, ", ".join(sorted(names)), component)
             for kind, names in changes
             if names
         ]
@@ -221,15 +223,22 @@ def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[
     if before.tangent.stable != after.tangent.stable:
         stable = before.tangent.stable
         low, high = _bracket(before, after, at, lambda p: p.tangent.stable == stable)
-        events.append(Event(high.load, "critical", _mode(high if stable else low)))
+        mode = _mode(high if stable else low)
+        events.append(_event(high, "critical", mode, component))
     elif not events and _jumps(before, after, component):
         low, high = _bracket(
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
         if _jumps(low, high, component):  # else it was but soft on the way
             way = numbers(high.answer.platform_screw - low.answer.platform_screw)
-            events.append(Event(high.load, "jump", f"by {way} rad, m"))
+            events.append(_event(high, "jump", f"by {way} rad, m", component))
     return events
+
+
+def _event(point: _Point, kind: str, what: str, component: int) -> Event:
+    """What happens at a point."""
+    moved = float(point.answer.platform_screw[component])
+    return Event(point.load, kind, what, moved)
 
 
 def _bracket(
@@ -266,10 +275,28 @@ def _mode(point: _Point) -> str:
     """The motion of negative stiffness, by the platform and the part that bends."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
-    screw = tangent.root[:, soft] / np.linalg.norm(
-        tangent.root[:, soft] * np.repeat([tangent.length, 1.0], 3)
+    return "buckles: " + mode_text(
+        tangent.root[:, soft], tangent.springs[:, soft], tangent.parts, tangent.length
     )
-    bent = tangent.springs[:, soft] ** 2
-    part = tangent.parts[int(bent.argmax())]
-    way = numbers(np.where(np.abs(screw) > 1e-6, screw, 0.0))
-    return f"buckles: platform along {way} rad, m; most in {part.frame} {part.kind}"
+
+
+def mode_text(
+    screw: NDArray, springs: NDArray, parts: Sequence[Part], length: float
+) -> str:
+    """A mode in words: how the platform moves, and what bends most.
+
+    Args:
+        screw: (6,) [rad, m] of the platform, of any size.
+        springs: (m,) [sqrt(2 J)] their deformation.
+        parts: (m,) whose springs they are.
+        length: [m] by which rotations are multiplied to be compared.
+
+    Returns:
+        The screw of unit size, if the platform moves, and the part.
+    """
+    bent = np.square(springs)
+    part = parts[int(bent.argmax())]
+    scale = np.repeat([length, 1.0], 3)
+    size = np.linalg.norm(screw * scale)
+    way = np.where(np.abs(screw) * scale > 1e-6 * size, screw / (size or 1.0), 0.0)
+    return f"platform along {numbers(way)} rad, m; most in {part.frame} {part.kind}"

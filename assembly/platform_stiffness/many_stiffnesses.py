@@ -138,7 +138,8 @@ def platform_stiffnesses(
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
     alone = np.setdiff1d(np.arange(springs.shape[1]), structure.spring_order)
-    springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
+    if alone.size:
+        springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
     for i in np.flatnonzero(road != SOLVED).tolist():
         q = np.full(len(robot.frames), np.nan)
         one = without_clearance(Posture(robot, q, T[i], float(off[i])))

@@ -25,7 +25,7 @@ from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture
-from assembly.model.robot import BeamLink, Frame, beam_axis
+from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
 from forcefit.inputs.display import html_table, short_repr
@@ -95,10 +95,7 @@ def natural_modes(
     D, H = tangent_space(answer.expansion)
     M = D.T @ mass_matrix(answer) @ D
     if not np.trace(M) > 0.0:
-        raise BadInput(
-            f'{posture.robot.name}: found no mass that moves; expected "density" of '
-            'beams or "mass" of frames'
-        )
+        raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M)
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(answer.expansion) @ D
@@ -111,6 +108,25 @@ def natural_modes(
         posture, frequencies, platform_moves(answer.expansion) @ x,
         tuple(_shares(part_owners(answer), y) for y in bent.T), idle,
     )  # fmt: skip
+
+
+def check_masses(robot: Robot) -> None:
+    """Refuse a robot none of whose bodies has a mass.
+
+    Raises:
+        BadInput: it has none.
+    """
+    beams = (f.link for f in robot.frames if isinstance(f.link, BeamLink))
+    if not any(f.mass for f in robot.frames) and not any(b.density for b in beams):
+        raise BadInput(_no_mass(robot))
+
+
+def _no_mass(robot: Robot) -> str:
+    """What a robot without masses is refused with."""
+    return (
+        f'{robot.name}: found no mass that moves; expected "density" of beams or '
+        '"mass" of frames'
+    )
 
 
 def _without_idle(
@@ -221,11 +237,17 @@ def _beam_mass(frame: Frame) -> NDArray:
     for rows, size in (((3, 9), mass), ((0, 6), turning)):
         M[np.ix_(rows, rows)] += size / 6 * np.array([[2, 1], [1, 2]])
     a, b, c, d = 22 * length, 13 * length, 4 * length**2, 3 * length**2
-    for plane, sign in (((4, 2, 10, 8), 1), ((5, 1, 11, 7), -1)):
+    e, f, g = 3 * length, 4 * length**2, length**2
+    bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
+    for plane, sign, second in bends:
         # a turn about y lowers what lies ahead along x
         s = np.array([1, sign, 1, sign])
-        block = np.array([
+        shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]
         ])  # fmt: skip
-        M[np.ix_(plane, plane)] += mass / 420 * block * np.outer(s, s)
+        turn = np.array([
+            [36, e, -36, e], [e, f, -e, -g], [-36, -e, 36, -e], [e, -g, -e, f]
+        ])  # fmt: skip
+        block = mass / 420 * shift + link.density * second / (30 * length) * turn
+        M[np.ix_(plane, plane)] += block * np.outer(s, s)
     return M

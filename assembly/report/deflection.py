@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import DeflectionCurve, load_deflection
 from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
@@ -29,6 +30,7 @@ def deflection_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     exact: bool = False,
+    follow: bool = False,
 ) -> dict[str, Any]:
     """Everything ``assembly deflection`` reports, as plain values.
 
@@ -39,16 +41,24 @@ def deflection_of(
         load: (6,) [N m, N] the rest of the load.
         gravity: (3,) [m/s^2] base axes.
         exact: whether with finite motions.
+        follow: whether past limit points, by arc length, from the first to the last
+            load; finite motions, clearances held at zero.
 
     Returns:
         Curve and events; ``status`` is ``"ok"``, or says why there is none.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "along": WRENCH[component].lower(), "exact": exact,
+        "along": WRENCH[component].lower(), "exact": exact or follow,
+        "followed": follow,
     }  # fmt: skip
     try:
-        curve = load_deflection(posture, component, loads, load, gravity, exact)
+        if follow:
+            curve = follow_load(
+                posture, component, loads[0], loads[-1], load, gravity, len(loads) - 1
+            )
+        else:
+            curve = load_deflection(posture, component, loads, load, gravity, exact)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     return results | _curve_values(curve)
@@ -112,10 +122,8 @@ def plot_deflection(results: dict[str, Any]) -> "Figure":
     axes = figure.subplots()
     moved, loads = 1e3 * np.asarray(results["deflection"]), results["loads"]
     axes.plot(moved, loads, ".-")
-    order = np.argsort(loads, kind="stable")
     for event in results["events"]:
-        at = np.interp(event["load"], np.asarray(loads)[order], moved[order])
-        axes.plot([at], [event["load"]], "x", color="black")
+        axes.plot([1e3 * event["deflection"]], [event["load"]], "x", color="black")
     axes.set_xlabel(f"{SCREW[component]} [{'mrad' if turns else 'mm'}]")
     axes.set_ylabel(f"{results['along']} [{'N m' if turns else 'N'}]")
     axes.set_title(plot_label(str(results["robot"])))

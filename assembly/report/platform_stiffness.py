@@ -38,6 +38,7 @@ def stiffness_of(
     at: ArrayLike = (0.0, 0.0, 0.0),
     exact: bool = False,
     length: float | None = None,
+    direction: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Everything ``assembly stiffness`` reports, as plain values.
 
@@ -49,6 +50,7 @@ def stiffness_of(
         exact: whether the tangent is that of the exact equilibrium, else the classical
             model's, and beside it that of problem (22) if the robot has clearances.
         length: [m] by which rotations are multiplied; the longest body if absent.
+        direction: (6,) unit, base axes: stiffness and shares along it.
 
     Returns:
         The keys of the public format; ``status`` is ``"ok"``, ``"free motion"``, or
@@ -72,6 +74,8 @@ def stiffness_of(
         point = platform[:3, 3] + platform[:3, :3] @ np.asarray(at, dtype=float)
         values = [stiffness_values(side, point, length) for side in sides]
         results |= values[0] | {"status": _status(sides[0])}
+        if direction is not None:
+            results["direction"] = _along(sides[0].at(point, length), direction)
         if exact:
             results["letting_go"] = values[1] if len(values) > 1 else None
         elif virtual_clearances(posture):
@@ -79,6 +83,16 @@ def stiffness_of(
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         results |= {"status": failure_status(error), "reason": str(error)}
     return results
+
+
+def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
+    """Stiffness and shares along a turn or a shift."""
+    way = np.asarray(direction, dtype=float)
+    free, blocked = answer.along(way)
+    return {
+        "direction": way, "free": free, "blocked": blocked,
+        "shares": _share_values(answer, way),
+    }  # fmt: skip
 
 
 def virtual_clearances(posture: Posture) -> bool:
@@ -194,6 +208,8 @@ def stiffness_text(results: dict[str, Any]) -> str:
         lines.append("unstable: this equilibrium has a direction of negative stiffness")
     lines += _state_lines(results)
     lines += _share_lines(results["shares"])
+    if "direction" in results:
+        lines += _direction_lines(results["direction"])
     for side in results.get("in_contact", ()):
         lines += ["", f"with clearances, {side['contacts']} pressed, {side['side']}:"]
         lines += _state_lines(side)
@@ -245,6 +261,21 @@ def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
         )
         lines.append(f"{name:{width}s}" + "".join(cells))
     return lines
+
+
+def _direction_lines(along: dict[str, Any]) -> list[str]:
+    """Stiffness along a direction, and the parts that give way most."""
+    parts = sorted(
+        (-share, f"{frame} {kind}")
+        for kind, word in _KINDS.items()
+        for frame, share in along["shares"].get(word, {}).items()
+    )
+    most = ", ".join(f"{name} {-100 * share:.3g} %" for share, name in parts[:3])
+    unit = "N m/rad" if np.any(along["direction"][:3]) else "N/m"
+    return [
+        f"along {numbers(along['direction'])}: {along['free']:.5g} {unit}, all else "
+        f"held {along['blocked']:.5g} {unit}; {most}"
+    ]
 
 
 def _largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:

@@ -20,6 +20,7 @@ from assembly.statistics.clearance_positions import (
     position_clearances,
 )
 from assembly.statistics.quantities import POSE_ERRORS
+from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
@@ -41,6 +42,8 @@ class Experiment:
         stress: whether the stress of the links is computed.
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
+        stiffness: state of the platform's stiffness, one of
+            :data:`assembly.statistics.stiffness_spread.STATES`; empty for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
             upper minus lower bound; inf for one that is not needed.
     """
@@ -53,6 +56,7 @@ class Experiment:
     stress: bool = True
     load: tuple[float, ...] | None = None
     gravity: tuple[float, ...] | None = None
+    stiffness: str = ""
     precision: tuple[float, float] = PRECISION
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -100,6 +104,8 @@ class Experiment:
         if self.clearance_model == "worst":
             shapes |= {f"{name}_lower": () for name in POSE_ERRORS}
         shapes |= dict.fromkeys(self.zones, ())
+        if self.stiffness:
+            shapes["stiffness"] = (6,)
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
         flags = ["play_mixed"] if self.clearance_model == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
@@ -168,6 +174,10 @@ class Experiment:
             rows["stress"] = peak_stresses(self.posture.robot, wrenches)
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
+        if self.stiffness:
+            rows["stiffness"] = draw_stiffnesses(
+                self.posture, errors, self.stiffness, self.load, self.gravity
+            )
         return rows
 
 

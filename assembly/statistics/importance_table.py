@@ -87,7 +87,9 @@ def importance_rows(
     Returns:
         (count,) of the experiment's record type.
     """
-    asked = replace(experiment, clearance_model=importance_clearance_model(experiment))
+    asked = replace(
+        experiment, clearance_model=importance_clearance_model(experiment), stiffness=""
+    )
     evaluated = asked.evaluate(design.rows(first, count), range(count))
     rows = np.zeros(count, dtype=experiment.record_type)
     for name in evaluated.dtype.names or ():

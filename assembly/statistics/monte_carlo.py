@@ -32,12 +32,13 @@ from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.sweep import journal_path
-from stiffness.screws import SCREW
+from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
     import xarray
 
 BLOCK = 1024  # draws solved and journalled together
+_UNITS = UNITS | {"stiffness": "N m/rad, N/m"}  # by axis: no limit is one number
 _QUEUED = 4  # blocks submitted ahead for each thread
 
 
@@ -176,6 +177,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "gravity": " ".join(map(repr, experiment.gravity or ())),
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
+        **({"stiffness": experiment.stiffness} if experiment.stiffness else {}),
     }
 
 
@@ -191,7 +193,8 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     """
     import xarray
 
-    dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link")}
+    dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link"),
+            "stiffness": ("draw", "wrench_component")}  # fmt: skip
     meanings = MEANINGS | {
         k: f"{MEANINGS[k]}; {CLEARANCE_MODELS[experiment.clearance_model]}"
         for k in POSE_ERRORS
@@ -202,7 +205,7 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     variables = {
         name: (
             dims.get(name, ("draw",)), rows[name],
-            {"units": UNITS.get(name, "1"), "long_name": meanings[name]},
+            {"units": _UNITS.get(name, "1"), "long_name": meanings[name]},
         )
         for name in rows.dtype.names or ()
     }  # fmt: skip
@@ -210,6 +213,8 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         "draw": np.arange(len(rows)), "screw": list(SCREW),
         "link": list(experiment.links), "source": list(experiment.sources.labels),
     }  # fmt: skip
+    if experiment.stiffness:
+        labels["wrench_component"] = list(WRENCH)
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
     return xarray.Dataset(variables, labels, provenance(experiment) | at)

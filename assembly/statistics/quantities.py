@@ -22,6 +22,7 @@ MEANINGS = {
     "force": "largest force through any body",
     "moment": "largest moment through any body",
     "stress": "largest von Mises stress in the link",
+    "stiffness": "of the platform along each axis, the others free; 0 where free",
     "play_mixed": "1 where the walk that settles the clearances met its criterion",
     "status": "0 solved, 1 no answer",
 }

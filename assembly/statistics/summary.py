@@ -22,6 +22,10 @@ from assembly.statistics.estimates import (
 )
 from assembly.statistics.importance_table import importance_report, importance_text
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.statistics.stiffness_spread import (
+    stiffness_report,
+    stiffness_spread_text,
+)
 from forcefit.inputs.table import BadInput
 
 if TYPE_CHECKING:
@@ -97,6 +101,10 @@ def summarise(
     if strength is not None:
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
         report["safety"] = strength / np.maximum(largest, 1e-300)
+    if "stiffness" in data:
+        report["stiffness"] = stiffness_report(
+            data["stiffness"].values[solved], str(data.attrs["stiffness"]), level
+        )
     if "total_index" in data:
         report["importance"] = importance_report(data)
     return report
@@ -207,6 +215,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         f"{_quantiles_text(results['all_draws']['quantiles'])}"
         for key, results in summary["quantities"].items() if "all_draws" in results
     ]  # fmt: skip
+    if "stiffness" in summary:
+        lines.append(stiffness_spread_text(summary["stiffness"]))
     if "importance" in summary:
         lines.append(importance_text(summary["importance"]))
     return "\n".join(lines)

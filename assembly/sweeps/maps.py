@@ -36,6 +36,8 @@ _STIFFNESS = (
     ("stiffness_condition", 1.0, "condition of the stiffness [-]", "magma_r"),
 )
 
+_FREQUENCY = ("lowest", 1.0, "lowest natural frequency [Hz]", "viridis")
+
 Panel = tuple[str, float, str, str]
 
 
@@ -239,6 +241,8 @@ def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     if "rotation_error_play" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
+    if "frequency" in data:
+        middle = (_FREQUENCY, middle[1 if "eigen_stiffness" not in data else 0])
     return (*_PAPER[:2], *middle, _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
 
 
@@ -246,6 +250,8 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
     """A variable; for pose errors the upper bound, or else half the platform screw."""
     if key == "softest":
         return data["eigen_stiffness"].isel(eigen=0, drop=True)
+    if key == "lowest":
+        return data["frequency"].isel(mode=0, drop=True)
     halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
     if key not in halves:
         return data[key].sel(bound="upper", drop=True) if "play" in key else data[key]

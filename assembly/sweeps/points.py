@@ -26,6 +26,7 @@ from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.point_conditions import (
     assemble_rows,
@@ -232,6 +233,8 @@ def _solve_reached(
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
         _record_stiffness(robot, T, mismatch, solved, rows)
+    if question.frequencies:
+        _record_frequencies(question.frequencies, robot, conditions, solved, rows)
     if question.linearisation:
         for i in ok:
             _compare_finite(conditions, i, solved, int(rows[i]))
@@ -305,6 +308,24 @@ def _record_stiffness(
         out["eigen_stiffness"][rows[run]] = stiffnesses.eigen_stiffnesses[i]
         out["stiffness_condition"][rows[run]] = stiffnesses.condition[i]
         out["share"][rows[run]] = shares[i]
+
+
+def _record_frequencies(
+    count: int, robot: Robot, conditions: Conditions, solved: SolvedPoints,
+    rows: NDArray,
+) -> None:  # fmt: skip
+    """Natural frequencies once a posture, as K_C; NaN beyond the modes there are."""
+    T = conditions.transforms
+    for run in _runs(T.reshape(len(T), -1)):
+        i = run.start
+        there = Posture(
+            robot, conditions.coordinates[i], T[i], float(conditions.mismatch[i])
+        )
+        try:
+            found = natural_modes(there, count).frequencies
+        except BadInput:
+            continue  # what has a mass does not move there
+        solved.records["frequency"][rows[run], : len(found)] = found
 
 
 def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:

@@ -49,6 +49,7 @@ class Question:
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
         stiffness: also K_C, clearances held at zero, and the shares of its parts.
+        frequencies: how many natural frequencies, of the same K_C and declared masses.
     """
 
     robot: Robot
@@ -67,6 +68,7 @@ class Question:
     gravity: tuple[float, ...] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: bool = False
+    frequencies: int = 0
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -146,6 +148,11 @@ def variables(question: Question) -> dict[str, Variable]:
         table["safety"] = Variable({}, "1", "yield strength over the largest stress")
     if question.stiffness:
         table |= _stiffness_variables(question.robot)
+    if question.frequencies:
+        modes = tuple(str(k + 1) for k in range(question.frequencies))
+        table["frequency"] = Variable(
+            {"mode": modes}, "Hz", "natural, lowest first, drives held"
+        )
     if question.linearisation:
         for part, unit in (("rotation", "rad"), ("translation", "m")):
             table[f"linearisation_{part}"] = Variable(

@@ -14,6 +14,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
+from assembly.platform_stiffness.vibration import check_masses
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     import xarray
 
     from assembly.model.error_distributions import ErrorSources
+
+_MODES = 100  # natural frequencies at most
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class SweepOptions:
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
         stiffness: also K_C and the shares of its parts, clearances held at zero.
+        frequencies: how many natural frequencies.
     """
 
     grid: str | None = None
@@ -74,6 +78,7 @@ class SweepOptions:
     gravity: Sequence[float] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: bool = False
+    frequencies: int | None = None
 
 
 def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
@@ -113,6 +118,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         gravity=tuple(options.gravity),
         under=dict(options.under),
         stiffness=options.stiffness,
+        frequencies=options.frequencies or 0,
     )
     _check_readings(question)
     command = _command(robot, options)
@@ -139,6 +145,12 @@ def _check(options: SweepOptions, machine: Robot) -> None:
                 f"--yield-strength: no link of {machine.name} has a shape from which "
                 "its stress follows"
             )
+    if options.frequencies is not None:
+        if not 1 <= options.frequencies <= _MODES:
+            raise BadInput(
+                f"--frequencies: found {options.frequencies}, expected 1 to {_MODES}"
+            )
+        check_masses(machine)
 
 
 def _sources(

@@ -42,6 +42,14 @@ def deflection(
     back: Annotated[
         bool, typer.Option("--back", help="Also back to the first load.")
     ] = False,
+    follow: Annotated[
+        bool,
+        typer.Option(
+            "--follow",
+            help="By arc length past limit points, stable or not; finite motions, "
+            "clearances held at zero.",
+        ),
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Plot the curve.")
     ] = None,
@@ -57,15 +65,20 @@ def deflection(
         plot_deflection,
     )
 
+    if follow and back:
+        raise BadInput("--follow: not with --back; the path turns by itself")
     if output is not None:
         check_writable(output, PICTURE)
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
-    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=exact or follow
+    )
     with one_thread():
         results = deflection_of(
-            applied.posture, component, loads, applied.load, applied.gravity, exact
-        )
+            applied.posture, component, loads, applied.load, applied.gravity, exact,
+            follow,
+        )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(deflection_text(results))

@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     UnderOption,
     declared_under,
     parse_assignments,
+    parse_direction,
     parse_point,
 )
 from forcefit.commands.progress import one_thread
@@ -35,6 +36,10 @@ def stiffness(
     at: Annotated[
         str | None,
         typer.Option(help="Point of the platform, in its axes [m], such as 0,0,-0.1."),
+    ] = None,
+    direction: Annotated[
+        list[str] | None,
+        typer.Option(help="Such as tx=1,tz=-1: stiffness and shares along it."),
     ] = None,
     exact: Annotated[
         bool,
@@ -69,11 +74,13 @@ def stiffness(
     if length is not None:
         checked("--length", length, "m", above=0)
     point = parse_point(at, "--at")
+    way = parse_direction(direction)
     applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
     with one_thread():
         results = stiffness_of(
-            applied.posture, applied.load, applied.gravity, point, exact, length
-        )
+            applied.posture, applied.load, applied.gravity, point, exact, length,
+            way,
+        )  # fmt: skip
         if by:
             results["slopes"] = _slopes(robot, by, pose, joint, point)
     write_json(results, json)

@@ -62,6 +62,13 @@ def statistics(
     margins: Annotated[
         bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
     ] = True,
+    stiffness: Annotated[
+        str | None,
+        typer.Option(
+            help="Spread of the platform's stiffness: contact (clearances pressed or "
+            "free) | exact (internal forces too)."
+        ),
+    ] = None,
     confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
     workers: Annotated[int, typer.Option(help="Threads.", min=1)] = 1,
     output: Annotated[
@@ -88,6 +95,8 @@ def statistics(
 
     _check_clearance_model(play)
     _check_word("--by", by, ("source", "frame", "kind"))
+    if stiffness is not None:
+        _check_word("--stiffness", stiffness, ("contact", "exact"))
     if not 0 < confidence < 1:
         raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
@@ -103,7 +112,7 @@ def statistics(
     experiment = Experiment(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
-        precision=precision_for(limits),
+        stiffness=stiffness or "", precision=precision_for(limits),
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
     options = None

@@ -70,6 +70,9 @@ def sweep(
         bool,
         typer.Option("--stiffness", help="K_C, and which part gives way."),
     ] = False,
+    frequencies: Annotated[
+        int | None, typer.Option(help="Natural frequencies, so many.")
+    ] = None,
     near: Annotated[
         float, typer.Option(help="Distance below which a singularity is named.")
     ] = 0.02,
@@ -122,6 +125,7 @@ def sweep(
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
+                frequencies=frequencies,
             ),
         )  # fmt: skip
         if figure is not None:

@@ -241,14 +241,18 @@ def validity(
         assumption_costs,
         costs_table,
         costs_text,
+        stiffness_cost,
     )
+    from validation.assumptions.platform_cost import PlatformCost
     from validation.assumptions.validity import Cost
 
     posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     costs = assumption_costs(posture, wrench, g, solids)
-    write_json(costs_table(posture, costs), json)
+    platform = stiffness_cost(posture, solids)
+    write_json(costs_table(posture, costs, platform), json)
     if json != "-":
-        print(costs_text(posture, costs))
-    if not any(isinstance(cost, Cost) for cost in costs.values()):
+        print(costs_text(posture, costs, platform))
+    known = any(isinstance(cost, Cost) for cost in costs.values())
+    if not known and not isinstance(platform, PlatformCost):
         raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""All four assumptions of ``validity.py`` at one posture, as a table."""
+"""All assumptions of ``validity.py`` at one posture, as a table."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,6 +12,13 @@ from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, beam_axis
 from assembly.solvers.conic import SolverFailed
+from validation.assumptions.platform_cost import (
+    NoSolids,
+    PlatformCost,
+    platform_cost,
+    platform_cost_table,
+    platform_cost_text,
+)
 from validation.assumptions.round_bars import bar_compliance, bar_stiffness
 from validation.assumptions.validity import (
     ENERGY_LIMIT,
@@ -20,11 +27,13 @@ from validation.assumptions.validity import (
     bush_cost,
     closure_cost,
     link_cost,
+    pieces_cost,
     spread_cost,
 )
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import without_clearance
 
+_NOT_MESHED = "not meshed; --solids does, in minutes"
 NOTHING = "nothing to compare: without errors and load neither model moves"
 
 
@@ -34,7 +43,7 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Costs of all four assumptions at one posture.
+    """Costs of all assumptions at one posture.
 
     Closures are compared without clearances, where the pose is unique.
 
@@ -53,6 +62,7 @@ def assumption_costs(
         "beams, not solids": lambda: _solid_cost(posture, load, solids),
         "weight at the links' ends": lambda: _weight_cost(posture, gravity, load),
         "disc and cone, not two bushes": lambda: bush_cost(posture, load),
+        "one spring a beam": lambda: _pieces_cost(tight, load, gravity),
     }
     costs: dict[str, Cost | str] = {}
     for name, compute in computed.items():
@@ -66,6 +76,17 @@ def assumption_costs(
 
 class _NotApplicable(Exception):
     """An assumption that the robot does not make, or that is not computed."""
+
+
+def _pieces_cost(
+    posture: Posture, load: ArrayLike | None, gravity: ArrayLike | None
+) -> Cost:
+    """Of beams that are one spring."""
+    if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
+        raise _NotApplicable("no beam")
+    if load is None and gravity is None and not posture.robot.errors.any():
+        raise _NotApplicable(NOTHING)
+    return pieces_cost(posture, load, gravity)
 
 
 def _weight_cost(
@@ -86,7 +107,7 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
         if not isinstance(link, BeamLink) or set(link.section) != {"radius"}:
             continue
         if not solids:
-            raise _NotApplicable("not meshed; --solids does, in minutes")
+            raise _NotApplicable(_NOT_MESHED)
         key = (beam_axis(frame)[0] / link.section["radius"], link.poisson)
         key = (round(key[0], 6), key[1])
         if key not in compliances:
@@ -97,20 +118,52 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
     return link_cost(posture, stiffness, load)
 
 
-def costs_table(posture: Posture, costs: Mapping[str, Cost | str]) -> dict[str, Any]:
+def stiffness_cost(posture: Posture, solids: bool = False) -> PlatformCost | str:
+    """What links as beams, acting at their ends, cost the platform's stiffness.
+
+    Args:
+        posture: where the robot stands.
+        solids: whether links are meshed.
+
+    Returns:
+        The cost, or why it is not known.
+
+    Raises:
+        BadInput: a link cannot be meshed.
+    """
+    if not solids:
+        return _NOT_MESHED
+    try:
+        return platform_cost(posture)
+    except (FreeMotion, NoSolids) as error:
+        return str(error)
+
+
+def costs_table(
+    posture: Posture, costs: Mapping[str, Cost | str], platform: PlatformCost | str
+) -> dict[str, Any]:
     """Costs for machines: [rad], [m], [-]; where not known, the reason."""
     rows: dict[str, dict[str, Any]] = {}
     for name, cost in costs.items():
         if isinstance(cost, Cost):
-            rows[name] = {**vars(cost), "matters": cost.matters}
+            values = {k: v for k, v in vars(cost).items() if v is not None}
+            rows[name] = {**values, "matters": cost.matters}
         else:
             rows[name] = {"reason": cost}
     limits = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
     robot = posture.robot.name
-    return {"robot": robot, "pose": posture.pose(), "limits": limits, "costs": rows}
+    stiffness: dict[str, Any] = {"reason": platform}
+    if isinstance(platform, PlatformCost):
+        stiffness = platform_cost_table(platform)
+    return {
+        "robot": robot, "pose": posture.pose(), "limits": limits, "costs": rows,
+        "platform": stiffness,
+    }  # fmt: skip
 
 
-def costs_text(posture: Posture, costs: Mapping[str, Cost | str]) -> str:
+def costs_text(
+    posture: Posture, costs: Mapping[str, Cost | str], platform: PlatformCost | str
+) -> str:
     """Costs for people, one line each."""
     lines = [f"{posture.robot.name}: what assumptions cost"]
     for name, cost in costs.items():
@@ -121,7 +174,12 @@ def costs_text(posture: Posture, costs: Mapping[str, Cost | str]) -> str:
         lines.append(
             f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
             f"urad  {_energy_text(cost.energy)}{mark}"
+            + (f"; {cost.pieces} pieces leave less" if mark and cost.pieces else "")
         )
+    if isinstance(platform, PlatformCost):
+        lines.append(platform_cost_text(platform))
+    else:
+        lines.append(f"{'stiffness by solids':>30}: {platform}")
     return "\n".join(lines)
 
 

@@ -1,6 +1,6 @@
 """The error of each assumption of the virtual-joint model at a posture.
 
-Four assumptions, each against a model without it, all else being equal:
+Five assumptions, each against a model without it, all else being equal:
 
 ==================  ==================================================================
 assumption          instead of
@@ -9,6 +9,7 @@ linear closures     closures that hold with finite motions, :mod:`assembly.exact
 beams               solids with held ends, by finite elements
 loads at the ends   a weight spread over its link
 disc and cone       a pin in two bushes, :mod:`validation.assumptions.bushes`
+one spring a beam   the same beam in ever more pieces, finite motions
 ==================  ==================================================================
 
 A cost is a difference of the platform's pose and a relative difference of the energy.
@@ -29,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly, solve_assembly
-from assembly.model.robot import MatrixLink
+from assembly.model.robot import BeamLink, MatrixLink
 from validation.assumptions.bushes import solve_bushes
 from validation.crosscheck.limits import FLOOR, HALVES, energy_floor
 from validation.crosscheck.spread_weight import energy_between_ends
@@ -46,11 +47,14 @@ class Cost:
         rotation: [rad] by which the platform's orientation is off.
         position: [m] by which its origin is off.
         energy: [-] by which the elastic energy is off, relative to the better model's.
+        pieces: of every beam with which less than the limits is left, where pieces are
+            what is compared.
     """
 
     rotation: float
     position: float
     energy: float
+    pieces: int | None = None
 
     @property
     def matters(self) -> bool:
@@ -176,3 +180,46 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
         SolverFailed: no solution was found.
     """
     return cost_between(solve_assembly(posture, load), solve_bushes(posture, load))
+
+
+def pieces_cost(
+    posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
+) -> Cost:
+    """What it costs that a beam is one spring at any deformation.
+
+    The error of n pieces falls as 1 / n^2 (``docs/proofs.md``): one and two pieces tell
+    what none would leave, and how many leave less than the limits.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        The cost, with the pieces that every beam needs.
+
+    Raises:
+        CannotAssemble: it cannot be assembled.
+        SolverFailed: no solution was found.
+    """
+    one, two = (
+        solve_exact(_in_pieces(posture, count), load, gravity=gravity)
+        for count in (1, 2)
+    )
+    off = 4 / 3 * (one.platform_screw - two.platform_screw)
+    energy = one.energy + 4 / 3 * (two.energy - one.energy)
+    stored = max(one.energy, energy) > energy_floor(posture.robot)
+    relative = abs(one.energy - energy) / energy if stored else math.nan
+    turn, shift = (float(np.linalg.norm(off[half])) for half in HALVES.values())
+    worst = max(shift / POSITION_LIMIT, relative / ENERGY_LIMIT if stored else 0.0)
+    return Cost(turn, shift, relative, max(1, math.ceil(math.sqrt(worst))))
+
+
+def _in_pieces(posture: Posture, count: int) -> Posture:
+    """The same with every beam cut."""
+    links = {
+        frame.name: replace(frame.link, pieces=count)
+        for frame in posture.robot.frames
+        if isinstance(frame.link, BeamLink)
+    }
+    return replace(posture, robot=posture.robot.with_links({**links}))

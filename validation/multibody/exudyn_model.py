@@ -154,11 +154,27 @@ class Model:
         return Contact(place, spring.far, clearance)
 
     def add_beam(
-        self, base: Place, length: float, K: NDArray, elements: int
-    ) -> tuple[tuple[int, ...], tuple[Place, ...]]:
-        """Elements along the base's x, clamped there, and their ends."""
+        self, base: Place, length: float, K: NDArray, elements: int,
+        inertia: NDArray,
+    ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
+        """Elements along the base's x, clamped there, and their ends.
+
+        Args:
+            base: where it begins.
+            length: [m].
+            K: (6, 6) [N, N m^2] of the section.
+            elements: number of them.
+            inertia: (3,) mass [kg/m] and its second moments about y and z [kg m], of
+                use to vibrations alone.
+
+        Returns:
+            The elements' numbers, and the places between them.
+        """
         section = self.exu.BeamSection()
         section.stiffnessMatrix = K
+        mass, about_y, about_z = inertia
+        section.massPerLength = mass
+        section.inertia = np.diag([about_y + about_z, about_y, about_z])
         step = length / elements
         bodies = [self.add_spring(base, np.diag([np.inf] * 6)).far]
         parts = []

@@ -216,7 +216,10 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
     axes = matrix(beam_axes(x, link.up), np.zeros(3))
     base = place.moved(axes @ shifted([-length, 0.0, 0.0]))
     K = element_stiffness(link, length / elements)
-    parts, nodes = model.add_beam(base, length, K, elements)
+    section = declared_section(link.section, link.poisson)
+    sizes = np.array([section.area, section.I_y, section.I_z])
+    inertia = (link.density or 0.0) * sizes
+    parts, nodes = model.add_beam(base, length, K, elements, inertia)
     return Elastic(place, nodes[-1].moved(inverse(axes)), parts, True, nodes)
 
 

@@ -42,7 +42,8 @@ from validation.multibody.exudyn_reading import (
     wrench,
 )
 from validation.multibody.exudyn_solver import largest_gap, solve
-from validation.multibody.motion import turn_of
+from validation.multibody.exudyn_vibration import natural_frequencies, set_masses
+from validation.multibody.motion import shifted, turn_of
 from validation.multibody.open_robot import Case, PostureLike, Tree, build, link_springs
 
 LINKS = ("beam", "spring")
@@ -223,6 +224,47 @@ def _simulate(
         tree = build(model, case)
         solve(model, tree.closures, narrow=bool(tree.contacts))
         return _read(model, robot, tree, started)
+    finally:
+        model.discard()
+
+
+def simulated_frequencies(
+    posture: PostureLike, count: int = 6, elements: int = 8
+) -> NDArray:
+    """Natural frequencies of a robot in Exudyn, drives held, as it stands nominally.
+
+    Args:
+        posture: as in :func:`simulate_assembly`; links with a section are beams with
+            consistent masses, the others must be given by a matrix and have none.
+        count: how many at most.
+        elements: of each beam.
+
+    Returns:
+        (k,) [Hz] lowest first; free motions are held by 1e-6 N m/rad or N/m.
+
+    Raises:
+        BadInput: a link's stiffness is not known.
+        SimulationFailed: no equilibrium was found.
+    """
+    robot = without_clearance(posture.robot)
+    robot = robot.with_errors(np.zeros_like(robot.errors))
+    posture = replace(posture, robot=robot)  # type: ignore[type-var]
+    case = Case(
+        posture=posture, scale=0.0, springs=link_springs(robot, "beam", {}, {}),
+        meshes={}, elements=elements, clearances=False, bushes=False,
+        load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
+    )  # fmt: skip
+    model = Model(*_import_exudyn(), robot.name, _TIGHT[0])
+    model.deadline = time.monotonic() + TIME_LIMIT
+    try:
+        tree = build(model, case)
+        bodies = {
+            f.name: (tree.bodies[f.name].moved(shifted(f.centre_of_mass)), f.mass)
+            for f in robot.frames
+        }
+        solve(model, tree.closures)
+        set_masses(model, list(bodies.values()))
+        return natural_frequencies(model)[:count]
     finally:
         model.discard()
 

@@ -4,6 +4,8 @@ Sources:
     Dowell, Traybar (1975), the Princeton beam; values after Obrezkov et al., Nonlinear
     Dynamics (2022), ANSYS beam elements and solids.
     Bathe, Bolourchi (1979), the curved cantilever; values of kynema, 12 nodes.
+    Wang, Sprague, Jonkman et al., Wind Energy 20 (2017), twisted and composite beams by
+    Legendre spectral elements; values of kynema, 12 and more nodes.
     Nachbagauer, Pechstein, Irschik, Gerstmayr (2011), the plane cantilever.
     Bauchau et al., Multibody System Dynamics 37 (2016), the four-bar with a tilted
     hinge; quasi-static, by Exudyn's geometrically exact beams, 64 elements a bar.
@@ -19,10 +21,12 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.pieces import cut_beams
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
+from benchmarks.princeton_solids import in_pieces, root_link
+from stiffness.screws import screw_map
 from validation.multibody.simulation import simulate_assembly
 
 ANGLES = np.radians([0, 15, 30, 45, 60, 75, 90])
@@ -132,6 +136,24 @@ def test_the_princeton_beam_bends_as_ansys_beams_do(force):
     assert linear / across[-1] - 1 == pytest.approx(off, abs=0.006)
 
 
+# [m] of a solid with large rotations: python -m benchmarks.princeton_solids
+SOLID = {
+    (8.896, 15): (0.0106000, 0.0419811), (8.896, 45): (0.0088268, 0.1087360),
+    (13.345, 45): (0.0151716, 0.1561285), (13.345, 75): (0.0062418, 0.1956991),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_root_that_cannot_warp_makes_the_princeton_beam_a_solid():
+    """8 pieces: 0.6 %; without it 1.5 % along the height, where twist counts most."""
+    root = root_link()
+    for (force, degrees), solid in SOLID.items():
+        moved = in_pieces(force, np.radians(degrees), root)
+        np.testing.assert_allclose(moved, solid, rtol=0.006)
+    free = in_pieces(13.345, np.radians(75))
+    assert free[0] / SOLID[13.345, 75][0] - 1 == pytest.approx(0.015, abs=0.001)
+
+
 def curved_cantilever(chords, pieces):
     """45 degrees of a circle of 100 in in chords, EI = GJ, clamped along x."""
     section = {"area": 1.0, "I_y": 1 / 12, "I_z": 1 / 12, "J": 1 / 6,
@@ -167,6 +189,66 @@ def test_a_curved_cantilever_bends_as_geometrically_exact_beams():
     tips = [tip_moved(curved_cantilever(8, n), ACROSS) for n in (2, 4)]
     tip = (4 * tips[1] - tips[0]) / 3
     np.testing.assert_allclose(tip, simulated.platform_screw[3:], rtol=1e-4)
+
+
+def test_the_curved_cantilever_s_error_falls_with_the_square_of_the_chords():
+    tips = [tip_moved(curved_cantilever(n, 1), ACROSS) for n in (8, 16, 32)]
+    off = [np.linalg.norm(one - two) for one, two in zip(tips, tips[1:], strict=False)]
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.03)
+
+
+def twisted_beam(count):
+    """10 m along x, its section turned by 90 degrees from root to tip, in pieces."""
+    E, nu = 200e9, 0.3
+    G = E / (2 * (1 + nu))
+    shear = 8.2604167e9 / (G * 0.125)
+    section = {"area": 0.125, "I_y": 5.20833e8 / E, "I_z": 1.30208333e8 / E,
+               "J": 1.41872656e8 / G, "shear_y": shear, "shear_z": shear}  # fmt: skip
+    frames = []
+    for k in range(count):
+        turn = np.pi / 2 * (k + 0.5) / count
+        link = BeamLink(section, E, nu, up=(0, -np.sin(turn), np.cos(turn)))
+        parent = frames[-1].name if frames else "base"
+        frames.append(Frame(f"f{k}", parent, [10 / count, 0, 0], link=link))
+    return home_posture(Robot("twisted", frames[-1].name, tuple(frames)))
+
+
+def test_a_twisted_beam_bends_as_published():
+    """Six digits once extrapolated; the published solid is 0.2 to 0.6 % off both."""
+    load = [0, 0, 0, 0, 0, -4e6]
+    tips = [tip_moved(twisted_beam(n), load) for n in (8, 16, 32)]
+    rate = np.linalg.norm(tips[0] - tips[1]) / np.linalg.norm(tips[1] - tips[2])
+    assert rate == pytest.approx(4.0, rel=0.02)
+    tip = (4 * tips[2] - tips[1]) / 3
+    np.testing.assert_allclose(tip, [-1.141526, -1.718053, -3.593213], rtol=3e-6)
+    np.testing.assert_allclose(tip, [-1.134192, -1.714467, -3.58423], rtol=7e-3)
+
+
+def composite_beam(count):
+    """10 in along x whose section couples twist and bending; each piece its K_E."""
+    section = np.diag([0.0, 0, 0, 1368.17e3, 88.56e3, 38.78e3])
+    section[:3, :3] = [
+        [16.96e3, 17.61e3, -0.351e3], [17.61e3, 59.12e3, -0.37e3],
+        [-0.351e3, -0.37e3, 141.47e3],
+    ]  # fmt: skip
+    length, C = 10 / count, np.zeros((6, 6))
+    for place, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True):
+        # of what is strained at s, the tip sees the motion at a distance length - s
+        to_tip = screw_map([-length * (1 - place) / 2, 0, 0])
+        C += weight * length / 2 * to_tip @ np.linalg.inv(section) @ to_tip.T
+    link = MatrixLink(np.linalg.inv((C + C.T) / 2))
+    frames = tuple(
+        Frame(f"f{k}", f"f{k - 1}" if k else "base", [length, 0, 0], link=link)
+        for k in range(count)
+    )
+    return home_posture(Robot("composite", frames[-1].name, frames))
+
+
+def test_a_composite_beam_bends_and_twists_as_published():
+    """150 lb across; six digits once extrapolated."""
+    tips = [tip_moved(composite_beam(n), [0, 0, 0, 0, 0, 150.0]) for n in (16, 32)]
+    published = [-9.02726627566e-2, -6.47488486259e-2, 1.22973648292]
+    np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, rtol=1e-6)
 
 
 def test_a_plane_cantilever_bends_as_published():

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
 from assembly.platform_stiffness.arc_length import follow_load
 from tests.assembly.platform_stiffness.test_deflection import FY, shallow_arch
 
@@ -22,6 +24,21 @@ def test_the_whole_path_of_a_shallow_arch():
     assert heights.min() < -0.1  # past both limit points
     assert (np.diff(heights) < 0).all()
     first, second = curve.events
-    assert -first.load == pytest.approx(limit, rel=2e-2)
-    assert -second.load == pytest.approx(-limit, rel=2e-2)
+    assert -first.load == pytest.approx(limit, rel=1e-9)
+    assert -second.load == pytest.approx(-limit, rel=1e-9)
+    assert {event.kind for event in curve.events} == {"critical"}
+    assert all(event.what.startswith("limit point") for event in curve.events)
     assert (curve.stiffness[np.abs(heights) < 0.03] < 0).all()
+
+
+def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
+    """A straight rigid bar stays an equilibrium; from k / L on it could also buckle."""
+    K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
+    bar = Frame("bar", "hinge", [0.4, 0, 0])
+    curve = follow_load(home_posture(Robot("bar", "bar", (hinge, bar))), 3, 0.0, -200.0)
+    (event,) = curve.events
+    assert -event.load == pytest.approx(50.0 / 0.4, rel=1e-5)
+    assert event.what.startswith("branch point, buckles: platform along [0 0 1.768 0 ")
+    assert event.what.endswith("most in hinge joint")
+    assert np.abs(curve.screws).max() < 1e-12

@@ -15,6 +15,7 @@ from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.robots.hexapod import HexapodParameters, hexapod, points
+from benchmarks.stiffness_random_robots import by_differences
 from stiffness.screws import screw_map
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
@@ -177,6 +178,17 @@ def test_the_tangent_of_random_robots_is_the_difference_of_their_equilibria(seed
     assert finite.any()
     part = np.ix_(finite, finite)
     assert_same_matrix(answer.compliance[part], by_load[part], 1e-4)
+
+
+@pytest.mark.parametrize("seed", [12, 42, 65])
+def test_the_tangent_holds_where_moments_act_on_a_platform_turned_by_a_radian(seed):
+    """Differences extrapolated to step zero; second derivatives are exact there too."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=int(rng.integers(1, 4)))
+    posture = home_posture(robot)
+    load = rng.normal(size=6) * [1, 1, 1, 20, 20, 20]
+    assert np.linalg.norm(solve_exact(posture, load).platform_screw[:3]) > 0.5
+    assert by_differences(posture, load)[0] < 1e-8
 
 
 def test_read_at_another_point_power_is_the_same():

@@ -4,6 +4,9 @@ import json
 
 import pytest
 
+from assembly.files.robot_file import write_robot
+from tests.assembly.platform_stiffness.test_deflection import shallow_arch
+
 
 def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
     picture = tmp_path / "curve.svg"
@@ -31,6 +34,33 @@ def test_back_is_the_same_way_where_nothing_is_lost(run):
     assert answer["loads"] == [100.0, 200.0, 300.0, 200.0, 100.0]
     there = answer["deflection"]
     assert there[0] == pytest.approx(there[4], rel=1e-6)
+
+
+def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
+    """Von Mises' truss: up to the limit, back through flat, and down."""
+    column = tmp_path / "arch.toml"
+    write_robot(shallow_arch().robot, column)
+    picture = tmp_path / "path.svg"
+    status, out, _ = run(
+        "assembly", "deflection", str(column), "--along", "fy=0:-300:15", "--follow",
+        "--json", "-", "-o", str(picture),
+    )  # fmt: skip
+    answer = json.loads(out)
+    assert status == 0
+    first, second = answer["events"]
+    assert first["what"].startswith("limit point, the load turns: platform along")
+    assert first["load"] == pytest.approx(-second["load"], rel=1e-6)
+    assert min(answer["deflection"]) < -0.2
+    assert picture.stat().st_size > 1000
+
+
+def test_a_followed_path_turns_by_itself(run):
+    status, _, err = run(
+        "assembly", "deflection", "four_bar", "--along", "fx=0:1:1", "--follow",
+        "--back",
+    )  # fmt: skip
+    assert status == 2
+    assert "--follow: not with --back" in err
 
 
 @pytest.mark.parametrize(

@@ -81,3 +81,53 @@ def test_the_chart_is_written(run, tmp_path):
     assert picture.stat().st_size > 1000
     assert "stiffness exact" in out
     assert status in {0, 1}
+
+
+def test_a_direction_has_its_stiffness_and_shares(run):
+    """Along fz it is what stands there already; of any length it is the same."""
+    status, out, _ = run(
+        "assembly", "stiffness", "orthoglide", "--direction", "tz=-2", "--json", "-"
+    )
+    answer = json.loads(out)
+    assert status == 0
+    along = answer["direction"]
+    assert along["direction"] == [0, 0, 0, 0, 0, -1]
+    assert along["free"] == pytest.approx(answer["along"]["tz"]["free"])
+    assert along["blocked"] == pytest.approx(answer["along"]["tz"]["blocked"])
+    assert along["shares"] == answer["shares"]["tz"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--direction", "tx=0"], "--direction: expected components of a translation"),
+        (["--direction", "tx=nan"], "--direction tx: found nan"),
+        (["--at", "1,2"], "--at: found '1,2', expected three numbers"),
+        (["--length", "0"], "--length: found 0, expected a finite number > 0"),
+        (["--load", "fz=nan"], "--load fz: found nan, expected a finite number"),
+        (["--pose", "tz=-9"], "cannot be reached"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(run, words, message):
+    status, out, err = run("assembly", "stiffness", "delta", *words)
+    assert status == 2
+    assert out == ""
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
+    status, out, _ = run(
+        "assembly",
+        "stiffness",
+        "four_bar",
+        "--exact",
+        "--load",
+        "fx=1e9",
+        "--json",
+        "-",
+    )
+    answer = json.loads(out)
+    assert status == 1
+    assert answer["status"] == "solver failed"
+    assert "out of balance" in answer["reason"]

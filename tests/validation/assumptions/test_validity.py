@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from assembly.exact.exact import solve_exact
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import virtual_joints
@@ -27,6 +28,7 @@ from validation.assumptions.validity import (
     bush_cost,
     closure_cost,
     link_cost,
+    pieces_cost,
     spread_cost,
 )
 from validation.crosscheck.spread_weight import energy_between_ends
@@ -290,3 +292,26 @@ def test_all_assumptions_are_known_where_they_mean_something(posture, monkeypatc
     assert all(isinstance(cost, Cost) for cost in costs.values())
     # the built-in robot's beams are Euler's; shear is what the stand-in adds
     assert 0 < costs["beams, not solids"].energy < 0.1
+
+
+def test_a_beam_needs_the_pieces_that_leave_20_um():
+    """A moment M rolls a beam up to a circle: what one spring is off is known.
+
+    Its tip at L (sin a / a - 1, (1 - cos a) / a), a = M L / EI; one spring turns by a
+    too, but lies on its chord.  Pieces asked for leave less, half of them more.
+    """
+    length, stiffness, angle = 1.0, 1e3, 0.2
+    link = BeamLink({"width": 0.1, "height": 0.1}, 1.2e5 * stiffness, 0.0,
+                    theory="euler")  # fmt: skip
+    load = [0, 0, angle * stiffness / length, 0, 0, 0]
+    exact = length * np.array([np.sin(angle) / angle - 1, (1 - np.cos(angle)) / angle])
+
+    def off(count):
+        cut = cantilever(replace(link, pieces=count), length)
+        return np.linalg.norm(solve_exact(cut, load).platform_screw[3:5] - exact)
+
+    cost = pieces_cost(cantilever(link, length), load)
+    assert cost.position == pytest.approx(off(1), rel=0.01)
+    assert cost.pieces > 4
+    assert off(cost.pieces) < 20e-6 < off(cost.pieces // 2)
+    assert pieces_cost(cantilever(link, length), np.multiply(load, 1e-4)).pieces == 1

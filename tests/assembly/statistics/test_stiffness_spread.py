@@ -1,0 +1,99 @@
+"""The spread of the platform's stiffness over draws of the errors."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.stiffness_spread import draw_stiffnesses, stiffness_report
+
+ERRORS = """
+[[errors]]
+frames = ["link_a", "link_b"]
+most = [2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4]
+"""
+
+
+def spring(row, stiffness):
+    K = np.diag([np.inf] * 6)
+    K[row, row] = stiffness
+    return K
+
+
+def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
+    """Two springs k that a gap e forces together through a play c: 2 k if e > c, or k.
+
+    With e < c the platform hangs on its own spring alone: the other is within its play.
+    """
+    k, c = 1e5, 1e-4
+    frames = (
+        Frame("one", joint_stiffness=spring(3, k)),
+        Frame("platform", "one"),
+        Frame("two", joint_stiffness=spring(3, k)),
+        Frame("bush", "two", clearance=Clearance(radial=0.0, axial=c, tilt=0.0),
+              rotation=[0, np.pi / 2, 0]),
+        Frame("end", "bush", rotation=[0, -np.pi / 2, 0]),
+    )  # fmt: skip
+    robot = Robot("bush", "platform", frames, (("platform", "end"),))
+    errors = np.zeros((2, 5, 6))
+    errors[:, 4, 3] = 2 * c, 0.5 * c
+    spread = draw_stiffnesses(home_posture(robot), errors, "contact")
+    np.testing.assert_allclose(spread[:, 3], [2 * k, k], rtol=1e-9)
+
+
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_a_draw_s_stiffness_is_that_of_its_robot(state):
+    robot = load_robot("irsbot2")
+    posture = place_robot(robot, {"tx": 0.1, "tz": -0.5})
+    sources = tolerance_sources(robot, [2e-2] * 3 + [2e-4] * 3)
+    load = (0.0, 0.0, 0.0, 0.0, 0.0, -100.0)
+    experiment = Experiment(
+        posture, sources, 3, "least", margins=False, load=load, stiffness=state
+    )
+    data = run_draws(experiment, 2)
+    values = sources.errors(sources.draw(0, 2, 3))
+    names = {"contact": "in contact", "exact": "exact"}
+    for found, errors in zip(data["stiffness"].values, values, strict=True):
+        forced = replace(posture, robot=robot.with_errors(errors))
+        tangent = platform_stiffness(forced, names[state], load)
+        expected = [tangent.along(axis)[0] for axis in np.eye(6)]
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert np.ptp(data["stiffness"].values, axis=0).min() > 0.0
+
+
+def test_the_report_tells_free_draws_from_stiff_ones():
+    values = np.full((10, 6), 2e6)
+    values[:4, 5], values[4, 5] = 0.0, np.nan
+    report = stiffness_report(values, "contact", 0.95)["axes"]
+    assert report["fz"]["draws"] == 9
+    assert report["fz"]["free"]["probability"] == pytest.approx(4 / 9)
+    assert report["fz"]["mean"]["value"] == report["fx"]["mean"]["value"] == 2e6
+
+
+def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
+    errors = tmp_path / "errors.toml"
+    errors.write_text(ERRORS)
+    words = ["assembly", "statistics", "irsbot2", "--errors", str(errors), "--pose",
+             "tx=0.1,tz=-0.5", "--draws", "20", "--no-margins", "--play", "least",
+             "--stiffness"]  # fmt: skip
+    file = tmp_path / "draws.nc"
+    status, out, _ = run(*words, "contact", "-o", str(file), "--json", "-")
+    axes = json.loads(out)["stiffness"]["axes"]
+    assert status == 0
+    assert set(axes) == {"mx", "my", "mz", "fx", "fy", "fz"}
+    with xarray.open_dataset(file, engine="h5netcdf") as data:
+        half = np.quantile(data["stiffness"].values[:, 5], 0.5)
+    quantiles = axes["fz"]["quantiles"]
+    assert quantiles["0.05"]["value"] <= half <= quantiles["0.95"]["value"]
+    status, out, err = run(*words, "linear")
+    assert status == 2
+    assert '--stiffness: found "linear"' in err

@@ -1,0 +1,233 @@
+r"""What links as beams, and links that act at ends, cost the platform's stiffness.
+
+Four models of one robot, clearances at zero, without errors:
+
+==============  ==================================================================
+model           its links
+==============  ==================================================================
+beams           virtual joints with the K_E that the robot declares
+meshed          virtual joints with K_E by finite elements, ends held rigidly
+solids          the finite elements themselves, both ends free to move: the
+                displacement method over all bodies, without virtual joints
+spread          virtual joints with K_E of the same mesh, wrenches spread over ends
+==============  ==================================================================
+
+Meshed and solids must agree to rounding: condensation leaves nothing out where joints
+are rigid at their ends.  Spread against meshed is what that assumption is worth: real
+seats lie between the two.  A difference is the largest relative one of the compliance
+along any wrench, which depends on no choice of point or length.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import virtual_joints
+from assembly.linear.reduction import FreeMotion
+from assembly.model.robot import BeamLink, MatrixLink, Robot
+from assembly.platform_stiffness.linear_tangent import without_clearance
+from forcefit.inputs.display import numbers
+from stiffness.screws import screw_map
+from validation.assumptions.solid_links import SolidLink, solid_link
+
+_NAMED = 3  # links that people are told
+_RANK = 1e-9  # of the largest singular value: less counts as zero
+
+
+class NoSolids(Exception):
+    """No link of the robot has a shape that could be meshed."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformCost:
+    """Relative errors of the platform's compliance.
+
+    Attributes:
+        beams: [-] of beams against solids.
+        meshed: [-] of meshed K_E against solids: rounding.
+        ends: [-] of rigid ends against wrenches spread over them.
+        by_link: [-] of each link alone a beam, against all as solids, largest first.
+        left: links without a shape, the same in all models.
+    """
+
+    beams: float
+    meshed: float
+    ends: float
+    by_link: Mapping[str, float]
+    left: tuple[str, ...]
+
+
+def platform_cost(posture: Posture) -> PlatformCost:
+    """Compare the platform's stiffness by beams and by solids.
+
+    Args:
+        posture: where the robot stands.
+
+    Returns:
+        The differences.
+
+    Raises:
+        BadInput: a link cannot be meshed.
+        FreeMotion: a motion of the platform is resisted by nothing.
+        NoSolids: no link has a shape.
+    """
+    robot = posture.robot
+    solids = {f.name: solid_link(f) for f in robot.frames if f.link is not None}
+    known = {name: solid for name, solid in solids.items() if solid is not None}
+    if not known:
+        raise NoSolids("no link has a shape that could be meshed")
+    answer = without_clearance(posture)
+    if answer.free.shape[1]:
+        screw = numbers(answer.free[:, 0])
+        raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
+    meshed = {name: solid.condensed for name, solid in known.items()}
+    true = solid_compliance(posture, known)
+    by_link = {
+        name: difference(
+            _compliance(posture, {k: K for k, K in meshed.items() if k != name}), true
+        )
+        for name in known
+        if isinstance(robot.frames[robot.index(name)].link, BeamLink)
+    }
+    condensed = _compliance(posture, meshed)
+    spread = _compliance(posture, {name: s.spread for name, s in known.items()})
+    return PlatformCost(
+        difference(answer.compliance, true), difference(condensed, true),
+        difference(condensed, spread),
+        dict(sorted(by_link.items(), key=lambda item: -item[1])),
+        tuple(name for name in solids if name not in known),
+    )  # fmt: skip
+
+
+def _compliance(posture: Posture, stiffness: Mapping[str, NDArray]) -> NDArray:
+    """(6, 6) by virtual joints, some links with another K_E."""
+    links = {name: MatrixLink(K) for name, K in stiffness.items()}
+    other = replace(posture, robot=posture.robot.with_links({**links}))
+    return without_clearance(other).compliance
+
+
+def difference(C: NDArray, other: NDArray) -> float:
+    """Largest relative difference of two compliances along any wrench.
+
+    Args:
+        C: (6, 6) symmetric, positive semidefinite.
+        other: (6, 6) the one that counts as right.
+
+    Returns:
+        [-] the largest of abs(w.C w / w.C_other w - 1).
+    """
+    size = np.sqrt(np.diag(other))
+    size = np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(other / np.outer(size, size))
+    kept = values > _RANK * values.max()
+    way = vectors[:, kept] / np.sqrt(values[kept])
+    ratio = way.T @ (C / np.outer(size, size)) @ way
+    return float(np.abs(np.linalg.eigvalsh(ratio) - 1.0).max(initial=0.0))
+
+
+def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
+    """The platform's compliance with links as solids, by the displacement method.
+
+    Unknowns are the motions of every link's end against its base, of joints' springs
+    and of free joints; a solid's energy is that of both its ends' motions in space.
+
+    Args:
+        posture: where the robot stands; clearances are held at zero.
+        solids: by frame; other links are springs with their K_E.
+
+    Returns:
+        (6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes.
+    """
+    robot, T = posture.robot, posture.transforms
+    joints, count = virtual_joints(robot), len(robot.frames)
+    origin = posture.platform[:3, 3]
+    to_origin = screw_map(T[:, :3, 3] - origin, T[:, :3, :3])
+    rows = [robot.index(name) for name in solids]
+    other = np.ones(joints.elastic.shape[1], dtype=bool)
+    owner = np.abs(joints.elastic).argmax(axis=0) // 6
+    other[joints.links & np.isin(owner, rows)] = False
+    # [springs that are none of the solids', free joints, motions of the solids' ends]
+    columns = np.hstack([joints.elastic[:, other], joints.free])
+    steps = columns.reshape(count, 6, columns.shape[1])
+    first = steps.shape[2]
+    steps = np.concatenate([steps, np.zeros((count, 6, 6 * len(rows)))], axis=2)
+    for k, i in enumerate(rows):
+        steps[i, :, first + 6 * k : first + 6 * k + 6] = np.eye(6)
+    steps = to_origin @ steps
+    ends, bases = np.zeros_like(steps), np.zeros_like(steps)
+    for i, parent in enumerate(robot.parents):
+        if parent >= 0:
+            bases[i] = ends[parent]
+        ends[i] = bases[i] + steps[i]
+    K = np.zeros((steps.shape[2],) * 2)
+    springs = int(other.sum())
+    K[:springs, :springs] = np.eye(springs)
+    for i, solid in zip(rows, solids.values(), strict=True):
+        # of a solid's frame its own joint's motion comes after its end
+        own = steps[i].copy()
+        own[:, :first] = 0.0
+        turn = T[i, :3, :3] @ solid.turn
+        tip = T[i, :3, 3] - origin
+        both = np.vstack([
+            np.linalg.inv(screw_map(place, turn)) @ motion
+            for place, motion in (
+                (tip - turn @ solid.span, bases[i]), (tip, bases[i] + own)
+            )
+        ])  # fmt: skip
+        K += both.T @ solid.ends @ both
+    return _loaded(K, _closed(robot, ends), ends[robot.index(robot.platform)])
+
+
+def _closed(robot: Robot, ends: NDArray) -> NDArray:
+    """Motions that keep the closures, as orthonormal columns."""
+    pairs = [
+        ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
+    ]
+    if not pairs:
+        return np.eye(ends.shape[2])
+    rows = np.vstack(pairs)
+    size = np.linalg.norm(rows, axis=0)
+    size[size == 0.0] = 1.0
+    _, S, Vt = np.linalg.svd(rows / size)
+    rank = int(np.sum(S > _RANK * S.max(initial=0.0)))
+    return Vt[rank:].T / size[:, None]
+
+
+def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
+    """(6, 6) motions of the platform under unit wrenches, those that cost left out."""
+    H, moved = basis.T @ K @ basis, platform @ basis
+    size = np.sqrt(np.diag(H))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(H / np.outer(size, size))
+    kept = values > 1e-13 * values.max()
+    root = (moved / size) @ vectors[:, kept] / np.sqrt(values[kept])
+    return root @ root.T
+
+
+def platform_cost_table(cost: PlatformCost) -> dict[str, Any]:
+    """For machines: [-], largest along any wrench."""
+    return {
+        "compliance": {
+            "beams": cost.beams, "meshed": cost.meshed, "ends": cost.ends,
+        },
+        "by_link": dict(cost.by_link), "without_shape": list(cost.left),
+    }  # fmt: skip
+
+
+def platform_cost_text(cost: PlatformCost) -> str:
+    """For people."""
+    lines = [
+        "compliance of the platform, largest difference along any wrench:",
+        f"{'beams, not solids':>30}: {100 * cost.beams:8.3g} %",
+        f"{'meshed K_E, not solids':>30}: {100 * cost.meshed:8.3g} %",
+        f"{'rigid ends, not spread':>30}: {100 * cost.ends:8.3g} %",
+    ]
+    for name, share in list(cost.by_link.items())[:_NAMED]:
+        lines.append(f"{name + ' alone a beam':>30}: {100 * share:8.3g} %")
+    if cost.left:
+        lines.append(f"without a shape, as declared: {', '.join(cost.left)}")
+    return "\n".join(lines)

@@ -1,0 +1,61 @@
+"""Small vibrations of an Exudyn model about its equilibrium.
+
+Exudyn linearises the model and projects it onto the motions that its joints leave.  Of
+the bodies only those that were given a mass have one, so that the mass matrix is
+singular: what follows without inertia is condensed, not an infinite frequency.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import Place
+
+_SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
+_NOTHING = 1e-12  # of the largest: no inertia
+
+
+def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:
+    """Give the model's rigid bodies point masses in place of those it was built with.
+
+    Args:
+        model: solved.
+        bodies: where each is, and [kg].
+    """
+    for item in range(model.mbs.systemData.NumberOfObjects()):
+        if model.mbs.GetObject(item)["objectType"] == "RigidBody":
+            _set_mass(model, item, [(p, m) for p, m in bodies if m and p.body == item])
+
+
+def _set_mass(model: Model, body: int, points: list[tuple[Place, float]]) -> None:
+    """Mass, centre and inertia about its reference point of one body."""
+    mass = sum(m for _, m in points)
+    centres = np.array([p.local[:3, 3] for p, _ in points]).reshape(-1, 3)
+    masses = np.array([m for _, m in points])
+    inertia = np.zeros((3, 3))
+    for m, c in zip(masses, centres, strict=True):
+        inertia += m * (c @ c * np.eye(3) - np.outer(c, c))
+    centre = masses @ centres / mass if mass else np.zeros(3)
+    model.mbs.SetObjectParameter(body, "mass", mass)
+    model.mbs.SetObjectParameter(body, "centerOfMass", centre)
+    model.mbs.SetObjectParameter(body, "inertia", inertia[_SIX].tolist())
+
+
+def natural_frequencies(model: Model) -> NDArray:
+    """(k,) [Hz] of a solved model, lowest first.
+
+    Args:
+        model: in its equilibrium.
+
+    Returns:
+        As many as there are inertias.
+    """
+    M, K, *_ = model.mbs.ComputeLinearizedSystem(projectIntoConstraintNullspace=True)
+    M, K = (M + M.T) / 2, (K + K.T) / 2
+    shift = 1e-6 * np.trace(K) / np.trace(M)
+    values, vectors = np.linalg.eigh(K + shift * M)
+    kept = values > 1e-15 * values.max()
+    root = vectors[:, kept] / np.sqrt(values[kept])
+    inverse = np.linalg.eigvalsh(root.T @ M @ root)[::-1]
+    inverse = inverse[inverse > _NOTHING * inverse.max()]
+    return np.sqrt(np.maximum(1.0 / inverse - shift, 0.0)) / (2 * np.pi)
