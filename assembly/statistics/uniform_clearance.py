@@ -90,13 +90,13 @@ def _ellipsoid(
         H = (Z.T * (2.0 / slack[cone])) @ Z + (y.T * (4.0 / slack**2)) @ y
         try:
             step = np.linalg.solve(H, -g)
-            # M M^T = Z H^-1 Z^T
-            M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
+            decrement = np.sqrt(max(0.0, -float(g @ step)))
+            if rho == 1.0 and decrement < 1e-3:
+                # M M^T = Z H^-1 Z^T
+                M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
+                return u, np.ascontiguousarray(M)
         except np.linalg.LinAlgError:  # numerically empty interior
             return None
-        decrement = np.sqrt(max(0.0, -float(g @ step)))
-        if rho == 1.0 and decrement < 1e-3:
-            return u, np.ascontiguousarray(M)
         u += Z @ (step / (1.0 + decrement))
         if rho > 1.0 and decrement < 0.5:
             most = _largest(heads, u)
