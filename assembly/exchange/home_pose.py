@@ -12,7 +12,7 @@ from assembly.exchange.orientation import onto
 from assembly.exchange.tree import place_frames
 from assembly.model.robot import JOINTS
 from forcefit.inputs.errors import BadInput, quoted
-from stiffness.screws import rotation_vector, transform
+from stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] what a closed loop may leave open
 _SCREWED_TIGHT = 1e-14  # scaled residual at which nothing is left but rounding
@@ -216,13 +216,15 @@ class _Loops:
         p = before[:, :3, 3]
         z = before[:, :3, 2] * self.moving[:, None]
         turning = (self.kinds == 1)[:, None]
+        past_axes = np.cross(z, p)
         scale = np.array([1, 1, 1, *[1 / self.size] * 3])
         residuals, rows = [np.zeros(0)], [np.zeros((0, len(q)))]
         for *places, asked in self.ends:
             poses, moved = [], []
             for joint, place in places:
                 T = place if joint < 0 else after[joint] @ place
-                arm = np.where(turning, np.cross(z, T[:3, 3] - p), z)
+                # z x (origin of T - p)
+                arm = np.where(turning, z @ skew(T[:3, 3]) - past_axes, z)
                 screws = np.concatenate([z * turning, arm], axis=1)
                 poses.append(T)
                 moved.append(screws.T * self.carried[joint])
