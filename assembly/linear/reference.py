@@ -111,9 +111,12 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
         constraints += [c[tight, r] == 0 for r in rows if len(tight)]
         some = np.flatnonzero((bounds[:, k] > 0) & np.isfinite(bounds[:, k]))
         if len(some):
-            sizes = cp.norm(cp.vstack([c[some, r] for r in rows]), axis=0)
-            most = [bounds[j, k] * factor[j, k] for j in some]
-            constraints.append(sizes <= cp.hstack(most))
+            most = cp.hstack([bounds[j, k] * factor[j, k] for j in some])
+            parts = [c[some, r] for r in rows]
+            if len(parts) == 1:
+                constraints.append(cp.abs(parts[0]) <= most)
+            else:
+                constraints.append(cp.SOC(most, cp.vstack(parts), axis=0))
     return constraints
 
 

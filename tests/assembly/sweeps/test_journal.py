@@ -315,9 +315,12 @@ def start_command(folder, *words):
     """The command in a process group of its own, stopped once its journal has grown."""
     path = folder / "map.nc"
     errors = folder.parent / f"{folder.name}.txt"  # a pipe that nobody reads fills
-    with errors.open("w+") as stderr, subprocess.Popen(
-        [*COMMAND, "-o", path, *words], stderr=stderr, start_new_session=True
-    ) as process:
+    with (
+        errors.open("w+") as stderr,
+        subprocess.Popen(
+            [*COMMAND, "-o", path, *words], stderr=stderr, start_new_session=True
+        ) as process,
+    ):
         journal = journal_path(path)
         end = time.monotonic() + 120
         while not journal.exists() or journal.stat().st_size < 20_000:

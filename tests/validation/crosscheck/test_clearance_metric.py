@@ -297,7 +297,8 @@ def drawn(name, size, pose=None):
 
 @pytest.mark.parametrize(
     ("name", "size", "pose", "said"),
-    [("hexapod", 1.0, None, "no signal"), ("delta", 1.0, None, "no signal"),
+    [pytest.param("hexapod", 1.0, None, "no signal", marks=pytest.mark.slow),
+     ("delta", 1.0, None, "no signal"),
      ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed")],
 )  # fmt: skip
 def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
@@ -314,7 +315,8 @@ def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
 
 @pytest.mark.parametrize(
     ("name", "load"),
-    [("hexapod", [0, 0, 0, 0, 0, -200]), ("delta", [0, 0, 0, 0, 0, -50]),
+    [("hexapod", [0, 0, 0, 0, 0, -200]),
+     pytest.param("delta", [0, 0, 0, 0, 0, -50], marks=pytest.mark.slow),
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):
