@@ -200,21 +200,24 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
         ("validation diagnose --help", ("numpy", "scipy", "rich")),
         ("stiffness beam --length 1 --radius 0.1 --young 1e9 --poisson 0.3",
          ("numba", "scipy")),
-        ("assembly zone irsbot2", FOR_MANY),
-        ("assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
-        ("assembly error irsbot2", FOR_MANY),
+        ("assembly zone irsbot2; assembly error irsbot2; "
+         "assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
     ],
 )  # fmt: skip
 def test_a_command_imports_only_what_it_uses(words, left_out):
-    """What makes a command wait; benchmarks/startup.py has the times."""
+    """What makes a command wait; benchmarks/startup.py has the times.
+
+    Several in one process: what none of them is to import, none has.
+    """
     code = f"""
 import sys
 from forcefit.commands import app as command
-sys.argv = ["forcefit", *{words.split()}]
-try:
-    command.main()
-except SystemExit as done:
-    assert not done.code
+for words in {words.split(";")}:
+    sys.argv = ["forcefit", *words.split()]
+    try:
+        command.main()
+    except SystemExit as done:
+        assert not done.code
 """
     unwanted = {*HEAVY} - {"numba", "clarabel"} | {*left_out}
     assert sorted(unwanted & in_memory(code, ROOT)) == []

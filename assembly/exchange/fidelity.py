@@ -4,9 +4,9 @@ import numpy as np
 
 from assembly.exchange.as_robot import RobotAndMechanism
 from assembly.exchange.mechanism import body_poses
+from assembly.exchange.tree import place_frames
 from assembly.model.robot import BASE, JOINTS
 from forcefit.inputs.errors import BadInput
-from stiffness.screws import rotation_matrix, transform
 
 FAITHFUL = 1e-12  # [rad, lengths] largest difference of a body's pose
 _POSTURES = 100
@@ -27,8 +27,6 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     Raises:
         BadInput: one of the two has joints that the other lacks.
     """
-    from assembly.kinematics.compiled_continuation import forward
-
     robot, mechanism = placed.robot, placed.mechanism
     moving = [joint.name for joint in mechanism.joints if joint.kind != "fixed"]
     rows = {f.name: i for i, f in enumerate(robot.frames) if f.joint != "fixed"}
@@ -40,11 +38,8 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     for _ in range(_POSTURES):
         shift = random.uniform(-1, 1, len(robot.frames))
         q = np.where(kinds > 0, robot.positions + shift, 0.0)
-        R, p = forward(robot.parents, kinds, robot.fixed_transforms, q)
-        after = [_after(frame.joint, q[i]) for i, frame in enumerate(robot.frames)]
-        frames = {
-            f.name: transform(p[i], R[i]) @ after[i] for i, f in enumerate(robot.frames)
-        }
+        _, after = place_frames(robot.parents, kinds, robot.fixed_transforms, q)
+        frames = dict(zip((f.name for f in robot.frames), after, strict=True))
         given = [q[rows[j.name]] if j.name in rows else 0.0 for j in mechanism.joints]
         poses = body_poses(mechanism, np.array(given))
         reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
@@ -55,11 +50,3 @@ def largest_difference(placed: RobotAndMechanism) -> float:
             gap = (poses[name] - frames[frame] @ at)[:3] * scale
             worst = max(worst, float(np.abs(gap).max()))
     return worst
-
-
-def _after(joint: str, q: float) -> np.ndarray:
-    """(4, 4) motion of a frame's joint about or along z."""
-    along = np.array([0.0, 0.0, q])
-    if joint == "revolute":
-        return transform(np.zeros(3), rotation_matrix(along))
-    return transform(along if joint == "prismatic" else np.zeros(3), np.eye(3))

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.orientation import onto
+from assembly.exchange.tree import place_frames
 from assembly.model.robot import JOINTS
 from forcefit.inputs.errors import BadInput, quoted
-from stiffness.screws import rotation_vector, transform
+from stiffness.screws import rotation_vector, skew, transform
 
 CLOSED = 1e-10  # [rad, m] what a closed loop may leave open
 _SCREWED_TIGHT = 1e-14  # scaled residual at which nothing is left but rounding
@@ -210,19 +211,20 @@ class _Loops:
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """What is open, translations over the size, and its derivatives by q."""
-        from assembly.kinematics.compiled_continuation import forward
-
         parents, fixed, _ = self.tree
-        R, p = forward(parents, self.kinds, fixed, q)
-        z = R[:, :, 2] * self.moving[:, None]
+        before, after = place_frames(parents, self.kinds, fixed, q)
+        p = before[:, :3, 3]
+        z = before[:, :3, 2] * self.moving[:, None]
         turning = (self.kinds == 1)[:, None]
+        past_axes = np.cross(z, p)
         scale = np.array([1, 1, 1, *[1 / self.size] * 3])
         residuals, rows = [np.zeros(0)], [np.zeros((0, len(q)))]
         for *places, asked in self.ends:
             poses, moved = [], []
             for joint, place in places:
-                T = self._after(R, p, q, joint) @ place
-                arm = np.where(turning, np.cross(z, T[:3, 3] - p), z)
+                T = place if joint < 0 else after[joint] @ place
+                # z x (origin of T - p)
+                arm = np.where(turning, z @ skew(T[:3, 3]) - past_axes, z)
                 screws = np.concatenate([z * turning, arm], axis=1)
                 poses.append(T)
                 moved.append(screws.T * self.carried[joint])
@@ -232,14 +234,3 @@ class _Loops:
             residuals.append(r[asked])
             rows.append(((moved[0] - moved[1]) * scale[:, None])[asked])
         return np.concatenate(residuals), np.vstack(rows)
-
-    def _after(self, R: NDArray, p: NDArray, q: NDArray, joint: int) -> NDArray:
-        """(4, 4) what stands on a joint, after the joint's motion."""
-        if joint < 0:
-            return np.eye(4)
-        c, s = np.cos(q[joint]), np.sin(q[joint])
-        if self.kinds[joint] == 1:
-            turn = R[joint] @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
-            return transform(p[joint], turn)
-        slid = q[joint] if self.kinds[joint] == 2 else 0.0
-        return transform(p[joint] + slid * R[joint, :, 2], R[joint])

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
@@ -53,19 +54,14 @@ def reference_energy(
     constraints = _clearance_constraints(c, bounds, np.ones_like(bounds))
     errors = posture.robot.errors / _UNIT
     constraints += _assembly_constraints(posture, x_p, errors + c + e + b)
-    energies = []
+    energy: Any = cp.Constant(0.0)
     for screws, compliances in ((e, link_compliances), (b, joint_compliances)):
-        for j, C in enumerate(compliances(posture.robot)):
-            soft = np.flatnonzero(np.diag(C) > 0)
-            hard = np.setdiff1d(np.arange(6), soft)
-            if len(hard):
-                constraints.append(screws[j, hard] == 0)
-            if len(soft):
-                K = np.linalg.inv(C[np.ix_(soft, soft)])
-                root = np.linalg.cholesky(K).T * _UNIT
-                energies.append(cp.sum_squares(root @ screws[j, soft]) / 2)
+        C = np.array(compliances(posture.robot))
+        hard = np.diagonal(C, axis1=1, axis2=2) <= 0
+        constraints.append(screws[hard] == 0)
+        roots = [_root_of_stiffness(one) for one in C]
+        energy += cp.sum_squares(block_diag(*roots) @ cp.vec(screws, "C")) / 2
     work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
-    energy = sum(energies, start=cp.Constant(0.0))
     _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
@@ -95,29 +91,46 @@ def reference_margin(posture: Posture, compliant: Compliant = "rigid") -> float 
     return None if problem.status == "infeasible" else float(t.value)
 
 
+def _root_of_stiffness(C: NDArray) -> NDArray:
+    """(6, 6) R with R^T R the stiffness, zero in directions that do not yield."""
+    soft = np.flatnonzero(np.diag(C) > 0)
+    root = np.zeros((6, 6))
+    root[np.ix_(soft, soft)] = np.linalg.cholesky(
+        np.linalg.inv(C[np.ix_(soft, soft)])
+    ).T
+    return root * _UNIT
+
+
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
     """Eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
     import cvxpy as cp
 
     constraints = []
-    for j, row in enumerate(bounds):
-        for k, rows in enumerate(CONES):
-            part = cp.hstack([c[j, r] for r in rows])
-            if row[k] == 0:
-                constraints.append(part == 0)
-            elif np.isfinite(row[k]):
-                constraints.append(cp.norm(part) <= float(row[k]) * factor[j, k])
+    for k, rows in enumerate(CONES):
+        tight = np.flatnonzero(bounds[:, k] == 0)
+        constraints += [c[tight, r] == 0 for r in rows if len(tight)]
+        some = np.flatnonzero((bounds[:, k] > 0) & np.isfinite(bounds[:, k]))
+        if len(some):
+            most = cp.hstack([bounds[j, k] * factor[j, k] for j in some])
+            parts = [c[some, r] for r in rows]
+            if len(parts) == 1:
+                constraints.append(cp.abs(parts[0]) <= most)
+            else:
+                constraints.append(cp.SOC(most, cp.vstack(parts), axis=0))
     return constraints
 
 
 def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
     """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
+    import cvxpy as cp
+
     robot = posture.robot
+    stacked = cp.vec(screws, "C")
 
     def pose_error(name: str) -> Any:
         """Eq. (8): displacement of a frame by the screws along its path."""
-        path = np.flatnonzero(robot.on_path[robot.index(name)])
-        return sum(posture.paths[j] @ screws[j] for j in path)
+        on_path = robot.on_path[robot.index(name)]
+        return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
 
     closures = [pose_error(a) == pose_error(b) for a, b in robot.closures]
     return [x_p == pose_error(robot.platform), *closures]

@@ -44,7 +44,7 @@ def position_clearances(
         prepared: the posture.
         draws: of :meth:`~assembly.batch.many_draws.OnePosture.solve`, k draws.
         clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
-        generators: of random numbers, one for each draw.
+        generators: of random numbers, one for each draw; none for "least".
 
     Returns:
         (k, 6) [rad, m]; NaN where a draw has no solution in unit cones (the bound of a

@@ -156,7 +156,10 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            numbers = np.asarray(draws).tolist()
+            # the positions of "least" are not random, and generators are slow to make
+            numbers = (
+                np.asarray(draws).tolist() if self.clearance_model != "least" else []
+            )
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
                 self.energies, solved, self.clearance_model, rngs

@@ -144,9 +144,11 @@ class Screen:
             left.append(end)
         sign = np.full(len(left), -1.0)
         sign[0] = 1.0
-        G = self._gram[np.ix_(columns, columns)]
-        b = self._gram[np.ix_(columns, left)] @ sign
-        rest = float(sign @ self._gram[np.ix_(left, left)] @ sign)
+        # np.ix_ takes several times as long, and this is done thousands of times
+        rows = self._gram.take(columns, axis=0)
+        G = rows.take(columns, axis=1)
+        b = rows.take(left, axis=1) @ sign
+        rest = float(sign @ self._gram.take(left, axis=0).take(left, axis=1) @ sign)
         empty = np.zeros(0)
         lower = np.concatenate([empty, *(self._bounds[i][0] for i in members)])
         upper = np.concatenate([empty, *(self._bounds[i][1] for i in members)])
@@ -235,22 +237,20 @@ def _within(
     Returns:
         (k,) unknowns, and how many the equations can tell apart.
     """
-    held: dict[int, float] = {}
-    count = len(b)
+    if not len(b):
+        return np.zeros(0), 0
+    held = np.zeros(len(b), dtype=bool)
+    x, rank = _solve(G, b)
     while True:
-        free = [i for i in range(count) if i not in held]
-        x = np.zeros(count)
-        for i, value in held.items():
-            x[i] = value
-        rank = 0
-        if free:
-            right = b[free] - G[np.ix_(free, list(held))] @ x[list(held)]
-            x[free], rank = _solve(G[np.ix_(free, free)], right)
-        out = [i for i in free if not lower[i] <= x[i] <= upper[i]]
-        if not out:
-            return x, rank + len(held)
-        for i in out:
-            held[i] = lower[i] if x[i] < lower[i] else upper[i]
+        low, high = ~held & ~(x >= lower), ~held & ~(x <= upper)
+        if not (low | high).any():
+            return x, rank + int(held.sum())
+        held |= low | high
+        x = np.where(low, lower, np.where(high, upper, np.where(held, x, 0.0)))
+        free, rank = np.flatnonzero(~held), 0
+        if len(free):
+            rows = G.take(free, axis=0)
+            x[free], rank = _solve(rows.take(free, axis=1), b[free] - rows @ x)
 
 
 def _solve(G: NDArray, b: NDArray) -> tuple[NDArray, int]:

@@ -75,7 +75,9 @@ def small_reach(rng, cones, rows, flat):
     return ReachableSet(rng.normal(size=6) * 2e-3, X, H, start, group)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
+)
 @pytest.mark.parametrize("rows", [0, 2])
 def test_branch_and_bound_meets_outer_approximation(seed, rows):
     reach = small_reach(np.random.default_rng(seed), 5, rows, flat=False)

@@ -72,7 +72,9 @@ def test_a_simplex_like_section_of_a_cube_has_its_known_mean():
         assert stats.kstest(one, stats.beta(1, 2).cdf).pvalue > 1e-3
 
 
-@pytest.mark.parametrize("thin", [1e-1, 1e-3, 1e-5])
+@pytest.mark.parametrize(
+    "thin", [1e-1, pytest.param(1e-3, marks=pytest.mark.slow), 1e-5]
+)
 def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
     """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
     sides stay free.  A walk with steps alike in all directions would take 1 / thin^2 of
@@ -95,6 +97,7 @@ def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
     assert stats.kstest(share, "uniform").pvalue > 1e-3
 
 
+@pytest.mark.slow
 def test_a_thin_segment_between_long_sides_is_uniform_along_all():
     """u0 + u1 = 2 - 1e-4 leaves a segment; five sides of 2 stay beside it."""
     rows = [[1, 1, 0, 0, 0, 0, 0]]
@@ -168,12 +171,15 @@ def settle_longer(one, found, rng):
     return found.platform_screw[0] + to_screw @ (u - found.clearances[0][free])
 
 
+DRAWN = 200
+
+
 @pytest.fixture(scope="module")
 def drawn():
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
     one = prepare_energies(place_robot(robot))
-    errors = sources.errors(sources.draw(0, 600, seed=2))
+    errors = sources.errors(sources.draw(0, DRAWN, seed=2))
     return one, one.solve(errors)
 
 
@@ -184,7 +190,7 @@ def test_play_changes_neither_energy_nor_bounds(drawn, play):
     loaded = loaded_clearances(one, found)
     assert not loaded[found.energy < 1e-20].any()
     assert loaded[found.energy > 1e-8].any()
-    settled, mixed = position_clearances(one, found, play, generators(600))
+    settled, mixed = position_clearances(one, found, play, generators(DRAWN))
     assert mixed.all()
     assert np.isfinite(settled).all()
     assert np.abs(settled - found.platform_screw).max() > 1e-5
@@ -193,11 +199,11 @@ def test_play_changes_neither_energy_nor_bounds(drawn, play):
 @pytest.mark.slow
 def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
     one, found = drawn
-    push = np.array([rng.normal(size=6) for rng in generators(600)])
+    push = np.array([rng.normal(size=6) for rng in generators(DRAWN)])
     size = size_of(one.posture.robot)
     push[:, 3:] /= size
     at_contact, anywhere = (
-        position_clearances(one, found, play, generators(600))[0]
+        position_clearances(one, found, play, generators(DRAWN))[0]
         for play in ("contact", "uniform")
     )
     reach = (push * at_contact).sum(axis=1) - (push * anywhere).sum(axis=1)
@@ -207,4 +213,4 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
 def test_an_unknown_way_is_refused(drawn):
     one, found = drawn
     with pytest.raises(ValueError, match="play is 'most'"):
-        position_clearances(one, found, "most", generators(600))
+        position_clearances(one, found, "most", generators(DRAWN))

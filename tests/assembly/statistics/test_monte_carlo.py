@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -147,8 +146,8 @@ def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path
                        "--fresh", "100"],
     }[command]  # fmt: skip
     base = ["assembly", command, "irsbot2", *arguments]
-    done = run(*base, "-o", "whole.nc", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    subprocess.run([sys.executable, "-m", "forcefit", *base, "-o", "whole.nc"],
+                   cwd=tmp_path, capture_output=True, check=True)  # fmt: skip
     path, whole = tmp_path / "killed.nc", (tmp_path / "whole.nc").read_bytes()
     for wait in range(4, 90, 6):
         process = subprocess.Popen(
@@ -204,34 +203,27 @@ def test_limits_that_are_none_are_refused(text):
         parse_limit(text)
 
 
-def run(*arguments, folder):
-    return subprocess.run(
-        [sys.executable, "-m", "forcefit", *map(str, arguments)],
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-
-
-def test_the_commands_from_files_to_figures(tmp_path):
+def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(ERRORS)
     (tmp_path / "plan.toml").write_text(PLAN)
-    done = run(
+    status, out, _ = run(
         "assembly", "statistics", "irsbot2", "--errors", "errors.toml", "--pose",
         "tx=0.1,tz=-0.5", "--draws", 200, "--limit", "energy=0.1", "--yield-strength",
-        "2e8", "--importance", 16, "-o", "d.nc", "--json", "-", folder=tmp_path,
+        "2e8", "--importance", 16, "-o", "d.nc", "--json", "-",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
+    assert status == 0
+    said = json.loads(out)
     assert said["draws"] == 200
     assert 0 < said["within_limits"]["probability"] < 1
     assert len(said["safety"]) == 4
     assert said["play"] == said["quantities"]["translation"]["play"] == "worst"
     assert "link_a.TX" in said["importance"]["platform"]
-    done = run(
+    status, _, _ = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
         "--plan", "plan.toml", "--fresh", 50, "-o", "t.nc", "--json", "t.json",
-        folder=tmp_path,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert status == 0
     found = json.loads((tmp_path / "t.json").read_text())["allocation"]
     assert found["worst"]["margin_free"]["proven"] == pytest.approx(1, rel=1e-3)
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
@@ -259,18 +251,19 @@ def test_the_commands_from_files_to_figures(tmp_path):
         (["--errors", "errors.toml", "-o", "no/d.nc"], "no folder"),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_line_and_exit_2(arguments, message, tmp_path):
+def test_bad_input_is_one_line_and_exit_2(
+    run, arguments, message, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(ERRORS)
-    done = run("assembly", "statistics", "irsbot2", *arguments, folder=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert [p.name for p in Path(tmp_path).iterdir()] == ["errors.toml"]
+    status, _, err = run("assembly", "statistics", "irsbot2", *arguments)
+    assert status == 2
+    assert message in err
+    assert err.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["errors.toml"]
 
 
-def test_the_robots_own_errors_are_judged(tmp_path):
-    done = run(
-        "assembly", "tolerances", "four_bar", "--grid", "tx=0.2", folder=tmp_path
-    )
-    assert done.returncode == 2
-    assert "no errors to judge" in done.stderr
+def test_a_robot_without_errors_has_none_to_judge(run):
+    status, _, err = run("assembly", "tolerances", "four_bar", "--grid", "tx=0.2")
+    assert status == 2
+    assert "no errors to judge" in err

@@ -230,7 +230,7 @@ def several(paper):
               "margin_free": 4.0}  # fmt: skip
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
                 np.zeros(2), np.array([0.05, 0.005]), limits, asked_yield=0.9,
-                draws=200, clearance_model="least")  # fmt: skip
+                draws=100, clearance_model="least")  # fmt: skip
     return postures, plan, allocate(postures, plan, fresh=300)
 
 

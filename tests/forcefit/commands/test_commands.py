@@ -273,20 +273,58 @@ def test_the_installed_command_refuses_without_a_traceback():
     assert done.stdout == ""
 
 
+def compile_at_once(command, cache):
+    """Three processes on an empty cache; a fourth then compiles nothing, says nothing.
+
+    What all of them write to standard output.
+    """
+    given = {"env": os.environ | {"NUMBA_CACHE_DIR": str(cache)}, "text": True,
+             "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}  # fmt: skip
+    written = []
+    for count in (3, 1):
+        for process in [subprocess.Popen(command, **given) for _ in range(count)]:
+            out, err = process.communicate(timeout=900)
+            said = err.count("compiling its solvers")
+            assert (process.returncode, said) == (0, int(count == 3)), err
+            written.append(out)
+    return written
+
+
 @pytest.mark.slow
 def test_processes_that_compile_at_once_leave_everything_compiled(tmp_path):
-    """Three on an empty cache; a fourth then compiles nothing, and says nothing."""
-    command = [sys.executable, "-m", "forcefit", "warm-up"]
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    runs = [
-        subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
-        for _ in range(3)
-    ]
-    for run in runs:
-        _, said = run.communicate(timeout=900)
-        assert (run.returncode, said.count("compiling its solvers")) == (0, 1), said
-    again = subprocess.run(command, env=environment, capture_output=True, text=True)
-    assert (again.returncode, "compiling its solvers" in again.stderr) == (0, False)
+    compile_at_once([sys.executable, "-m", "forcefit", "warm-up"], tmp_path)
+
+
+QUARTER = """
+import importlib.util, sys
+import numpy as np
+if __name__ == "__main__":
+    spec = importlib.util.spec_from_file_location("assembly.quarter", __file__)
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    print(module.quarter(np.array([12.0])))
+else:
+    from assembly.solvers.compiled import Vector, kernel, part
+
+    @part
+    def half(v: Vector) -> float:
+        return v[0] / 2
+
+    @kernel
+    def quarter(v):
+        return half(v) / 2
+"""
+
+
+def test_processes_that_compile_one_kernel_at_once_leave_it_compiled(tmp_path):
+    """The same with a kernel of one line and its part, in one file each."""
+    (tmp_path / "quarter.py").write_text(QUARTER)
+    command = [sys.executable, str(tmp_path / "quarter.py")]
+    assert compile_at_once(command, tmp_path / "cache") == ["3.0\n"] * 4
+    compiled = [path.name for path in (tmp_path / "cache").rglob("*.nbc")]
+    assert sorted(name.partition("-")[0] for name in compiled) == [
+        "quarter.half", "quarter.quarter"
+    ]  # fmt: skip
 
 
 @pytest.mark.slow

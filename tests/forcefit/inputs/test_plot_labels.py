@@ -23,6 +23,13 @@ def drawn(figure):
     return figure
 
 
+def drawn_texts(figure):
+    """All texts of a figure, drawn."""
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in drawn(figure).findobj(Text)]
+
+
 @pytest.mark.parametrize("name", ODD)
 def test_matplotlib_shows_a_name_as_it_is_written(name):
     """As wide as the same text with formulas switched off."""
@@ -52,24 +59,33 @@ def grid(count, axes):
 
 def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
     both = grid((2, 3), (f"q.{ODD[0]}", f"{ODD[2]}.link.length"))
-    assert drawn(map_figure(both)).get_suptitle().startswith(plot_label(ODD[0]))
-    drawn(path_figure(grid((4,), (f"q.{ODD[2]}",))))
+    shown = drawn_texts(map_figure(both))
+    assert any(text.startswith(plot_label(ODD[0])) for text in shown)
+    for name in both["energy"].dims:
+        assert shown.count(plot_label(name)) == 6  # panels
+    shown = drawn_texts(path_figure(grid((4,), (f"q.{ODD[2]}",))))
+    assert shown.count(plot_label(f"q.{ODD[2]}")) == 6
+    assert any(plot_label(f"parallel: {ODD[2]}") in text for text in shown)
 
 
 def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
     attrs = {"robot": ODD[0], "seed": 1, "play": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
-    drawn(histogram_figure(xarray.Dataset(draws, attrs=attrs)))
+    shown = drawn_texts(histogram_figure(xarray.Dataset(draws, attrs=attrs)))
+    assert any(text.startswith(plot_label(ODD[0])) for text in shown)
     shares = np.full((1, len(ODD), 3), 0.5)
     axes = ("quantity", "group", "estimate")
     coords = {"quantity": ["energy"], "group": ODD}
     coords["estimate"] = ["value", "lower", "upper"]
     indices = {key: (axes, shares) for key in ("first_index", "total_index")}
-    drawn(tornado_figure(xarray.Dataset(indices, coords)))
+    labels = {plot_label(name) for name in ODD}
+    assert labels <= {*drawn_texts(tornado_figure(xarray.Dataset(indices, coords)))}
     sizes = {
         key: ("class", np.full(len(ODD), 1e-4))
         for key in ("tolerance", "loosest_allowed", "scaled_alike")
     }
     sizes["unit"] = ("class", np.full(len(ODD), "m"))
     plan = xarray.Dataset(sizes, {"class": ODD}, {"said": f"{ODD[0]}; {ODD[2]}"})
-    drawn(allocation_figure(plan))
+    shown = drawn_texts(allocation_figure(plan))
+    assert labels <= {*shown}
+    assert any(plot_label(f"{ODD[0]}\n{ODD[2]}") in text for text in shown)

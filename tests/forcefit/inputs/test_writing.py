@@ -6,10 +6,12 @@ import os
 import resource
 import signal
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from assembly.files.robot_file import read_robot, write_robot
 from assembly.robots import load_robot
@@ -58,23 +60,24 @@ def test_no_command_writes_a_file_by_itself():
     assert [said for path in files for said in written_elsewhere(path)] == []
 
 
-def limited(size):
-    """No file of this process may grow beyond a size: a disk that is full."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
-
-
-@pytest.fixture
+@contextmanager
 def full_disk():
+    """No file of this process may grow beyond 512 bytes, pytest's own log included:
+    for the call alone.
+    """
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    limited(512)
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (512, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def a_figure():
+def a_figure(title=""):
     from matplotlib.figure import Figure
 
     figure = Figure()
+    figure.suptitle(title)
     figure.subplots().plot(np.arange(20) ** 2)
     return figure
 
@@ -105,14 +108,12 @@ WRITE = {
 
 @pytest.mark.parametrize("name", WRITE)
 @pytest.mark.parametrize("before", [None, b"what stood there\n"])
-def test_a_full_disk_is_one_message_and_the_old_file_stays(
-    tmp_path, full_disk, name, before
-):
+def test_a_full_disk_is_one_message_and_the_old_file_stays(tmp_path, name, before):
     path = tmp_path / name
     if before is not None:
         path.write_bytes(WRITTEN.get(path.suffix, before))
         before = path.read_bytes()
-    with pytest.raises(BadInput) as error:
+    with full_disk(), pytest.raises(BadInput) as error:
         WRITE[name](path)
     assert str(error.value).startswith(f"{path}: cannot be written: ")
     left = [p.read_bytes() for p in tmp_path.iterdir()]
@@ -129,15 +130,24 @@ def test_a_file_appears_whole_with_nothing_beside_it(tmp_path, name):
 @pytest.mark.parametrize("ending", PIXELS.endings)
 def test_every_ending_of_a_picture_works_and_is_replaced(tmp_path, ending):
     path = tmp_path / f"picture{ending.upper()}"
-    for _ in range(2):
-        save_pixels(np.zeros((5, 5, 3), np.uint8), path)
+    for shade in (0, 255):
+        save_pixels(np.full((5, 7, 3), shade, np.uint8), path)
         check_writable(path, PIXELS)
+        shown = np.asarray(Image.open(path).convert("RGB"))
+        assert shown.shape == (5, 7, 3)
+        assert (abs(shown.astype(int) - shade) <= 2).all()  # JPEG rounds
 
 
 @pytest.mark.parametrize("ending", PICTURE.endings)
 def test_every_ending_of_a_figure_works_and_is_replaced(tmp_path, ending):
-    for _ in range(2):
-        save_figure(a_figure(), tmp_path / f"figure{ending}")
+    path = tmp_path / f"figure{ending}"
+    path.write_bytes(WRITTEN[ending])
+    save_figure(a_figure(), path)
+    first = path.read_bytes()
+    assert first.startswith(WRITTEN[ending])
+    assert len(first) > 1000
+    save_figure(a_figure(title="replaced"), path)
+    assert path.read_bytes() not in {first, WRITTEN[ending]}
 
 
 def fail_in(path):

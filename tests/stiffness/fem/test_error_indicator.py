@@ -171,7 +171,9 @@ def test_only_round_faces_of_bent_elements_can_leave_their_shapes():
     assert np.abs(each[side]).max() > 0
 
 
-@pytest.mark.parametrize("mesh", [(1, 12), (2, 12), (3, 18)])
+@pytest.mark.parametrize(
+    "mesh", [(1, 12), (2, 12), pytest.param((3, 18), marks=pytest.mark.slow)]
+)
 def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
     """J ~ R^4, the mesh's volume ~ R^2: the relative error is twice the volume's."""
     level = bar(*mesh)

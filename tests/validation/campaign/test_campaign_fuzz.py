@@ -1,4 +1,7 @@
-"""Whatever is done to a campaign's files: it is read, or one line says why not."""
+"""Whatever is done to a campaign's files: it is read, or one line says why not.
+
+The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.py``.
+"""
 
 import re
 
@@ -14,7 +17,7 @@ from validation.campaign.campaign_file import read_campaign
 from validation.study.study_file import read_study
 
 LIGHT = settings(
-    max_examples=300,
+    max_examples=100,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
@@ -268,7 +271,7 @@ def test_a_file_of_errors_of_garbled_bytes_is_read_or_one_line_says_why(
     assert np.isfinite(sources.errors(sources.draw(0, 1, 1)[0])).all()
 
 
-@settings(LIGHT, max_examples=100)
+@LIGHT
 @given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
 def test_any_numbers_are_read_or_one_line_says_why(rows, tmp_path):
     lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]

@@ -305,14 +305,16 @@ def drawn(name, size, pose=None):
 
 @pytest.mark.parametrize(
     ("name", "size", "pose", "said"),
-    [("hexapod", 1.0, None, "no signal"), ("delta", 1.0, None, "no signal"),
-     ("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed")],
+    [pytest.param("hexapod", 1.0, None, "no signal", marks=pytest.mark.slow),
+     ("delta", 1.0, None, "no signal"), ("four_bar", 1.0, None, "passed"),
+     pytest.param("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed",
+                  marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
     """No load, and errors within the clearance: any place in the valley, and no energy.
 
-    That says something of the overconstrained robot only: the others close without
-    energy whatever their clearance.
+    That says something of the overconstrained robots only, which pass: the others close
+    without energy whatever their clearance.
     """
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
@@ -322,7 +324,8 @@ def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
 
 @pytest.mark.parametrize(
     ("name", "load"),
-    [("hexapod", [0, 0, 0, 0, 0, -200]), ("delta", [0, 0, 0, 0, 0, -50]),
+    [pytest.param("hexapod", [0, 0, 0, 0, 0, -200], marks=pytest.mark.slow),
+     pytest.param("delta", [0, 0, 0, 0, 0, -50], marks=pytest.mark.slow),
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):

@@ -4,13 +4,16 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from assembly.files.robot_file import write_robot
+from assembly.model.robot import Clearance
 from forcefit.commands.validation import app
 from forcefit.inputs.table import BadInput
 from tests.mutations_for_tests import MUTATIONS
+from tests.robots_for_tests import coaxial_beams
 
 pytestmark = pytest.mark.exudyn
 
@@ -67,11 +70,14 @@ def test_the_command_writes_the_public_keys(tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_the_command_keeps_clearances_if_asked(irsbot2, tmp_path):
+def test_the_command_keeps_clearances_if_asked(tmp_path):
+    """Springs in a row that miss each other by more than the clearance between them."""
     target, file = tmp_path / "check.json", tmp_path / "robot.toml"
-    write_robot(irsbot2, file)
-    outcome = run(str(file), "--pose", "tx=0.0,tz=-0.5", "--clearances",
-               "--scale", "0.5,0.25", "--json", str(target))  # fmt: skip
+    gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
+    play = Clearance(radial=2e-5, axial=1e-5)
+    write_robot(coaxial_beams(gap, clearance=play), file)
+    outcome = run(str(file), "--clearances", "--scale", "0.5,0.25", "--json",
+                  str(target))  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     table = json.loads(target.read_text())
     assert table["passed"] is True

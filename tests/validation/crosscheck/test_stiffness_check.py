@@ -15,7 +15,9 @@ from validation.crosscheck.stiffness_check import check_stiffness
 pytestmark = pytest.mark.exudyn
 
 
-@pytest.mark.parametrize("name", ["hexapod", "orthoglide", "arm6"])
+@pytest.mark.parametrize(
+    "name", ["hexapod", pytest.param("orthoglide", marks=pytest.mark.slow), "arm6"]
+)
 @pytest.mark.parametrize("links", ["spring", "beam"])
 def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
     """Nothing is bent there, so that beams are K_E too."""

@@ -216,13 +216,14 @@ def test_the_reading_drifts(added):
     close(added("drift", given, row()), [0, 2e-5 * rise, 0, 0, 0, -1e-5 * rise], 1e-12)
 
 
-def test_what_a_linear_model_misses_is_added(added):
+@pytest.mark.parametrize("program", ["multibody", "springs"])
+def test_what_a_linear_model_misses_is_added(program):
     """A turn by e: L (cos e - 1) along the beam, L (sin e - e) across."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
     design = CampaignDesign(configurations=2, rows=2, load=0.0)
     wanted = [(Hidden("geometric_stiffening", {}), 5.0)]
-    campaign = generate_campaign(robot, wanted, design, seed=3)
+    campaign = generate_campaign(robot, wanted, design, program=program, seed=3)
     for i, where in enumerate(campaign.plan.rows):
         q = where.coordinates["drive"]
         c, s = math.cos(q), math.sin(q)

@@ -1,0 +1,32 @@
+"""Where the frames of a tree of joints stand; each joint acts about or along its z."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def place_frames(
+    parents: NDArray, kinds: NDArray, fixed: NDArray, q: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Transforms of all frames, before and after the motion of their own joint.
+
+    Args:
+        parents: (n,) rows, each before its children, -1 for the base.
+        kinds: (n,) 0 fixed, 1 revolute, 2 prismatic.
+        fixed: (n, 4, 4) frames in their parents.
+        q: (n,) [rad or m] coordinates.
+
+    Returns:
+        (n, 4, 4) before it and (n, 4, 4) after it, seen from the base.
+    """
+    angle = np.where(kinds == 1, q, 0.0)
+    motion = np.zeros((len(q), 4, 4))
+    motion[:, range(4), range(4)] = 1.0
+    motion[:, 0, 0] = motion[:, 1, 1] = np.cos(angle)
+    motion[:, 1, 0] = np.sin(angle)
+    motion[:, 0, 1] = -motion[:, 1, 0]
+    motion[:, 2, 3] = np.where(kinds == 2, q, 0.0)
+    before, after = np.empty_like(motion), np.empty_like(motion)
+    for i, parent in enumerate(parents.tolist()):
+        before[i] = fixed[i] if parent < 0 else after[parent] @ fixed[i]
+        after[i] = before[i] @ motion[i]
+    return before, after
