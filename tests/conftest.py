@@ -1,5 +1,11 @@
 """What several test files need."""
 
+import os
+
+# before numpy: on matrices as small as these a second thread only waits, but busily,
+# and the tests take twice the processor time
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -49,8 +49,16 @@ def test_kangaroo_closes_with_the_loops_that_its_rods_need(tmp_path):
     assert answer.difference < 1e-12
 
 
-@pytest.mark.parametrize("ending", ["urdf", "xml"])
-@pytest.mark.parametrize("name", BUILT_IN)
+# of the robots that take long, the ending with which a quick run tries them
+QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
+
+
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [pytest.param(name, ending, marks=() if QUICK.get(name, ending) == ending
+                  else pytest.mark.slow)
+     for name in BUILT_IN for ending in ("urdf", "xml")],
+)  # fmt: skip
 def test_built_in_robots_come_back(name, ending, tmp_path):
     """Drives, platform, and every frame of the same name, at home and elsewhere."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"

@@ -88,7 +88,9 @@ def assert_within(answer, exact):
     assert bound.rotation_open == bound.translation_open == 0.0
 
 
-@pytest.mark.parametrize("spread", [0, 6, 12, 15])
+@pytest.mark.parametrize(
+    "spread", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (6, 12)), 15]
+)
 def test_random_robots_whose_stiffnesses_differ_by_any_powers_of_ten(spread):
     compared = 0
     for seed in range(12):

@@ -67,11 +67,17 @@ poisson = 0.3
 """
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """Of meshes: the bar's is made once."""
+    return tmp_path_factory.mktemp("meshes")
+
+
 @pytest.fixture
-def ram(tmp_path, monkeypatch):
+def ram(tmp_path, monkeypatch, cache):
     """A prismatic joint's robot file whose link is a square bar's surface."""
     pyvista = pytest.importorskip("pyvista")
-    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
     surface = pyvista.PolyData.from_regular_faces(bar.points, bar.triangles)
     surface.save(tmp_path / "bar.stl")

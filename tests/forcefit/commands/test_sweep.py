@@ -147,8 +147,12 @@ GRIDS = {
 }
 
 
-@pytest.mark.parametrize("grid", GRIDS)
-@pytest.mark.parametrize("errors", ["1e-4", "0"])
+@pytest.mark.parametrize(
+    ("errors", "grid"),
+    [("1e-4", "one point"), ("0", "one point"), ("1e-4", "a map"), ("0", "a line"),
+     *(pytest.param(*case, marks=pytest.mark.slow)
+       for case in (("0", "a map"), ("1e-4", "a line")))],
+)  # fmt: skip
 def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
     run, tmp_path, errors, grid
 ):

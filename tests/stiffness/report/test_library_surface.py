@@ -46,11 +46,17 @@ density = 2700
 """
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """Of meshes: each is made once."""
+    return tmp_path_factory.mktemp("meshes")
+
+
 @pytest.fixture
-def bar_stl(tmp_path, monkeypatch):
+def bar_stl(tmp_path, monkeypatch, cache):
     """A square bar of 20 x 20 x 80 mm, in a file of millimetres."""
     pyvista = pytest.importorskip("pyvista")
-    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
     path = tmp_path / "bar.stl"
     pyvista.PolyData.from_regular_faces(1000 * bar.points, bar.triangles).save(path)
@@ -155,10 +161,10 @@ def test_a_surface_without_its_interface_is_refused_and_nothing_written(
     assert not (tmp_path / "links").exists()
 
 
-def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch):
+def test_a_step_file_is_an_entry_too(tmp_path, monkeypatch, cache):
     """A brick by gmsh's own kernel; STEP is in millimetres and says so."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
-    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

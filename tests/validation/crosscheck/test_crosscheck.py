@@ -326,8 +326,10 @@ def test_the_crosscheck_of_one_pose_ignores_another_robots_errors(posture):
 
 
 @pytest.mark.parametrize(
-    "name", ["four_bar", "five_bar", "3rrr", "delta", "orthoglide", "arm6", "hexapod"]
-)
+    "name",
+    ["four_bar", "five_bar", "3rrr", "orthoglide", "arm6",
+     *(pytest.param(name, marks=pytest.mark.slow) for name in ("delta", "hexapod"))],
+)  # fmt: skip
 def test_every_built_in_robot_passes_under_a_load(name):
     """Their drives are springs about one axis and rigid in the other five."""
     posture = home_posture(load_robot(name))

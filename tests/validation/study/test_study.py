@@ -135,7 +135,7 @@ QUIET = "[checks]\npicture = false\n"
 @pytest.mark.parametrize(
     "name",
     [
-        name if name in {"four_bar", "3rrr"} else pytest.param(name, marks=SLOW)
+        name if name == "four_bar" else pytest.param(name, marks=SLOW)
         for name in BUILT_IN
     ],
 )
