@@ -70,6 +70,48 @@ def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
     return _SOLVED[key]
 
 
+_MASSES: dict[tuple, tuple[NDArray, NDArray]] = {}  # by this process
+
+
+def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
+    """Consistent mass of a frame's mesh link, by the finite elements of its K_E.
+
+    Args:
+        frame: one with a :class:`assembly.model.robot.MeshLink` that has a density.
+
+    Returns:
+        (12, 12) [kg m^2 .. kg] for screws of base and tip, each read at its end, in the
+        frame's axes; and (3,) [m] from base to tip, in the frame's axes.
+
+    Raises:
+        BadInput: the surface or an interface is not usable.
+        ValueError: the frame has no mesh link.
+    """
+    from stiffness.fem.fea import solve_link
+    from stiffness.fem.material import Material
+    from stiffness.fem.two_ends import two_ends
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
+
+    link = frame.link
+    if not isinstance(link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    key = (link.surface, link.surface.stat().st_mtime_ns, link.unit, repr(link.base),
+           repr(link.tip), link.young, link.poisson, link.density)  # fmt: skip
+    if key not in _MASSES:
+        material = Material(link.young, link.poisson, link.density or 0.0)
+        solved = solve_link(
+            read_surface(link.surface, link.unit), parse_interface(link.base),
+            parse_interface(link.tip), [material],
+        )  # fmt: skip
+        span = solved.centers[1] - solved.centers[0]
+        _MASSES[key] = two_ends(solved).mass, span
+    mass, span = _MASSES[key]
+    turn = mesh_turn(frame, span)
+    R = np.kron(np.eye(4), turn)
+    return R @ mass @ R.T, turn @ span
+
+
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
     """Rotation from a frame's mesh's axes to the frame's.
 

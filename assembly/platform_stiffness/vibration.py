@@ -25,7 +25,8 @@ from assembly.exact.equilibrium import tangent_space
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.finite_robot import LINK
 from assembly.kinematics.posture import Posture
-from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
+from assembly.model.mesh_link import mesh_link_mass
+from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
 from forcefit.inputs.display import html_table, short_repr
@@ -116,8 +117,8 @@ def check_masses(robot: Robot) -> None:
     Raises:
         BadInput: it has none.
     """
-    beams = (f.link for f in robot.frames if isinstance(f.link, BeamLink))
-    if not any(f.mass for f in robot.frames) and not any(b.density for b in beams):
+    shapes = (f.link for f in robot.frames if isinstance(f.link, BeamLink | MeshLink))
+    if not any(f.mass for f in robot.frames) and not any(s.density for s in shapes):
         raise BadInput(_no_mass(robot))
 
 
@@ -125,7 +126,7 @@ def _no_mass(robot: Robot) -> str:
     """What a robot without masses is refused with."""
     return (
         f'{robot.name}: found no mass that moves; expected "density" of beams or '
-        '"mass" of frames'
+        'meshes, or "mass" of frames'
     )
 
 
@@ -189,9 +190,16 @@ def mass_matrix(answer: ExactAssembly) -> NDArray:
             centre = T[:3, 3] + T[:3, :3] @ frame.centre_of_mass
             moved = (screw_map(answer.posture.platform[:3, 3] - centre) @ tip)[3:]
             M += frame.mass * moved.T @ moved
-        if isinstance(frame.link, BeamLink) and frame.link.density is not None:
-            B = _beam_ends(answer, i, tip)
+        link = frame.link
+        if isinstance(link, BeamLink) and link.density is not None:
+            length, axis = beam_axis(frame)
+            axes = section_axes(axis, link.up)
+            B = _ends(answer, i, tip, length * axis, axes)
             M += B.T @ _beam_mass(frame) @ B
+        elif isinstance(link, MeshLink) and link.density is not None:
+            inertia, span = mesh_link_mass(frame)
+            B = _ends(answer, i, tip, span, np.eye(3))
+            M += B.T @ inertia @ B
     return M
 
 
@@ -204,23 +212,33 @@ def _body_motion(answer: ExactAssembly, i: int) -> NDArray:
     return answer.placement.moves * (above[model.frame] | own)
 
 
-def _beam_ends(answer: ExactAssembly, i: int, tip: NDArray) -> NDArray:
-    """(12, N) motion of a beam's base and tip, each at its place in section axes."""
+def _ends(
+    answer: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
+) -> NDArray:
+    """(12, N) motion of a link's base and tip, each at its place.
+
+    Args:
+        answer: an equilibrium.
+        i: the link's frame.
+        tip: (6, N) of the body's end, at the platform's nominal origin.
+        span: (3,) [m] from base to tip, in the frame's axes.
+        axes: (3, 3) in which motions are read, seen from the frame.
+
+    Returns:
+        Turns and shifts of the base, then of the tip.
+    """
     here, robot = answer.placement, answer.cut.robot
-    frame = robot.frames[i]
-    assert isinstance(frame.link, BeamLink)
-    length, axis = beam_axis(frame)
     above = robot.on_path[i].copy()
     above[i] = False
     base = here.moves * above[here.model.frame]
     T = here.body_ends[i]
-    axes = T[:3, :3] @ section_axes(axis, frame.link.up)
+    turned = T[:3, :3] @ axes
     origin = answer.posture.platform[:3, 3]
-    start = T[:3, 3] - length * axes[:, 0]
+    start = T[:3, 3] - T[:3, :3] @ span
     ends = []
     for place, motion in ((start, base), (T[:3, 3], tip)):
         read = screw_map(origin - place) @ motion
-        ends += [axes.T @ read[:3], axes.T @ read[3:]]
+        ends += [turned.T @ read[:3], turned.T @ read[3:]]
     return np.vstack(ends)
 
 

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import BeamLink, Frame, MeshLink, beam_axis
 from stiffness.beam.beam import section_axes
-from stiffness.fem.condensation import condense, rigid_motions
-from stiffness.fem.elements import assemble
+from stiffness.fem.condensation import condense
 from stiffness.fem.fea import MeshedLink, solve_link
 from stiffness.fem.material import Material
-from stiffness.fem.sparse_solver import solve
+from stiffness.fem.two_ends import two_ends
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import Surface, read_surface
 
@@ -100,7 +99,7 @@ def _of_prism(
     surface = prism(dict(shape))
     sides = parse_interface("z=0"), parse_interface("z=1")
     solved = solve_link(surface, *sides, [Material(1.0, poisson)], accuracy=ACCURACY)
-    return both_ends(solved), _spread(solved)
+    return two_ends(solved).stiffness, _spread(solved)
 
 
 _MESHED: dict[tuple, tuple[NDArray, NDArray, NDArray]] = {}  # by this process
@@ -117,35 +116,8 @@ def _of_mesh(link: MeshLink) -> tuple[NDArray, NDArray, NDArray]:
             accuracy=ACCURACY,
         )  # fmt: skip
         span = solved.centers[1] - solved.centers[0]
-        _MESHED[key] = both_ends(solved), _spread(solved), span
+        _MESHED[key] = two_ends(solved).stiffness, _spread(solved), span
     return _MESHED[key]
-
-
-def both_ends(solved: MeshedLink) -> NDArray:
-    """(12, 12) stiffness of a meshed link against motions of both its rigid ends.
-
-    Args:
-        solved: on its finest mesh.
-
-    Returns:
-        Rows base then tip, each read at its centre; moving as a whole costs nothing.
-    """
-    mesh, constants = solved.level.mesh, solved.level.material
-    upper = assemble(mesh, constants[:, 0], constants[:, 1])
-    fields = np.zeros((len(mesh.nodes), 3, 12))
-    free = np.ones(len(mesh.nodes), dtype=bool)
-    for side, center in enumerate(solved.centers):
-        nodes = np.unique(mesh.faces[mesh.patch == side])
-        columns = slice(6 * side, 6 * side + 6)
-        fields[nodes, :, columns] = rigid_motions(mesh.nodes[nodes], center)
-        free[nodes] = False
-    free = np.repeat(free, 3)
-    flat = fields.reshape(-1, 12)
-    full = upper + upper.T
-    full.setdiag(upper.diagonal())
-    flat[free] = solve(upper[free][:, free], -(full @ flat)[free])
-    K = flat.T @ (full @ flat)
-    return (K + K.T) / 2
 
 
 def _spread(solved: MeshedLink) -> NDArray:
