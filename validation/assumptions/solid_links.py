@@ -16,13 +16,13 @@ from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import BeamLink, Frame, MeshLink, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.fem.condensation import condense
-from stiffness.fem.fea import MeshedLink, solve_link
+from stiffness.fem.fea import FemOptions, MeshedLink, solve_link
 from stiffness.fem.material import Material
 from stiffness.fem.two_ends import two_ends
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import Surface, read_surface
 
-ACCURACY = 0.005  # asked of every entry of K_E, relative to sqrt(K_ii K_jj)
+_OPTIONS = FemOptions(accuracy=0.005)  # of every entry of K_E, over sqrt(K_ii K_jj)
 _FACETS = 64  # of a circle; the mesh's nodes lie on the circle itself
 _KEPT = 32  # shapes
 
@@ -98,7 +98,7 @@ def _of_prism(
     """Both stiffnesses of a prism of unit length and modulus along z."""
     surface = prism(dict(shape))
     sides = parse_interface("z=0"), parse_interface("z=1")
-    solved = solve_link(surface, *sides, [Material(1.0, poisson)], accuracy=ACCURACY)
+    solved = solve_link(surface, *sides, [Material(1.0, poisson)], options=_OPTIONS)
     return two_ends(solved).stiffness, _spread(solved)
 
 
@@ -113,7 +113,7 @@ def _of_mesh(link: MeshLink) -> tuple[NDArray, NDArray, NDArray]:
         solved = solve_link(
             read_surface(link.surface, link.unit), parse_interface(link.base),
             parse_interface(link.tip), [Material(link.young, link.poisson)],
-            accuracy=ACCURACY,
+            options=_OPTIONS,
         )  # fmt: skip
         span = solved.centers[1] - solved.centers[0]
         _MESHED[key] = two_ends(solved).stiffness, _spread(solved), span
