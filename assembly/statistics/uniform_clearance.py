@@ -20,8 +20,6 @@ Sources:
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dposv
 
 CHAINS, KEPT = 4, 64  # chains, and points of each that are compared
 R_HAT, EFFECTIVE = 1.05, 100.0  # largest R-hat, smallest effective sample size
@@ -90,14 +88,15 @@ def _ellipsoid(
         y = np.add.reduceat(u[:, None] * Z, heads, axis=0)
         g = 2.0 * (1.0 / slack) @ y
         H = (Z.T * (2.0 / slack[cone])) @ Z + (y.T * (4.0 / slack**2)) @ y
-        L, step, failed = dposv(H, -g, lower=1)
-        if failed:  # numerically empty interior
+        try:
+            step = np.linalg.solve(H, -g)
+            decrement = np.sqrt(max(0.0, -float(g @ step)))
+            if rho == 1.0 and decrement < 1e-3:
+                # M M^T = Z H^-1 Z^T
+                M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
+                return u, np.ascontiguousarray(M)
+        except np.linalg.LinAlgError:  # numerically empty interior
             return None
-        decrement = np.sqrt(max(0.0, -float(g @ step)))
-        if rho == 1.0 and decrement < 1e-3:
-            # M M^T = Z H^-1 Z^T
-            M = solve_triangular(L, Z.T, lower=True).T
-            return u, np.ascontiguousarray(M)
         u += Z @ (step / (1.0 + decrement))
         if rho > 1.0 and decrement < 0.5:
             most = _largest(heads, u)
