@@ -16,7 +16,7 @@ from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import BeamLink, Frame, MeshLink, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.fem.condensation import condense
-from stiffness.fem.fea import MeshedLink, solve_link
+from stiffness.fem.fea import Budget, MeshedLink, solve_link
 from stiffness.fem.material import Material
 from stiffness.fem.two_ends import two_ends
 from stiffness.surface.interface import parse_interface
@@ -25,6 +25,8 @@ from stiffness.surface.surface import Surface, read_surface
 ACCURACY = 0.005  # asked of every entry of K_E, relative to sqrt(K_ii K_jj)
 _FACETS = 64  # of a circle; the mesh's nodes lie on the circle itself
 _KEPT = 32  # shapes
+# for a shape; walls of a hundredth of the length take more
+_BUDGET = Budget(seconds=40.0, unknowns=400_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ def solid_link(frame: Frame) -> SolidLink | None:
     if not isinstance(link, BeamLink) or "area" in link.section:
         return None
     length, axis = beam_axis(frame)
-    shape = tuple((k, round(v / length, 9)) for k, v in sorted(link.section.items()))
+    shape = tuple((k, round(v / length, 6)) for k, v in sorted(link.section.items()))
     ends, distributing = _of_prism(shape, link.poisson)
     unit = np.repeat([length**1.5, length**0.5], 3)
     both = np.tile(unit, 2)
@@ -98,7 +100,10 @@ def _of_prism(
     """Both stiffnesses of a prism of unit length and modulus along z."""
     surface = prism(dict(shape))
     sides = parse_interface("z=0"), parse_interface("z=1")
-    solved = solve_link(surface, *sides, [Material(1.0, poisson)], accuracy=ACCURACY)
+    solved = solve_link(
+        surface, *sides, [Material(1.0, poisson)], accuracy=ACCURACY,
+        budget=_BUDGET,
+    )  # fmt: skip
     return two_ends(solved).stiffness, _spread(solved)
 
 
@@ -113,7 +118,7 @@ def _of_mesh(link: MeshLink) -> tuple[NDArray, NDArray, NDArray]:
         solved = solve_link(
             read_surface(link.surface, link.unit), parse_interface(link.base),
             parse_interface(link.tip), [Material(link.young, link.poisson)],
-            accuracy=ACCURACY,
+            accuracy=ACCURACY, budget=_BUDGET,
         )  # fmt: skip
         span = solved.centers[1] - solved.centers[0]
         _MESHED[key] = two_ends(solved).stiffness, _spread(solved), span
