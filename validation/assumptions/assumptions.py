@@ -12,6 +12,7 @@ from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, beam_axis
 from assembly.solvers.conic import SolverFailed
+from stiffness.mesh.mesh import MeshFailed
 from validation.assumptions.platform_cost import (
     NoSolids,
     PlatformCost,
@@ -129,13 +130,13 @@ def stiffness_cost(posture: Posture, solids: bool = False) -> PlatformCost | str
         The cost, or why it is not known.
 
     Raises:
-        BadInput: a link cannot be meshed.
+        BadInput: a surface or an interface is not usable.
     """
     if not solids:
         return _NOT_MESHED
     try:
         return platform_cost(posture)
-    except (FreeMotion, NoSolids) as error:
+    except (FreeMotion, MeshFailed, NoSolids) as error:
         return str(error)
 
 

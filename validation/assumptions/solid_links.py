@@ -16,15 +16,19 @@ from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import BeamLink, Frame, MeshLink, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.fem.condensation import condense
-from stiffness.fem.fea import FemOptions, MeshedLink, solve_link
+from stiffness.fem.fea import Budget, FemOptions, MeshedLink, solve_link
 from stiffness.fem.material import Material
 from stiffness.fem.two_ends import two_ends
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import Surface, read_surface
 
-_OPTIONS = FemOptions(accuracy=0.005)  # of every entry of K_E, over sqrt(K_ii K_jj)
 _FACETS = 64  # of a circle; the mesh's nodes lie on the circle itself
 _KEPT = 32  # shapes
+# for a shape; walls of a hundredth of the length take more
+_OPTIONS = FemOptions(
+    accuracy=0.005,  # of every entry of K_E, over sqrt(K_ii K_jj)
+    budget=Budget(seconds=40.0, unknowns=400_000),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +83,7 @@ def solid_link(frame: Frame) -> SolidLink | None:
     if not isinstance(link, BeamLink) or "area" in link.section:
         return None
     length, axis = beam_axis(frame)
-    shape = tuple((k, round(v / length, 9)) for k, v in sorted(link.section.items()))
+    shape = tuple((k, round(v / length, 6)) for k, v in sorted(link.section.items()))
     ends, distributing = _of_prism(shape, link.poisson)
     unit = np.repeat([length**1.5, length**0.5], 3)
     both = np.tile(unit, 2)
