@@ -63,7 +63,9 @@ def test_tilt_swings_the_tip_on_its_arm():
     assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
 
 
-@pytest.mark.parametrize("share", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize(
+    "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
+)
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
 def test_no_other_play_is_worse_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""

@@ -185,7 +185,9 @@ def test_torsion_follows_the_fourth_power_of_the_radius(mesh):
 # --- both together -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mesh", [(1, 6), (1, 12), (2, 12), (2, 24)])
+@pytest.mark.parametrize(
+    "mesh", [(1, 6), (1, 12), (2, 12), pytest.param((2, 24), marks=pytest.mark.slow)]
+)
 def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
     """Bending: from above to 1 032 277 N m/rad, within five times; torsion G J / L."""
     K, indicated, shape = bar(*mesh).totals()

@@ -58,10 +58,11 @@ def test_the_papers_bar_from_its_surface(cache):
     assert link.inertia[0, 0] == pytest.approx(across, rel=2e-6)
 
 
+@pytest.mark.slow
 def test_a_bar_of_two_materials_end_to_end(cache):
     """Stretched: two springs in series, but for the end effect both have."""
     half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226)
-    options = FemOptions(cache=cache, budget=Budget(levels=1))
+    options = FemOptions(cache=cache, budget=Budget(levels=2))
     one, two = (
         solve_link(bar_surface(), *PLANES, m, options=options).link
         for m in ([Material(E, NU)], [Material(E, NU), half])

@@ -247,9 +247,16 @@ def test_softer_links_are_a_larger_load_if_nothing_else_yields():
     assert elastic["modulus_scale"] > 100
 
 
+# one of each kind: of the weight, a spring, the geometry, the reading, two laws
+QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
+         "friction_hysteresis", "contact_stiffening", "thermal_expansion")  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    "name", [n for n in LIBRARY if n not in ("joint_clearance", "geometric_stiffening")]
-)
+    "name",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
+     for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
+)  # fmt: skip
 def test_an_effect_is_its_own_best_explanation(name):
     readings = alternatives(quick({name: 5.0}, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
