@@ -1,5 +1,6 @@
 """``[[effect]]`` of a robot file: known effects of the machine."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -60,7 +61,14 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
             hint = nearest(key, allowed)
             message = f"found {quoted(key)}, which is no parameter of {effect} here"
             raise table.bad("parameters", f"{message}{hint}")
-    return {key: inner.number(key, "SI") for key in inner.content}
+    # times must pass: nothing settles at once, nor in a negative time
+    unit = LIBRARY[effect].unit
+    return {
+        key: inner.number(
+            key, "SI", above=0.0 if unit(robot, key) == "s" else -math.inf
+        )
+        for key in inner.content
+    }
 
 
 def effect_tables(robot: Robot) -> list[dict[str, Any]]:

@@ -95,5 +95,6 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> float:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited &= bounds > 0.0
-    excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
+    with np.errstate(over="ignore"):  # of a bound next to nothing
+        excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     return max(0.0, float(excess.max()), float(where_rigid.max()))

@@ -362,7 +362,9 @@ def parse_axis(option: str, text: str) -> "NDArray":
             f"{option}: found {describe(text)}, expected x, y, z or three numbers "
             "such as 0,0,1, not all zero"
         )
-    return vector
+    largest = np.abs(vector).max()
+    # the square of 1e300 is no double
+    return vector if 1e-150 < largest < 1e150 else vector / largest
 
 
 def parse_sizes(option: str, text: str, unit: str) -> list[float]:

@@ -7,6 +7,7 @@
 import difflib
 import math
 import reprlib
+import sys
 import unicodedata
 from collections.abc import Iterable
 
@@ -112,6 +113,8 @@ def checked(
     Raises:
         BadInput: it is not finite, outside the range, or of no physical size.
     """
+    if abs(value) > sys.float_info.max:  # an integer may be
+        value = math.copysign(math.inf, 1 if value > 0 else -1)
     if math.isfinite(value) and above < value < below and value >= least:
         in_range = abs(value) <= LARGEST and (above != 0 or value >= 1 / LARGEST)
         if not in_range:

@@ -52,6 +52,11 @@ def test_every_effect_comes_back_from_a_file_as_it_was_written(tmp_path):
 
 
 REFUSED = {
+    'name = "drift"\nparameters = { time_constant = 0.0, "amplitude.tx" = 1e-5 }': (
+        "time_constant",
+        "found 0.0",
+        "> 0",
+    ),
     'name = "self_wait"': ["self_wait", "self_weight"],
     'name = "self_weight"\nparameters = { "g.w" = 1 }': ["g.w", "self_weight"],
     'name = "encoder_offset"\nparameters = { tool = 1e-4 }': ["tool", "drive"],

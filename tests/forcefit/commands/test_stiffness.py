@@ -215,3 +215,5 @@ def test_the_picture_shows_every_entry_that_matters():
 def test_directions_as_people_write_them():
     np.testing.assert_array_equal(parse_axis("--axis", "-z"), [0, 0, -1])
     np.testing.assert_array_equal(parse_axis("--axis", "1, 2,3"), [1, 2, 3])
+    # the square of 1e300 is no double
+    np.testing.assert_array_equal(parse_axis("--axis", "1e300,0,1e300"), [1, 0, 1])

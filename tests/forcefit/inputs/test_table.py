@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from forcefit.inputs.errors import one_line
+from forcefit.inputs.errors import checked, one_line
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import (
     BadInput,
@@ -268,3 +268,8 @@ def test_deep_keys_that_are_sound_are_read(tmp_path):
     numbers = ", ".join(["0.25"] * 500)
     path.write_text(f"a.b.c.d = [{numbers}]\ntext = '{'so. ' * 50}'\n")
     assert read_toml(path).content["a"]["b"]["c"]["d"] == [0.25] * 500
+
+
+def test_an_integer_that_is_no_double_is_out_of_range():
+    with pytest.raises(BadInput, match="--workers: found inf, expected"):
+        checked("--workers", 10**400, "1", least=1)
