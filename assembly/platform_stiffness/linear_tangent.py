@@ -39,6 +39,7 @@ _RANK = 1e-10  # relative size below which a singular value counts as zero
 _NOISE = 1e-12  # of a column before a projection that removes it whole
 _AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
 _PRESSED = 1e-8  # of the largest force: smaller ones press nothing
+_ROUNDING = 1e-12  # nor does what is this small beside the energy without clearance
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
@@ -99,7 +100,10 @@ def contacts(answer: Assembly) -> tuple[NDArray, NDArray]:
     force = _forces(answer)
     size = cone_sizes(answer.clearances, answer.joints.group)
     at_bound = size >= 1.0 - _AT_BOUND
-    pressed = at_bound & (force > _PRESSED * force.max(initial=0.0))
+    least = max(
+        _PRESSED * force.max(initial=0.0), _ROUNDING * answer.energy_without_clearance
+    )
+    pressed = at_bound & (force > least)
     return pressed, at_bound & ~pressed
 
 
