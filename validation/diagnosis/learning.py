@@ -33,7 +33,7 @@ from validation.diagnosis.candidates import (
     variables_of,
 )
 from validation.diagnosis.evidence import Evidence, Prior, background
-from validation.diagnosis.holdout import blocks_of
+from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
 MOST = 4  # functions that are learned
@@ -284,19 +284,16 @@ def _foretells(school: _School, one: Learned) -> bool:
     names = np.random.default_rng(1).permutation(np.unique(where))
     if len(names) < 2:
         return False
-    better = {}
+    less = np.zeros(len(where))
     for fold in np.array_split(names, min(_FOLDS, len(names))):
         kept = np.isin(where, fold)
         lost = [
             _foretold(X, school.residual, kept) / school.noise**2
             for X in (known, np.hstack([known, B * block.size]))
         ]
-        for name in fold:
-            own_cells = where[kept] == name
-            better[name] = float((lost[0] - lost[1])[own_cells].sum())
-    gains = np.array(list(better.values()))
-    error = gains.std(ddof=1) * np.sqrt(len(gains))
-    return bool(gains.sum() > _PROVEN * error)
+        less[kept] = lost[0] - lost[1]
+    gain, error = gain_over_blocks(less, where)
+    return gain > _PROVEN * error
 
 
 def _foretold(X: NDArray, z: NDArray, kept: NDArray) -> NDArray:

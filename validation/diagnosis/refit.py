@@ -261,10 +261,15 @@ def _refit(
             moved[seen] = x
             return moved
 
+        def slopes_at(x: NDArray) -> NDArray:
+            moved = with_seen(x)
+            at_start = np.array_equal(moved, scaled)
+            return J[:, seen] if at_start else slopes(moved, seen)
+
         if len(seen):
             fitted = least_squares(
                 lambda x: left_at(with_seen(x).tobytes()), scaled[seen],
-                jac=lambda x: slopes(with_seen(x), seen),
+                jac=slopes_at,
                 bounds=(lower[seen] / size[seen], upper[seen] / size[seen]),
                 max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED, gtol=1e-10,
                 x_scale="jac",

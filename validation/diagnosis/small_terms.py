@@ -18,12 +18,12 @@ from assembly.model.links import in_series
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.responses import Responses
+from validation.diagnosis.signatures import UNSEEN
 
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
 LARGEST_SHIFT = 0.1  # of the robot's size, likewise
-_UNSEEN = 1e-3  # [sigma] over all readings, of an error of the largest size
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ def _term(
     known = given.reshape(-1)
     # a tolerance of zero says that a direction is exact
     shown = (size > 1e-9 * largest[axis // 3]) & ~(known == 0.0)
-    shown &= size > _UNSEEN / np.array(most)[axis // 3]
+    shown &= size > UNSEEN / np.array(most)[axis // 3]
     frame = np.repeat(np.arange(count), 6)
     return SmallTerm(
         name=name,

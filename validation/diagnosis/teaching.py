@@ -15,7 +15,7 @@ from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.evidence import background
-from validation.diagnosis.holdout import blocks_of
+from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
 from validation.diagnosis.learning import Learned, learn, term_name
@@ -110,11 +110,8 @@ def _foretells(
     ]
     rows = np.nonzero(judged.cells)[0]
     where = blocks_of(campaign)[0][held][rows]
-    gains = np.array([
-        float((squares[0] - squares[1])[where == name].sum()) for name in set(where)
-    ])
-    error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
-    return bool(gains.sum() > _ERROR * error)
+    gain, error = gain_over_blocks(squares[0] - squares[1], where)
+    return gain > _ERROR * error
 
 
 def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]:
