@@ -63,7 +63,7 @@ most = 1e-4
 COMMANDS = {
     "sweep": "assembly sweep five_bar --grid tx=-0.04:0.04:0.01,ty=0.1:0.15:0.01 "
     "--errors errors.toml --draws 20 --reading none -o out.nc --json out.json",
-    "statistics": "assembly statistics five_bar --errors errors.toml --draws 20000 "
+    "statistics": "assembly statistics five_bar --errors errors.toml --draws 4000 "
     "--pose ty=0.13 --no-margins -o out.nc --json out.json",
     "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "
     "--plan plan.toml --fresh 50 -o out.nc --figure out.png --json out.json",
@@ -231,7 +231,7 @@ def undisturbed(command: str) -> Case:
 
 def points_in_all(case: Case) -> int:
     """Points of a whole run: those of the last child and of the one before it."""
-    return {"sweep": 54 * 20, "statistics": 20000}[case.words[1]]
+    return {"sweep": 54 * 20, "statistics": 4000}[case.words[1]]
 
 
 def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
