@@ -2,21 +2,25 @@
 
     python benchmarks/mutants.py [COUNT] [--seed N] [--only FOLDER]
 
-Each fault is put into a copy of the tree; the tests of its chapter run first, then
-those of its package, then all default tests; the first failure is enough.  Functions
-compiled by numba are compiled anew for faults in their files.  Printed:
-the share caught, and every survivor with its line.
+Each fault is put into a copy of the tree.  First the tests nearest to it run: those of
+its chapter and those that import its module; the first failure is enough.  Faults that
+these do not see are put in together, a dozen at once, and all default tests run: what
+fails is run with each of them alone.  Compiled functions are compiled anew for faults
+in their files.  Printed: the share caught, and every survivor with its line.
 """
 
 import argparse
 import ast
 import os
+import re
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
@@ -33,6 +37,22 @@ SWAPS: dict[type, type] = {
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
+AT_ONCE = 12
+PROCESSOR_SECONDS = 1200  # of one test run; one that needs more does not end
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One wrong expression: in which file, on which row, the new line and what it is."""
+
+    chapter: str
+    path: Path
+    row: int
+    line: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.row}  {self.what}"
 
 
 def places(tree: ast.Module) -> Iterator[ast.AST]:
@@ -74,9 +94,9 @@ def wrong(node: ast.AST, random: Random) -> ast.AST | None:
     return swap and ast.Compare(node.left, ops, node.comparators)
 
 
-def mutant(path: Path, random: Random) -> tuple[str, int, str] | None:
-    """A file with one fault: its text, the line, and what was done to it."""
-    source = path.read_text(encoding="utf-8")
+def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
+    """A fault in a file; None where the expression drawn has none of ours."""
+    source = (ROOT / path).read_text(encoding="utf-8")
     nodes = list(places(ast.parse(source)))
     if not nodes:
         return None
@@ -86,38 +106,88 @@ def mutant(path: Path, random: Random) -> tuple[str, int, str] | None:
     if new is None or old is None or "\n" in old:
         return None
     text = ast.unparse(ast.fix_missing_locations(new))
-    lines = source.splitlines(keepends=True)
-    row = node.lineno - 1  # type: ignore[attr-defined]
-    line = lines[row].encode()
+    row = node.lineno  # type: ignore[attr-defined]
+    line = source.splitlines(keepends=True)[row - 1].encode()
     begin, end = node.col_offset, node.end_col_offset  # type: ignore[attr-defined]
-    lines[row] = (line[:begin] + f"({text})".encode() + line[end:]).decode()
-    return "".join(lines), row + 1, f"{old} -> {text}"
+    changed = (line[:begin] + f"({text})".encode() + line[end:]).decode()
+    return Fault(chapter, path, row, changed, f"{old} -> {text}")
 
 
-def caught(tree: Path, chapter: str, compiled: bool) -> bool:
-    """Whether any default test fails, the nearest asked first."""
-    package = chapter.partition("/")[0]
-    environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
-    with tempfile.TemporaryDirectory() as cache:
-        if compiled:
-            environment["NUMBA_CACHE_DIR"] = cache
-        for tests in (f"tests/{chapter}", f"tests/{package}", "tests"):
-            if not (tree / tests).is_dir():
-                continue
-            command = [
-                sys.executable, "-m", "pytest", "-q", "-x", "-m", "not slow",
-                "-p", "no:cacheprovider", "-p", "no:xdist", tests,
-            ]  # fmt: skip
-            try:
-                ran = subprocess.run(
-                    command, cwd=tree, env=environment, timeout=1800,
-                    capture_output=True,
-                )  # fmt: skip
-            except subprocess.TimeoutExpired:
-                return True  # a loop that no longer ends
-            if ran.returncode not in {0, 5}:
-                return True
-    return False
+def put(faults: Iterable[Fault], tree: Path) -> None:
+    """Lay a new copy of the tree with these faults in it."""
+    # with the caches of compiled functions, whose files keep their times
+    left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT, tree, ignore=left_out)
+    for fault in faults:
+        lines = (tree / fault.path).read_text(encoding="utf-8").splitlines(True)
+        lines[fault.row - 1] = fault.line
+        (tree / fault.path).write_text("".join(lines), encoding="utf-8")
+        if any(line.startswith("@kernel") for line in lines):
+            # built into what calls them, whose files have not changed
+            for cached in (tree / "assembly").rglob("*.nbi"):
+                cached.unlink()
+
+
+def failed(tree: Path, tests: list[str]) -> str | None:
+    """The first test that fails, "" where none can be named; None if all pass."""
+    command = [
+        sys.executable, "-m", "pytest", "-q", "-x", "-rfE", "-m", "not slow",
+        "-p", "no:cacheprovider", "-p", "no:xdist", *tests,
+    ]  # fmt: skip
+    ran = subprocess.run(
+        command,
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"},
+        preexec_fn=lambda: resource.setrlimit(
+            resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS)
+        ),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if ran.returncode in {0, 5}:
+        return None
+    first = re.search(r"^(?:FAILED|ERROR) (\S+)", ran.stdout, re.MULTILINE)
+    return first[1] if first else ""
+
+
+def nearest(fault: Fault) -> list[str]:
+    """Files of the tests of a chapter and of those that import the module."""
+    module = ".".join(fault.path.with_suffix("").parts)
+    folder, _, name = module.rpartition(".")
+    imports = re.compile(
+        rf"{re.escape(module)}\b|from {re.escape(folder)} import [^\n]*\b{name}\b"
+    )
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    importing = [path for path in files if imports.search(path.read_text())]
+    chapter = [
+        path for path in files if path.is_relative_to(ROOT / "tests" / fault.chapter)
+    ]
+    return [str(path.relative_to(ROOT)) for path in dict.fromkeys(importing + chapter)]
+
+
+def survivors(faults: list[Fault], tree: Path) -> list[Fault]:
+    """Those of some faults, put in together, that no default test sees."""
+    left = list(faults)
+    while left:
+        put(left, tree)
+        test = failed(tree, ["tests"])
+        if test is None:
+            break
+        caught = []
+        for fault in left if test else []:
+            put([fault], tree)
+            if failed(tree, [test]) is not None:
+                caught.append(fault)
+        if not caught:  # only together: one by one
+            for fault in left:
+                put([fault], tree)
+                if failed(tree, ["tests"]) is not None:
+                    caught.append(fault)
+            return [fault for fault in left if fault not in caught]
+        left = [fault for fault in left if fault not in caught]
+    return left
 
 
 def main() -> None:
@@ -135,27 +205,27 @@ def main() -> None:
         for path in sorted((ROOT / chapter).rglob("*.py"))
     ]
     weights = [len((ROOT / path).read_text().splitlines()) for _, path in files]
-    began, done, survivors = time.monotonic(), 0, []
+    began, done, survived = time.monotonic(), 0, 0
+    unseen: list[Fault] = []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "forcefit"
-        # with the caches of compiled functions, whose files keep their times
-        left_out = shutil.ignore_patterns(".git", ".venv", ".mypy_cache", "*_study")
-        shutil.copytree(ROOT, tree, ignore=left_out)
         while done < asked.count:
             ((chapter, path),) = random.choices(files, weights)
-            drawn = mutant(ROOT / path, random)
-            if drawn is None:
+            fault = drawn(chapter, path, random)
+            if fault is None:
                 continue
-            text, row, what = drawn
-            (tree / path).write_text(text, encoding="utf-8")
-            seen = caught(tree, chapter, "import kernel" in text)
-            shutil.copy2(ROOT / path, tree / path)
+            put([fault], tree)
+            if failed(tree, nearest(fault)) is None:
+                unseen.append(fault)
+                print(f"not seen by the nearest tests  {fault}", flush=True)
             done += 1
-            if not seen:
-                survivors.append(f"{path}:{row}  {what}")
-                print(f"survived  {survivors[-1]}", flush=True)
+            if len(unseen) == AT_ONCE or done == asked.count:
+                for fault in survivors(unseen, tree):
+                    survived += 1
+                    print(f"survived  {fault}", flush=True)
+                unseen = []
             print(
-                f"{done} faults, {done - len(survivors)} caught, "
+                f"{done} faults, {survived} survived, {len(unseen)} not yet known, "
                 f"{time.monotonic() - began:.0f} s",
                 flush=True,
             )
