@@ -43,7 +43,7 @@ PROCESSOR_SECONDS = 1200  # of one test run; one that needs more does not end
 
 @dataclass(frozen=True)
 class Fault:
-    """One wrong expression: in which file, on which row, the new line and what it is."""
+    """A wrong expression: in which file, on which row, the new line, what it is."""
 
     chapter: str
     path: Path
