@@ -1,12 +1,14 @@
 """Random one-line faults in the numerical modules, and whether the tests see them.
 
-    python benchmarks/mutants.py [COUNT] [--seed N] [--only FOLDER]
+    python benchmarks/mutants.py [COUNT] [--seed N] [--only FOLDER] [--traced FOLDER]
 
-Each fault is put into a copy of the tree.  First the tests nearest to it run: those of
-its chapter and those that import its module; the first failure is enough.  Faults that
-these do not see are put in together, a dozen at once, and all default tests run: what
-fails is run with each of them alone.  Compiled functions are compiled anew for faults
-in their files.  Printed: the share caught, and every survivor with its line.
+All default tests run once, traced: which test passes which line, and how long it takes
+(kept in the folder after --traced, so that a second call goes on with it).  Each fault
+is put into a copy of the tree, and the tests that pass its line run, the shortest
+first, a minute of them; the first failure is enough.  Compiled lines are not traced:
+for them the tests that import the module and those of its chapter run.  Faults not seen
+so far are put in together, a dozen at once, and all default tests run: what fails is
+run with each of them alone.  Printed: the share caught, and every survivor.
 """
 
 import argparse
@@ -24,6 +26,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+from coverage import CoverageData
+
 ROOT = Path(__file__).parents[1]
 CHAPTERS = (
     "stiffness/beam", "stiffness/surface", "stiffness/mesh", "stiffness/fem",
@@ -38,6 +42,7 @@ SWAPS: dict[type, type] = {
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
 AT_ONCE = 12
+LONGEST = 60.0  # [s] of tests that run for one fault alone
 PROCESSOR_SECONDS = 1200  # of one test run; one that needs more does not end
 
 
@@ -152,7 +157,56 @@ def failed(tree: Path, tests: list[str]) -> str | None:
     return first[1] if first else ""
 
 
-def nearest(fault: Fault) -> list[str]:
+@dataclass(frozen=True)
+class Trace:
+    """Which tests pass a line, and seconds that each test takes."""
+
+    lines: CoverageData
+    seconds: dict[str, float]
+
+    def nearest(self, fault: Fault) -> list[str]:
+        """Tests for a fault, the shortest first."""
+        file = next(
+            (f for f in self.lines.measured_files() if f.endswith(f"/{fault.path}")), ""
+        )
+        passing = self.lines.contexts_by_lineno(file).get(fault.row, []) if file else []
+        tests = [name.partition("|")[0] for name in passing if name]
+        if not tests:
+            files = set(importing(fault))
+            tests = [t for t in self.seconds if t.partition("::")[0] in files]
+        tests.sort(key=lambda test: self.seconds.get(test, 0.0))
+        total, chosen = 0.0, []
+        for test in dict.fromkeys(tests):
+            total += self.seconds.get(test, 0.0)
+            if chosen and total > LONGEST:
+                break
+            chosen.append(test)
+        return chosen
+
+
+def traced(tree: Path, folder: Path) -> Trace:
+    """All default tests, traced, or what an earlier call left in the folder."""
+    data, printed = folder / "lines.coverage", folder / "tests.txt"
+    if not printed.exists():
+        packages = ("stiffness", "assembly", "validation")
+        command = [
+            sys.executable, "-m", "pytest", "-n", "auto", "-m", "not slow", "-vv",
+            *(f"--cov={name}" for name in packages), "--cov-context=test",
+            "--cov-report=", "--durations=0", "--durations-min=0",
+        ]  # fmt: skip
+        environment = {"PYTHONPATH": str(tree), "COVERAGE_FILE": str(data)}
+        ran = subprocess.run(
+            command, cwd=tree, env={**os.environ, **environment}, check=True,
+            capture_output=True, text=True,
+        )  # fmt: skip
+        printed.write_text(ran.stdout)
+    lines = CoverageData(str(data))
+    lines.read()
+    rows = re.findall(r"^([\d.]+)s call +(\S.*)$", printed.read_text(), re.MULTILINE)
+    return Trace(lines, {test.strip(): float(seconds) for seconds, test in rows})
+
+
+def importing(fault: Fault) -> list[str]:
     """Files of the tests of a chapter and of those that import the module."""
     module = ".".join(fault.path.with_suffix("").parts)
     folder, _, name = module.rpartition(".")
@@ -160,11 +214,12 @@ def nearest(fault: Fault) -> list[str]:
         rf"{re.escape(module)}\b|from {re.escape(folder)} import [^\n]*\b{name}\b"
     )
     files = sorted((ROOT / "tests").rglob("test_*.py"))
-    importing = [path for path in files if imports.search(path.read_text())]
-    chapter = [
-        path for path in files if path.is_relative_to(ROOT / "tests" / fault.chapter)
+    chapter = ROOT / "tests" / fault.chapter
+    return [
+        str(path.relative_to(ROOT))
+        for path in files
+        if path.is_relative_to(chapter) or imports.search(path.read_text())
     ]
-    return [str(path.relative_to(ROOT)) for path in dict.fromkeys(importing + chapter)]
 
 
 def survivors(faults: list[Fault], tree: Path) -> list[Fault]:
@@ -196,6 +251,7 @@ def main() -> None:
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")
+    parser.add_argument("--traced", type=Path)
     asked = parser.parse_args()
     random = Random(asked.seed)
     files = [
@@ -209,15 +265,19 @@ def main() -> None:
     unseen: list[Fault] = []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "forcefit"
+        put([], tree)
+        kept = asked.traced or Path(folder)
+        kept.mkdir(parents=True, exist_ok=True)
+        trace = traced(tree, kept)
         while done < asked.count:
             ((chapter, path),) = random.choices(files, weights)
             fault = drawn(chapter, path, random)
             if fault is None:
                 continue
             put([fault], tree)
-            if failed(tree, nearest(fault)) is None:
+            if failed(tree, trace.nearest(fault)) is None:
                 unseen.append(fault)
-                print(f"not seen by the nearest tests  {fault}", flush=True)
+                print(f"not yet seen  {fault}", flush=True)
             done += 1
             if len(unseen) == AT_ONCE or done == asked.count:
                 for fault in survivors(unseen, tree):
