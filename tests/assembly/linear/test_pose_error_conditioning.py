@@ -78,7 +78,7 @@ def small_reach(rng, cones, rows, flat):
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
 )
-@pytest.mark.parametrize("rows", [0, 2])
+@pytest.mark.parametrize("rows", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_branch_and_bound_meets_outer_approximation(seed, rows):
     reach = small_reach(np.random.default_rng(seed), 5, rows, flat=False)
     for part in (slice(0, 3), slice(3, 6)):

@@ -134,6 +134,7 @@ def test_clearances_are_held_and_a_robot_without_mass_is_refused():
         natural_modes(home_posture(load_robot("irsbot2")))
 
 
+@pytest.mark.slow
 def test_a_meshed_bar_swings_as_the_beam_it_is():
     """A round bar of L / r = 11: bending within what its ends' restraint costs.
 

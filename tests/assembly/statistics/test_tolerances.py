@@ -249,6 +249,7 @@ def test_an_allocation_is_a_data_set_and_a_few_lines(several):
     assert all(len(repr(thing)) < 1000 for thing in (found, plan, plan.sources))
 
 
+@pytest.mark.slow
 def test_fresh_draws_solved_one_by_one_meet_the_limits_as_often(several):
     """Another seed, each draw by itself through :func:`solve_assembly`, slowly."""
     postures, plan, found = several

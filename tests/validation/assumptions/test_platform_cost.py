@@ -89,6 +89,7 @@ def test_virtual_joints_lose_nothing_of_solids_that_act_at_their_ends(posture):
     assert list(cost.by_link) == ["stout", "slim"]  # the shorter for its thickness
 
 
+@pytest.mark.slow
 def test_one_link_costs_the_platform_what_it_costs_itself():
     frame = Frame("tip", translation=[0.3, 0.0, 0.0], link=ROUND)
     posture = home_posture(Robot("cantilever", "tip", (frame,)))

@@ -219,6 +219,7 @@ def test_the_papers_robot_with_clearances_agrees_in_energy_and_springs(irsbot2):
     assert check.metric.gaps[0] > check.metric.gaps[1] > check.metric.gaps[2] > 0
 
 
+@pytest.mark.slow
 def test_with_clearances_the_energy_is_that_of_finite_rotations(irsbot2):
     """Contacts against cones, springs as links, at the paper's full errors.
 

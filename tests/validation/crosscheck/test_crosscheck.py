@@ -163,6 +163,7 @@ def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
     assert all("do not explain" in name for name in failed)
 
 
+@pytest.mark.slow
 def test_rods_that_roll_are_held_and_said_to_be():
     """The delta's rods roll by radians under a load; without one they need no holding.
 
