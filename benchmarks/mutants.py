@@ -43,7 +43,9 @@ SWAPS: dict[type, type] = {
 }  # fmt: skip
 AT_ONCE = 12
 LONGEST = 60.0  # [s] of tests that run for one fault alone
-PROCESSOR_SECONDS = 1200  # of one test run; one that needs more does not end
+# one test run's; a fault that makes it need more is caught
+PROCESSOR_SECONDS = {"alone": 240, "all": 1800}
+MEMORY = 8 * 2**30  # [byte]
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,15 @@ def put(faults: Iterable[Fault], tree: Path) -> None:
                 cached.unlink()
 
 
+def limit(seconds: int) -> None:
+    """Processor time and memory of this process."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
 def failed(tree: Path, tests: list[str]) -> str | None:
     """The first test that fails, "" where none can be named; None if all pass."""
+    every = tests == ["tests"]
     command = [
         sys.executable, "-m", "pytest", "-q", "-x", "-rfE", "-m", "not slow",
         "-p", "no:cacheprovider", "-p", "no:xdist", *tests,
@@ -144,9 +153,7 @@ def failed(tree: Path, tests: list[str]) -> str | None:
         command,
         cwd=tree,
         env={**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"},
-        preexec_fn=lambda: resource.setrlimit(
-            resource.RLIMIT_CPU, (PROCESSOR_SECONDS, PROCESSOR_SECONDS)
-        ),
+        preexec_fn=lambda: limit(PROCESSOR_SECONDS["all" if every else "alone"]),
         capture_output=True,
         text=True,
         check=False,
