@@ -249,7 +249,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
         return sum(points for _, end, points in sound if end <= at)
     counts["journals with a bit turned"] += 1
     content[at] ^= 1 << random.randrange(8)
-    if at <= content.find(b"\n") and not sound:
+    if not sound and (at <= content.find(b"\n") or b"\n" not in content):
         path.unlink()  # nothing in it says whose it is: refused, and begun anew
         return 0
     path.write_bytes(content)
