@@ -89,7 +89,7 @@ def assert_within(answer, exact):
 
 
 @pytest.mark.parametrize(
-    "spread", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (6, 12)), 15]
+    "spread", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (6, 12, 15))]
 )
 def test_random_robots_whose_stiffnesses_differ_by_any_powers_of_ten(spread):
     compared = 0

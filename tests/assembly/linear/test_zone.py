@@ -105,7 +105,7 @@ def test_the_reading_of_compliant_joints_must_be_one_of_two():
         zone_margin(home_posture(planar_four_bar()), "soft")
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), legs=st.integers(2, 3))
 def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
     rng = np.random.default_rng(seed)

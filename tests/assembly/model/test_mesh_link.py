@@ -90,6 +90,7 @@ def ram(tmp_path, monkeypatch, cache):
     return written
 
 
+@pytest.mark.slow
 def test_a_mesh_with_an_axis_works_below_a_prismatic_joint_at_zero(ram):
     """Along z as where a translation says so; along x the same K in turned axes."""
     spelt = read_robot(ram(more="translation = [0, 0, 0.08]")).frame("tool")

@@ -130,6 +130,7 @@ def shallow_arch():
     return home_posture(Robot("arch", "apex", frames, (("end", "ground"),)))
 
 
+@pytest.mark.slow
 def test_a_shallow_arch_snaps_through_at_its_limit_point():
     """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2: largest, then a jump."""
     half, rise, k = 1.0, 0.1, 1e5

@@ -73,7 +73,7 @@ def test_a_simplex_like_section_of_a_cube_has_its_known_mean():
 
 
 @pytest.mark.parametrize(
-    "thin", [*(pytest.param(t, marks=pytest.mark.slow) for t in (1e-1, 1e-3)), 1e-5]
+    "thin", [pytest.param(t, marks=pytest.mark.slow) for t in (1e-1, 1e-3, 1e-5)]
 )
 def test_a_thin_cap_of_a_disc_beside_long_sides_keeps_its_marginals(thin):
     """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two

@@ -323,6 +323,7 @@ else:
 """
 
 
+@pytest.mark.slow
 def test_processes_that_compile_one_kernel_at_once_leave_it_compiled(tmp_path):
     """The same with a kernel of one line and its part, in one file each.
 

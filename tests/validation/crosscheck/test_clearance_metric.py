@@ -308,7 +308,8 @@ def drawn(name, size, pose=None):
     ("name", "size", "pose", "said"),
     [pytest.param("hexapod", 1.0, None, "no signal", marks=pytest.mark.slow),
      pytest.param("delta", 1.0, None, "no signal", marks=pytest.mark.slow),
-     ("arm6", 1.0, None, "no signal"), ("four_bar", 1.0, None, "passed"),
+     ("arm6", 1.0, None, "no signal"),
+     pytest.param("four_bar", 1.0, None, "passed", marks=pytest.mark.slow),
      pytest.param("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed",
                   marks=pytest.mark.slow)],
 )  # fmt: skip
