@@ -10,7 +10,7 @@ draws, or the worst corners, just meet every limit, and fresh draws verify them.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,6 @@ from assembly.statistics.scaling import (
     with_worst_corners,
 )
 from assembly.statistics.verification import prove_worst, verify
-
-if TYPE_CHECKING:
-    pass
-
 
 _SCALING_DRAWS = 4  # times the training draws: only one factor is to be found
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.targets import goals_of, grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
 from stiffness.screws import SCREW
-
-if TYPE_CHECKING:
-    pass
 
 
 def grid_postures(robot: Robot, grid: str) -> list[Posture]:

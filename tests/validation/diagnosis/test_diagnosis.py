@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import norm
 
 from assembly.effects import apply_effects
 from assembly.files.robot_file import read_robot
@@ -163,7 +164,9 @@ def test_results_are_in_the_public_format(name, diagnosed):
         for p in effect["parameters"]:
             assert {"name", "value", "std", "unit"} <= p.keys()
             low, high = p["interval_90"]
-            assert low < p["value"] < high
+            half = norm.ppf(0.95) * p["std"]
+            assert high - p["value"] == pytest.approx(half, rel=1e-3)
+            assert p["value"] - low == pytest.approx(half, rel=1e-3)
     for one in written["alternatives"]:
         assert {"names", "probability"} <= one.keys()
     error = written["error"]

@@ -8,7 +8,12 @@ from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import structure
 from validation.diagnosis.holdout import split
-from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit, outlying
+from validation.diagnosis.lack_of_fit import (
+    SIGNIFICANT,
+    believed_noise,
+    lack_of_fit,
+    outlying,
+)
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import trends
 
@@ -54,6 +59,15 @@ def noisy(rng, rows=40, sets=10, size=1.0):
     z = size * rng.normal(size=(rows, 6))
     z[rng.random(z.shape) < 0.1] = np.nan
     return campaign_of(z * SIGMA, SIGMA, np.arange(rows) % sets)
+
+
+def test_an_understated_sigma_is_found_in_repeats(rng):
+    """Three times the stated sigma; stated right or too large, it is let be."""
+    for size, expected in ((3.0, 3.0), (1.0, 1.0), (0.5, 1.0)):
+        campaign = noisy(rng, rows=400, sets=100, size=size)
+        factors = believed_noise(campaign, whiten(campaign, campaign.measured))
+        # some 800 degrees of freedom each: 2.5 % of one standard deviation
+        np.testing.assert_allclose(factors, expected, rtol=0.12)
 
 
 def test_probabilities_of_noise_are_uniform(rng):
