@@ -46,6 +46,13 @@ def test_a_spline_of_two_variables_is_the_product():
     assert set(shape_names(FORMS["spline"], 2)) == set(ends)
 
 
+def test_a_spline_of_two_knots_is_a_line_and_ends_level():
+    x = np.array([-1.0, 0.0, 0.25, 1.0, 3.0])
+    hats = natural_spline(np.array([0.0, 1.0]), x)
+    right = np.clip(x, 0.0, 1.0)
+    np.testing.assert_allclose(hats, np.column_stack([1 - right, right]), atol=1e-15)
+
+
 def test_roughness_is_the_integral_of_squared_curvature():
     values = np.array([1.0, -2.0, 0.5, 3.0, 2.5, 0.0])
     spline = CubicSpline(np.arange(6), values, bc_type="natural")
