@@ -1,5 +1,6 @@
 """The robot as a scene of a page: turned, exaggerated and closed by the reader."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -50,8 +51,8 @@ def robot_scene(
         "body": None if body is None else _error_body(body, posture.platform[:3, 3]),
         "exaggeration": readable_factor(bodies, size),
         "box": np.stack([middle - half, middle + half], axis=1),
-        "length": shown_in("m", size).__dict__,
-        "displacement": shown_in("m", largest).__dict__,
+        "length": asdict(shown_in("m", size)),
+        "displacement": asdict(shown_in("m", largest)),
     }
     return scene(spec, caption)
 
@@ -107,5 +108,5 @@ def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
     text = f"errors the platform can have, up to {sizes.max() * shown.factor:.4g}"
     return {
         "points": body.points, "faces": body.faces, "origin": origin,
-        "text": f"{text} {shown.name}",
+        "text": f"{text} {shown.shown}",
     }  # fmt: skip

@@ -62,7 +62,9 @@ def diagnose(
     if report is not None:
         from validation.diagnosis.report import write_report
 
-        write_report(diagnosis, report, tally)
+        folder = campaign if campaign.is_dir() else campaign.parent
+        files = sorted(path for path in folder.iterdir() if path.is_file())
+        write_report(diagnosis, report, tally, files)
     if save is not None:
         if not diagnosis.foretells:
             typer.echo(

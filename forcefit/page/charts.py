@@ -8,7 +8,7 @@ a robot, :mod:`assembly.report.scene`.
 import html
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -220,7 +220,7 @@ def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
     array = np.asarray(values, dtype=float) if unit else np.zeros(0)
     finite = array[np.isfinite(array)]
     shown = shown_in(unit, float(np.abs(finite).max()) if len(finite) else 0.0)
-    return {"unit": shown.si, "shown": shown.name, "factor": shown.factor}
+    return asdict(shown)
 
 
 def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:

@@ -69,7 +69,8 @@
         colorbar: { title: { text: unit(layer), side: "right" } } }
         : { ...common, type: "scatter", mode: "lines+markers", x: xs, y: values,
           text: xs.map((_, i) => hover(i)) };
-      return show(figure, [trace], { height: 460, xaxis: axisLayout(x),
+      return show(figure, [trace], { height: 460, title: { text: escaped(layer.title),
+        font: { size: 13 } }, margin: { l: 60, r: 20, t: 40, b: 50 }, xaxis: axisLayout(x),
         yaxis: axisLayout(y || { ...layer, options: {} }) });
     };
     const open = (i, j) => {
@@ -222,7 +223,7 @@
         : null;
       const spans = spec.box.map(([low, high]) => (high - low) / size);
       const thin = spans.indexOf(Math.min(...spans));
-      const eye = [0.7, 0.7, 0.6].map((v, c) => c === thin ? 1.8 : v);
+      const eye = [0.45, 0.45, 0.4].map((v, c) => c === thin ? 1.25 : v);
       const axis = c => ({ title: { text: `${"xyz"[c]} [${unit(spec.length)}]` },
         range: spec.box[c].map(v => v * factor(spec.length)) });
       const told3d = { aspectmode: "manual", xaxis: axis(0), yaxis: axis(1),

@@ -90,10 +90,10 @@ def _head_cell(head: str | Column, shown: Shown) -> str:
     if isinstance(head, str):
         return f"<th>{html.escape(head)}</th>"
     title = html.escape(head.title)
-    if not shown.si:
+    if not shown.unit:
         return f"<th>{title}</th>"
-    si = html.escape(f"{head.title} [{shown.si}]")
-    return f'<th data-si="{si}">{title} [{html.escape(shown.name)}]</th>'
+    si = html.escape(f"{head.title} [{shown.unit}]")
+    return f'<th data-si="{si}">{title} [{html.escape(shown.shown)}]</th>'
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> str:
@@ -104,7 +104,7 @@ def _cell(cell: Cell, head: str | Column, shown: Shown) -> str:
         return f"<td{_two_texts(cell)}>{html.escape(_texts(cell)[0])}</td>"
     digits = head.digits if isinstance(head, Column) else 6
     text = number_text(cell * shown.factor, digits=digits)
-    si = f' data-si="{number_text(cell, digits=digits)}"' if shown.si else ""
+    si = f' data-si="{number_text(cell, digits=digits)}"' if shown.unit else ""
     return f'<td data-v="{float(cell)!r}"{si}>{text}</td>'
 
 
@@ -112,14 +112,14 @@ def _texts(value: Value) -> tuple[str, str]:
     """A number in the unit of a drawing, and in SI."""
     shown = shown_in(value.unit, value.value)
     return (
-        number_text(value.value * shown.factor, shown.name, value.digits),
-        number_text(value.value, shown.si, value.digits),
+        number_text(value.value * shown.factor, shown.shown, value.digits),
+        number_text(value.value, shown.unit, value.digits),
     )
 
 
 def _two_texts(value: Value) -> str:
     """Attributes that hold the SI value in full, its unit, and both as text."""
     own, si = _texts(value)
-    unit = f' data-u="{html.escape(value.unit)}"' if shown_in(value.unit).si else ""
+    unit = f' data-u="{html.escape(value.unit)}"' if shown_in(value.unit).unit else ""
     other = f' data-si="{html.escape(si)}"' if si != own else ""
     return f' data-v="{float(value.value)!r}"{unit}{other}'

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 # SI unit: (least size [SI], shown unit, factor), the coarsest first
 _SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)),
-    "rad": ((1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
+    "rad": ((0.1, "deg", 180 / math.pi), (1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
     "J": ((1e-1, "J", 1.0), (0.0, "mJ", 1e3)),
     "Pa": ((1e8, "GPa", 1e-9), (0.0, "MPa", 1e-6)),
     "N/m": ((0.0, "N/µm", 1e-6),),
@@ -21,13 +21,13 @@ class Shown:
     """How numbers of one SI unit are shown.
 
     Attributes:
-        si: the SI unit, empty for a pure number.
-        name: the unit shown.
-        factor: shown = factor * SI.
+        unit: SI, empty for a pure number.
+        shown: the unit shown.
+        factor: number shown = factor * number in SI.
     """
 
-    si: str
-    name: str
+    unit: str
+    shown: str
     factor: float
 
 
@@ -45,11 +45,9 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
         return Shown("", "", 1.0)
     usual = _SHOWN.get(unit, ((0.0, unit, 1.0),))
     size = abs(size) if math.isfinite(size) else math.inf
-    # zero is shown in the coarser unit
+    size = size or 1e-3  # zero is shown in mm and mrad
     return next(
-        Shown(unit, name, factor)
-        for least, name, factor in usual
-        if size >= least or size == 0.0
+        Shown(unit, name, factor) for least, name, factor in usual if size >= least
     )
 
 

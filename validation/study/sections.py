@@ -10,7 +10,7 @@ from assembly.linear.reach import reachable_screws
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import GREY, Axis, Layer, chart, matrix, value_map
-from forcefit.page.page import paragraph, picture, section
+from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 from forcefit.page.words import in_words, unit_of
 from stiffness.link import scaled
@@ -26,11 +26,11 @@ _CLEARANCE_OF = {
 }
 # of the maps: key, words
 MAPPED = {
-    "margin": "zone margin, eq. (21)",
-    "margin_free": "zone margin, compliant joints free",
-    "energy": "energy, eq. (22)",
-    "rotation_error": "largest turn, eq. (27), clearances anywhere",
     "translation_error": "largest shift, eq. (27), clearances anywhere",
+    "rotation_error": "largest turn, eq. (27), clearances anywhere",
+    "energy": "energy, eq. (22)",
+    "margin_free": "zone margin, compliant joints free",
+    "margin": "zone margin, eq. (21)",
 }
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
 WRENCH = ("N m", "N m", "N m", "N", "N", "N")
@@ -314,17 +314,11 @@ def _of_map(view: Any, key: str) -> NDArray:
 
 def crosscheck_section(results: StudyResults) -> str:
     """VJM against the multibody simulation."""
-    from validation.crosscheck.plot import closing_figure
-
     check, title = results.crosscheck, "Against a multibody simulation"
     if check is None:
         if not results.crosscheck_failure:
             return ""
         return section(title, paragraph(f"Not compared: {results.crosscheck_failure}"))
-    closing = ""
-    if results.closing is not None:
-        figure = closing_figure(check.posture, results.closing)
-        closing = picture(figure, "The simulation closes the open robot by force.")
     return section(
         title,
         paragraph(
@@ -335,7 +329,6 @@ def crosscheck_section(results: StudyResults) -> str:
         ),
         table(check.metric.header(), check.metric.rows(), "cross-check"),
         _slope_chart(check),
-        closing,
     )
 
 
