@@ -1,6 +1,5 @@
 """A diagnosis as one self-contained page."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from forcefit.inputs.writing import write_text
@@ -8,7 +7,6 @@ from forcefit.page.page import (
     Page,
     Provenance,
     Tile,
-    command_line,
     page,
     paragraph,
     section,
@@ -35,13 +33,14 @@ _ASSUMED = (
     "An effect that is none of the library shows as a function learned, or as outside "
     "the library; effects that the design cannot tell apart are named together.",
 )
+NOWHERE = Provenance()
 
 
 def write_report(
     diagnosis: Diagnosis,
     path: Path | str,
     tally: Calibration | None = None,
-    files: Sequence[Path] = (),
+    provenance: Provenance = NOWHERE,
 ) -> None:
     """Write the page, whole or not at all.
 
@@ -49,23 +48,25 @@ def write_report(
         diagnosis: the diagnosis.
         path: of the page.
         tally: how often it is right on this design, if that was simulated.
-        files: of the campaign.
+        provenance: command and files.
 
     Raises:
         BadInput: it cannot be written.
     """
-    write_text(report_page(diagnosis, tally, files), path)
+    write_text(report_page(diagnosis, tally, provenance), path)
 
 
 def report_page(
-    diagnosis: Diagnosis, tally: Calibration | None = None, files: Sequence[Path] = ()
+    diagnosis: Diagnosis,
+    tally: Calibration | None = None,
+    provenance: Provenance = NOWHERE,
 ) -> str:
     """The page as HTML with its charts inside.
 
     Args:
         diagnosis: the diagnosis.
         tally: how often it is right on this design, if that was simulated.
-        files: of the campaign.
+        provenance: command and files.
 
     Returns:
         The whole page.
@@ -99,7 +100,7 @@ def report_page(
             f"{diagnosis.split.how}.",
             body=body,
             assumed=_ASSUMED,
-            provenance=Provenance(command_line(), files),
+            provenance=provenance,
             results=results.table(diagnosis, tally),
         )
     )
