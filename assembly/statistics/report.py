@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
+_GOOD = 0.95  # a yield below it is no good news
 _LISTED = 20  # errors in a table of shares
 _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
@@ -51,7 +52,7 @@ def draws_page(
         Page(
             title=f"{summary['robot']}: random errors",
             verdict=verdict + ".",
-            good=goes["probability"] > 0.5,
+            good=_share(summary)["probability"] >= _GOOD,
             tiles=_draws_tiles(summary),
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
             f"play {summary['play']}: {summary['play_means']}.",
@@ -67,6 +68,13 @@ def draws_page(
     )
 
 
+def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
+    """The yield: all limits kept, or going together where there are none."""
+    limits: Mapping[str, float] | None = summary.get("within_limits")
+    forced: Mapping[str, float] = summary["assembles"]["forced"]
+    return limits or forced
+
+
 def _share_text(interval: Mapping[str, float]) -> str:
     """A probability in per cent, with its interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
@@ -75,7 +83,7 @@ def _share_text(interval: Mapping[str, float]) -> str:
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Yield, pose error, and the errors that matter."""
-    share = summary.get("within_limits") or summary["assembles"]["forced"]
+    share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
     tiles = [Tile("Yield", [f"{100 * share['probability']:.4g} %"],

@@ -131,10 +131,10 @@ def page(content: Page) -> str:
         _assumed(content.assumed),
         _provenance(content.provenance),
         embedded(content.results, "results"),
-        f"<script type='text/plain' id=plotly>{_plotly()}</script>",
-        f"<script>{script}</script></body></html>\n",
     ]
-    return "\n".join(parts)
+    if any("class=spec>" in piece for piece in content.body):
+        parts.append(f"<script type='text/plain' id=plotly>{_plotly()}</script>")
+    return "\n".join([*parts, f"<script>{script}</script></body></html>\n"])
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
