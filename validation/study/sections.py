@@ -33,6 +33,7 @@ MAPPED = {
     "margin": "zone margin, eq. (21)",
 }
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
+_PARTS = ("translation", "rotation")
 WRENCH = ("N m", "N m", "N m", "N", "N", "N")
 _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
 
@@ -81,11 +82,11 @@ def governing_section(results: StudyResults) -> str:
     if worst is None or not results.governing:
         return ""
     rows = [
-        [one["part"], one["what"], *(_change(one, worst, k) for k in worst)]
+        [one["part"], one["what"], *(_change(one, worst, k) for k in _PARTS)]
         for one in results.governing
     ]
     head = ["part", "made perfect"]
-    for part in worst:
+    for part in _PARTS:
         head += [f"largest {in_words(part)}", "change"]
     flat = [[*row[:2], *(cell for pair in row[2:] for cell in pair)] for row in rows]
     return section(
