@@ -3,8 +3,8 @@
     python benchmarks/report_opening.py my_study/report.html
 
 Headless Chromium by selenium, which draws without a graphics card: a desktop is faster.
-Times are from the start of loading: the headline readable, the first screen drawn, every
-figure drawn; and the processor time of the page's thread.
+Times are from the start of loading: the headline readable, the first screen drawn, all
+figures drawn; and the processor time of the page's thread.
 """
 
 import shutil
@@ -16,7 +16,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 TIMES = 5
 MARKS = """
-const at = name => (performance.getEntriesByName(name)[0] || {startTime: NaN}).startTime;
+const at = name => (performance.getEntriesByName(name)[0] || {}).startTime;
 return ['first-contentful-paint', 'first screen', 'drawn'].map(at);
 """
 
@@ -45,9 +45,8 @@ def opened(path: Path) -> list[float]:
 
 def main() -> None:
     """Print size and times of each page that is named."""
-    print(
-        "page, MB, headline [s], plotly.js [s], drawn [s]; least and median of", TIMES
-    )
+    head = "page, MB, headline, first screen, all, processor [s]"
+    print(f"{head}; least and median of {TIMES}")
     for path in map(Path, sys.argv[1:]):
         runs = [opened(path) for _ in range(TIMES)]
         times = [sorted(column) for column in zip(*runs, strict=True)]
