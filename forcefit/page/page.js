@@ -223,7 +223,7 @@
         : null;
       const spans = spec.box.map(([low, high]) => (high - low) / size);
       const thin = spans.indexOf(Math.min(...spans));
-      const eye = [0.45, 0.45, 0.4].map((v, c) => c === thin ? 1.25 : v);
+      const eye = [0.55, 0.55, 0.4].map((v, c) => c === thin ? 1.5 : v);
       const axis = c => ({ title: { text: `${"xyz"[c]} [${unit(spec.length)}]` },
         range: spec.box[c].map(v => v * factor(spec.length)) });
       const told3d = { aspectmode: "manual", xaxis: axis(0), yaxis: axis(1),
