@@ -1,10 +1,11 @@
 # make study   set everything up and run the main job
 # make test    set everything up and run the tests
+# make docs    set everything up and build the site, build/site/index.html
 
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: study test test-slow check clean
+.PHONY: study test test-slow check docs clean
 
 study: .venv/ready
 	$(BIN)/forcefit study examples/irsbot2.toml
@@ -19,6 +20,13 @@ check: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: .venv/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
+.venv/docs: .venv/ready
+	$(BIN)/python -m pip install --quiet -e ".[docs]"
+	@touch $@
 
 .venv/ready: pyproject.toml
 	@sh .ci/system_packages

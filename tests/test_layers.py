@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # from the ground up: a chapter imports only chapters before its own, and itself
 FLOORS = (
-    "forcefit/inputs",
+    "forcefit/inputs", "forcefit/page",
     "stiffness/screws", "stiffness/link", "stiffness/beam", "stiffness/surface",
     "stiffness/mesh", "stiffness/fem", "stiffness/report", "stiffness/exchange",
     "assembly/solvers", "assembly/model", "assembly/kinematics", "assembly/linear",
@@ -20,7 +20,7 @@ FLOORS = (
     "assembly/effects", "assembly/files", "assembly/robots", "assembly/exchange",
     "assembly/sweeps",
     "assembly/statistics",
-    "validation/html", "validation/multibody", "validation/crosscheck",
+    "validation/multibody", "validation/crosscheck",
     "validation/assumptions", "validation/campaign", "validation/exchange",
     "validation/standards", "validation/synthetic",
     "validation/diagnosis", "validation/correction", "validation/inspection",

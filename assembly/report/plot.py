@@ -75,7 +75,7 @@ def robot_plotter(
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
-    exaggeration_factor = exaggeration or _exaggeration(bodies, size)
+    exaggeration_factor = exaggeration or readable_factor(bodies, size)
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1100, 800))
     for i, frame in enumerate(assembly.posture.robot.frames):
         start, end = bodies.starts[i], bodies.ends[i]
@@ -170,8 +170,16 @@ def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
     return DisplacedBodies(starts, ends, at_start, at_end, bends[:, :3, 0])
 
 
-def _exaggeration(bodies: DisplacedBodies, size: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that keeps the plot readable."""
+def readable_factor(bodies: DisplacedBodies, size: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that keeps a plot readable.
+
+    Args:
+        bodies: with their displacements.
+        size: [m] of the robot.
+
+    Returns:
+        The exaggeration: no shift more than a tenth of the size, no turn over 0.5 rad.
+    """
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
     if shift == turn == 0.0:

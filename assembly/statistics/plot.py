@@ -20,7 +20,7 @@ _SCALES = {
     "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
     "moment": (1.0, "N m"), "stress": (1e-6, "MPa"),
 }  # fmt: skip
-_NAMES = {
+NAMES = {
     "rotation": "platform rotation error", "translation": "platform position error",
     "energy": "assembly energy", "margin": "zone margin, compliant joints rigid",
     "margin_free": "zone margin, compliant joints free",
@@ -98,7 +98,7 @@ def _histogram(panel: Any, name: str, values: Any) -> None:
     scale, unit = _SCALES[name]
     x = scale * (values.max(axis=1) if values.ndim == 2 else values)
     x = x[np.isfinite(x)]
-    panel.set(xlabel=f"{_NAMES[name]} [{unit}]", ylabel="draws")
+    panel.set(xlabel=f"{NAMES[name]} [{unit}]", ylabel="draws")
     if len(x) < 2 or np.ptp(x) == 0:
         panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center")
         return
@@ -154,7 +154,7 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
                        label=key.replace("_index", ""))  # fmt: skip
         groups = [plot_label(str(name)) for name in one["group"].values[order]]
         panel.set_yticks(np.arange(bars), groups, fontsize=8)
-        panel.set(xlabel=f"share of the variance: {_NAMES[name]}")
+        panel.set(xlabel=f"share of the variance: {NAMES[name]}")
         if name in POSE_ERRORS:
             panel.set_title(
                 f"play {data.attrs['importance_clearance_model']}", fontsize=9

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
 _ROUNDING = 1e-18  # of the largest value: less is zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
-_WORDS = {
+WORDS = {
     "forced": "goes together, by force if need be",
     "rigid": "goes together by clearances alone, compliant joints rigid",
     "rigid_compliant_free": "goes together by clearances alone, compliant joints free",
@@ -193,7 +193,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
             f"warning: in {summary['play_not_mixed']} draws uniform clearances are not "
             "mixed when their walk ends: their pose errors are too narrow"
         )
-    lines += [f"{_WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
+    lines += [f"{WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
     for key, results in summary["exceeds"].items():
         limit = _named(results["limit"], results["unit"])
         lines.append(f"{_titled(key, results)} above {limit}: {_share(results)}")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands import assembly, stiffness, validation
+from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
@@ -22,6 +22,7 @@ app = typer.Typer(
 app.add_typer(stiffness.app, name="stiffness", help="How stiff is a link?")
 app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
 app.add_typer(validation.app, name="validation", help="Is it true?")
+app.add_typer(report.app, name="report", help="What changed between two runs?")
 app.command()(convert)
 
 

@@ -8,15 +8,14 @@ import typer
 from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.writing import PAGE, ROBOT, check_writable, write_json
+from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.writing import ROBOT, check_writable, write_json
 
 
 def diagnose(
     campaign: CampaignArgument,
     json: JsonOption = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Also write a report, one HTML file.")
-    ] = None,
+    report: ReportOption = None,
     calibrate: Annotated[
         int, typer.Option(help="Simulate this many campaigns on the same design.")
     ] = 0,
@@ -39,9 +38,8 @@ def diagnose(
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
 
-    for path, kind in ((report, PAGE), (save, ROBOT)):
-        if path is not None:
-            check_writable(path, kind)
+    if save is not None:
+        check_writable(save, ROBOT)
     data = read_campaign(campaign)
     with progress_bars() as update:
         diagnosis = trace(data, finite=finite_motions, update=update)
@@ -62,7 +60,8 @@ def diagnose(
     if report is not None:
         from validation.diagnosis.report import write_report
 
-        write_report(diagnosis, report, tally)
+        folder = campaign if campaign.is_dir() else campaign.parent
+        write_report(diagnosis, report, tally, provenance(folder))
     if save is not None:
         if not diagnosis.foretells:
             typer.echo(

@@ -20,8 +20,15 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.progress import progress_bars
+from forcefit.commands.report import ReportOption, provenance
 from forcefit.inputs.errors import BadInput, nearest
-from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+from forcefit.inputs.writing import (
+    PICTURE,
+    check_writable,
+    save_figure,
+    write_json,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from assembly.statistics.allocation import Allocation
@@ -77,6 +84,7 @@ def statistics(
     figure: Annotated[
         Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
     ] = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Draw errors many times: yields, pose errors, what matters.
@@ -132,6 +140,10 @@ def statistics(
         **summarise(data, limits, yield_strength, confidence),
     }  # fmt: skip
     write_json(summary, json)
+    if report is not None:
+        from assembly.statistics.report import draws_page
+
+        write_text(draws_page(summary, data, provenance(robot, errors)), report)
     held.close()
     if json != "-":
         print(summary_text(summary))
@@ -181,6 +193,7 @@ def tolerances(
     figure: Annotated[
         Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
     ] = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """How tight errors must be; with a plan, how loose they may be.
@@ -244,6 +257,10 @@ def tolerances(
             texts.append(allocation_text(results["allocation"]))
             _save_allocation(allocation, output, figure)
     write_json(results, json)
+    if report is not None:
+        from assembly.statistics.report import tolerances_page
+
+        write_text(tolerances_page(results, provenance(robot, plan)), report)
     held.close()
     if json != "-":
         print("\n".join(texts))

@@ -1,27 +1,46 @@
 """A diagnosis as one self-contained page."""
 
-import html
 from pathlib import Path
 
 from forcefit.inputs.writing import write_text
+from forcefit.page.page import (
+    Page,
+    Provenance,
+    Tile,
+    page,
+    paragraph,
+    section,
+)
+from forcefit.page.tables import Cell, Column, Value, table
+from validation.diagnosis import results
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.figures import (
-    confounding_figure,
-    covariate_figure,
-    error_figure,
-    ladder_figure,
-    probability_figure,
-    vector_figure,
+    confounding_chart,
+    covariate_charts,
+    error_chart,
+    ladder_chart,
+    probability_chart,
+    vector_charts,
 )
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import LISTED, effects, learned, steps
 from validation.diagnosis.sentence import calibration_text, open_text, sentence
 from validation.diagnosis.verdict import Calibration
-from validation.html import html_figure, html_page, html_table
+
+_ASSUMED = (
+    "Rows kept aside chose and fitted nothing; errors before and after are theirs.",
+    "Readings scatter as their sigma states, unless the noise below says otherwise.",
+    "An effect that is none of the library shows as a function learned, or as outside "
+    "the library; effects that the design cannot tell apart are named together.",
+)
+NOWHERE = Provenance()
 
 
 def write_report(
-    diagnosis: Diagnosis, path: Path | str, tally: Calibration | None = None
+    diagnosis: Diagnosis,
+    path: Path | str,
+    tally: Calibration | None = None,
+    provenance: Provenance = NOWHERE,
 ) -> None:
     """Write the page, whole or not at all.
 
@@ -29,77 +48,100 @@ def write_report(
         diagnosis: the diagnosis.
         path: of the page.
         tally: how often it is right on this design, if that was simulated.
+        provenance: command and files.
 
     Raises:
         BadInput: it cannot be written.
     """
-    write_text(report_page(diagnosis, tally), path)
+    write_text(report_page(diagnosis, tally, provenance), path)
 
 
-def report_page(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
-    """The page as HTML with its pictures inside.
+def report_page(
+    diagnosis: Diagnosis,
+    tally: Calibration | None = None,
+    provenance: Provenance = NOWHERE,
+) -> str:
+    """The page as HTML with its charts inside.
 
     Args:
         diagnosis: the diagnosis.
         tally: how often it is right on this design, if that was simulated.
+        provenance: command and files.
 
     Returns:
         The whole page.
     """
     campaign = diagnosis.campaign
-    settled = diagnosis.verdict in {"explained", "learned", "none_needed"}
-    parts = [
-        f"<h1>Diagnosis of {html.escape(campaign.name)}</h1>",
-        f"<p class='verdict {'good' if settled else 'bad'}'>"
-        f"{html.escape(sentence(diagnosis))}</p>",
-        f"<p>{len(campaign)} rows, robot {html.escape(campaign.robot.name)}; "
-        f"{html.escape(diagnosis.split.how)}.</p>",
-        "<h2>Before and after</h2>",
-        html_figure(error_figure(diagnosis), "Rows that chose and fitted nothing."),
-        "<h2>What every step bought</h2>",
-        html_figure(ladder_figure(diagnosis), "Line at 1: noise as stated."),
-        html_table(
-            ["step", "unknowns", "rms kept aside", "unit", "sigma"],
-            [
-                [
-                    row["term"],
-                    f"{row['unknowns']:.0f}",
-                    f"{row['kept_aside_rms']:.3g}",
-                    row["unit"],
-                    f"{row['kept_aside_sigma']:.3g}",
-                ]
-                for row in steps(diagnosis)
-            ],
-        ),
+    body = [
+        section("Before and after", error_chart(diagnosis)),
+        section("What every step bought", ladder_chart(diagnosis), _steps(diagnosis)),
         *_learned(diagnosis),
         *_parameters(diagnosis),
-        "<h2>Where the residual is</h2>",
-        html_figure(vector_figure(diagnosis), "All rows but outliers."),
-        "<h2>What it varies with</h2>",
-        html_figure(covariate_figure(diagnosis), "Line at 1: noise as stated."),
-        *_structure(diagnosis),
-        "<h2>Which effect</h2>",
-        html_figure(
-            probability_figure(diagnosis), "Posterior weight of all sets with it."
+        section("Where the residual is", vector_charts(diagnosis)),
+        section(
+            "What it varies with", covariate_charts(diagnosis), *_structure(diagnosis)
         ),
-        html_table(
-            ["set of effects", "probability"],
-            [[" + ".join(n) or "none", f"{p:.3f}"] for n, p in diagnosis.alternatives],
-        ),
-        "<h2>What this design can tell apart</h2>",
-        html_figure(
-            confounding_figure(diagnosis),
-            "1: whatever the row's effect does, the column's can do as well.",
-        ),
+        section("Which effect", probability_chart(diagnosis), _sets(diagnosis)),
+        section("What this design can tell apart", confounding_chart(diagnosis)),
         *_next(diagnosis),
         *_noise(diagnosis),
     ]
     if tally is not None:
-        parts += [
-            "<h2>How often this is right</h2>",
-            f"<p>{html.escape(calibration_text(tally))}</p>",
-        ]
-    return html_page(f"Diagnosis of {campaign.name}", "\n".join(parts))
+        body.append(
+            section("How often this is right", paragraph(calibration_text(tally)))
+        )
+    return page(
+        Page(
+            title=f"Diagnosis of {campaign.name}",
+            verdict=sentence(diagnosis),
+            good=diagnosis.verdict in {"explained", "learned", "none_needed"},
+            tiles=_tiles(diagnosis),
+            about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
+            f"{diagnosis.split.how}.",
+            body=body,
+            assumed=_ASSUMED,
+            provenance=provenance,
+            results=results.table(diagnosis, tally),
+        )
+    )
+
+
+def _tiles(diagnosis: Diagnosis) -> list[Tile]:
+    """Verdict, error before and after, the likeliest effect, what to measure."""
+    before, after = diagnosis.before, diagnosis.after
+    tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
+    for kind, unit in (("position", "m"), ("rotation", "rad")):
+        values = [getattr(errors, kind) for errors in (before, after)]
+        if all(v == v for v in values):  # NaN: not measured
+            tiles.append(Tile(f"Error of {kind}, rms", [
+                Value(values[0], unit, 3), " to ", Value(values[1], unit, 3),
+            ], ["before and after, on rows kept aside."]))  # fmt: skip
+    names = " + ".join(diagnosis.best_by_score) or "nothing"
+    likely = max(diagnosis.probability.values(), default=0.0)
+    tiles.append(Tile("Likeliest cause", [names.replace("_", " ")],
+                      [f"probability of an effect up to {likely:.3f}."]))  # fmt: skip
+    if diagnosis.next is not None:
+        tiles.append(Tile("Measure next", [diagnosis.next.why]))
+    return tiles
+
+
+def _steps(diagnosis: Diagnosis) -> str:
+    """Table of the ladder."""
+    rows: list[list[Cell]] = [
+        [row["term"], f"{row['unknowns']:.0f}",
+         Value(row["kept_aside_rms"], row["unit"], 3),
+         Value(row["kept_aside_sigma"], "", 3)]
+        for row in steps(diagnosis)
+    ]  # fmt: skip
+    return table(["step", "unknowns", "rms kept aside", "sigma"], rows, "steps")
+
+
+def _sets(diagnosis: Diagnosis) -> str:
+    """Table of the sets of effects."""
+    rows: list[list[Cell]] = [
+        [" + ".join(n) or "none", p] for n, p in diagnosis.alternatives
+    ]
+    return table(["set of effects", Column("probability", digits=3)], rows)
 
 
 def _learned(diagnosis: Diagnosis) -> list[str]:
@@ -112,40 +154,38 @@ def _learned(diagnosis: Diagnosis) -> list[str]:
     if not rows:
         return []
     head = ["where", "of", "form", "value [rad, m, per N m or N]"]
-    return ["<h2>Learned</h2>", html_table(head, rows)]
+    return [section("Learned", table(head, rows))]
 
 
 def _parameters(diagnosis: Diagnosis) -> list[str]:
     """Table of the best set's numbers."""
     if diagnosis.verdict not in LISTED:
         return []
-    rows = []
+    rows: list[list[Cell]] = []
     for effect in effects(diagnosis):
         for p in effect["parameters"]:
             low, high = p["interval_90"]
             rows.append([
                 f"{effect['name']}: {p['name']}",
-                f"{p['value']:.6g}",
-                f"{p['std']:.2g}",
-                f"{low:.6g} .. {high:.6g}",
-                p["unit"],
-            ])
+                Value(p["value"], p["unit"], 6), Value(p["std"], p["unit"], 2),
+                Value(low, p["unit"], 6), Value(high, p["unit"], 6),
+            ])  # fmt: skip
     title = "Parameters, if so" if diagnosis.verdict == "ambiguous" else "Parameters"
-    head = ["parameter", "value", "std", "90 % interval", "unit"]
-    return [f"<h2>{title}</h2>", html_table(head, rows)]
+    head = ["parameter", "value", "standard deviation", "at least (90 %)", "at most"]
+    return [section(title, table(head, rows, "parameters"))]
 
 
 def _structure(diagnosis: Diagnosis) -> list[str]:
     """Table of what is left varies with."""
     if not diagnosis.trends:
         return []
-    rows = [
+    rows: list[list[Cell]] = [
         [t.against, f"{100 * t.share:.0f} %", f"{t.probability:.1g}"]
         for t in diagnosis.trends
     ]
     return [
-        "<p>What is left after the best set of effects varies with:</p>",
-        html_table(["against", "share of its square", "by chance"], rows),
+        paragraph("What is left after the best set of effects varies with:"),
+        table(["against", "share of its square", "by chance"], rows),
     ]
 
 
@@ -157,9 +197,11 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     rows.append(["load [N m, N]", load_text(diagnosis.next.load)])
     rows += [[k, f"{v:g}"] for k, v in diagnosis.next.covariates.items()]
     return [
-        "<h2>Measure next</h2>",
-        f"<p>{html.escape(diagnosis.next.why)}.</p>",
-        html_table(["command", "value"], rows),
+        section(
+            "Measure next",
+            paragraph(f"{diagnosis.next.why}."),
+            table(["command", "value"], rows),
+        )
     ]
 
 
@@ -174,14 +216,11 @@ def _noise(diagnosis: Diagnosis) -> list[str]:
         if lack.repeats_freedom
         else "no repeats to judge it by"
     )
-    return [
-        "<h2>Noise and outliers</h2>",
-        f"<p>What is left is {lack.rms:.2f} of the stated sigma (probability "
-        f"{lack.probability:.2g} by chance); {repeats}.</p>",
-        f"<p>Left out as outliers: {html.escape(', '.join(far)) or 'none'}.</p>",
-        *(
-            [f"<p>{html.escape(open_text(diagnosis.open))}.</p>"]
-            if diagnosis.open.any()
-            else []
-        ),
+    texts = [
+        f"What is left is {lack.rms:.2f} of the stated sigma (probability "
+        f"{lack.probability:.2g} by chance); {repeats}.",
+        f"Left out as outliers: {', '.join(far) or 'none'}.",
     ]
+    if diagnosis.open.any():
+        texts.append(f"{open_text(diagnosis.open)}.")
+    return [section("Noise and outliers", *map(paragraph, texts))]

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from assembly.report.platform_stiffness import DIRECTIONS, plot_shares, share_rows
+from forcefit.page.page import picture
+from forcefit.page.tables import table
 from stiffness.screws import SCREW
-from validation.html import html_figure, html_table
 
 _SHOWN = 8  # parts in the table
 
@@ -40,11 +41,11 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         "N/rad, N m/m, N/m]"
         + (f"; {free} motions that nothing resists" if free else "")
         + ".</p>"
-        + html_table(["", *SCREW], rows)
+        + table(["", *SCREW], rows)
         + f"<p>Eigen-stiffnesses [N/m], angles times "
         f"{stiffness['characteristic_length']:.4g} m: {eigen}.</p>"
         "<p>Which part gives way: shares in the compliance along each axis [%], the "
         "largest first.</p>"
-        + html_table(["part", *DIRECTIONS], blame)
-        + html_figure(plot_shares(stiffness), "Shares of links and joints.")
+        + table(["part", *DIRECTIONS], blame)
+        + picture(plot_shares(stiffness), "Shares of links and joints.")
     )

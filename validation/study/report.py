@@ -1,41 +1,37 @@
 """Report of a study: one self-contained HTML page, and the results as JSON."""
 
-import html
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
-from stiffness.screws import SCREW
-from validation.crosscheck.verdict import verdict_text
-from validation.html import (
-    html_figure,
-    html_image,
-    html_page,
-    html_table,
-    png_bytes,
-)
+from forcefit.page.page import Page, Provenance, Tile, command_line, page
+from forcefit.page.tables import Value
 from validation.study.headline import verdict, worst_clearance
 from validation.study.platform_section import platform_section
+from validation.study.sections import (
+    crosscheck_section,
+    governing_section,
+    maps_section,
+    reference_section,
+    robot_section,
+    solution_section,
+    stiffness_section,
+    unchecked_section,
+)
 from validation.study.study import StudyResults, points_solved
 
-_CLEARANCE_OF = {
-    "frozen": "anywhere while no deformation changes",
-    "free": "anywhere, and compliant joints turn about their own axis",
-    "budget": "anywhere, and springs too, with 5 % more than the least energy",
-}
-# of the maps: key, name, factor
-_MAPPED = (
-    ("margin", "zone margin, eq. (21)", 1.0),
-    ("margin_free", "zone margin, compliant joints free", 1.0),
-    ("energy", "energy, eq. (22) [J]", 1.0),
-    ("rotation_error", "largest turn, eq. (27) [mrad], clearances anywhere", 1e3),
-    ("translation_error", "largest shift, eq. (27) [mm], clearances anywhere", 1e3),
+_ASSUMED = (
+    "Small screws: the closures are linear in them; the linearisation error and the "
+    "cross-check show what that costs at these errors.",
+    "Links are elastic between their ends; no contact stiffness, friction, temperature "
+    "or dynamics.",
+    "The cross-check leaves the clearances out on both sides.",
+    "Between the points of a grid nothing is certified.",
 )
 
 
@@ -81,6 +77,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "reference": results.reference,
         "stiffness": results.stiffness,
         "platform_stiffness": results.platform_stiffness,
+        "governing": results.governing,
     }
     if results.crosscheck is not None:
         table["crosscheck"] = results.crosscheck.table()
@@ -110,276 +107,104 @@ def map_summary(maps: Any) -> dict[str, Any]:
 
 
 def report_page(results: StudyResults) -> str:
-    """The page as HTML with its pictures inside."""
+    """The page as HTML, which needs no other file."""
     study, robot = results.study, results.robot
-    parts = [
-        f"<h1>{html.escape(study.title)}</h1>",
-        f"<p class=note>{html.escape(robot.name)}: {html.escape(robot.description)}. "
-        f"{len(robot.frames)} frames, {len(robot.closures)} closures; "
-        f"{html.escape(study.errors)}; link stiffness: {study.source}. "
-        f"forcefit {version('forcefit')}. SI units, screws [R T], wrenches [M F].</p>",
-        _verdict(results),
-        _unchecked(results),
-        _solution(results),
+    body = [
+        unchecked_section(results),
+        robot_section(results),
+        governing_section(results),
+        maps_section(results, map_summary(results.maps))
+        if results.maps is not None
+        else "",
+        solution_section(results),
         platform_section(results.platform_stiffness),
+        reference_section(results),
+        stiffness_section(results),
+        crosscheck_section(results),
     ]
-    if results.reference is not None:
-        parts.append(_reference(results))
-    if results.stiffness:
-        parts.append(_stiffness(results.stiffness))
-    if results.maps is not None:
-        parts.append(_maps(results))
-    if results.assembly is not None and "picture" in study.checks:
-        parts.append(_picture(results))
-    if results.crosscheck is not None or results.crosscheck_failure:
-        parts.append(_crosscheck(results))
-    parts.append(_left_out())
-    return html_page(study.title, "\n".join(parts))
-
-
-def _verdict(results: StudyResults) -> str:
-    """The conclusion at the top."""
-    kind = "good" if results.passed else "bad"
-    return f"<p class='verdict {kind}'>{html.escape(verdict(results))}</p>"
-
-
-def _unchecked(results: StudyResults) -> str:
-    """What could not be checked, and why."""
-    if not results.unchecked:
-        return ""
-    rows = [[name, why] for name, why in results.unchecked.items()]
-    return "<h2>What could not be checked</h2>" + html_table(["check", "why"], rows)
-
-
-def _solution(results: StudyResults) -> str:
-    """The assembly at the study's pose, with its certificate."""
-    solution = results.solution
-    pose = ", ".join(
-        f"{k} = {round(v, 9) + 0.0:g}" for k, v in solution["pose"].items()
+    about = (
+        f"{robot.name}: {robot.description}. {len(robot.frames)} frames, "
+        f"{len(robot.closures)} closures; {study.errors}; link stiffness: "
+        f"{study.source}."
     )
-    parts = [f"<h2>Assembly at one pose</h2><p>Nominal pose: {pose} [m, rad].</p>"]
-    rows = [[k, str(v)] for k, v in solution["mobility"].items()]
-    zone = solution.get("zone", {})
-    for key in ("margin", "margin_free"):
-        rows.append([f"zone {key}, eq. (21)", _number(zone.get(key))])
-    if solution["status"] == "ok":
-        rows.append(["energy, eq. (22) [J]", f"{solution['energy']:.9g}"])
-        for name, value in zip(SCREW, solution["platform_screw"], strict=True):
-            quantity = f"platform error {name} [rad, m], clearances at least energy"
-            rows.append([quantity, f"{value:.6e}"])
-        for key, value in solution["certificate"].items():
-            rows.append([f"certificate: {key}", f"{value:.2e}"])
-        rows += _linearisation_rows(solution["linearisation_error"])
-    parts.append(html_table(["quantity", "value"], rows))
-    if solution["status"] == "ok":
-        parts.append(_wrenches(results))
-    if results.error:
-        parts.append(_pose_error(results))
-    return "".join(parts)
+    command = command_line()
+    return page(
+        Page(
+            title=study.title,
+            verdict=verdict(results),
+            good=results.passed,
+            tiles=_tiles(results),
+            about=about,
+            body=body,
+            assumed=[f"{study.errors[0].upper()}{study.errors[1:]}.", *_ASSUMED],
+            provenance=Provenance(command, study.files),
+            results=results_table(results),
+        )
+    )
 
 
-def _linearisation_rows(error: dict[str, Any]) -> list[list[str]]:
-    """What linear closures cost against finite motions."""
-    if error["status"] != "ok":
-        return [["linearisation error", error["status"]]]
+def _tiles(results: StudyResults) -> list[Tile]:
+    """Worst case, what governs it, what to tighten, the force, the checks."""
+    if results.assembly is None:
+        return [Tile("Assembly", [results.solution["status"]])]
+    worst = worst_clearance(results)
+    tiles = []
+    if worst["pose"] is not None:
+        over = worst["map"]
+        tiles.append(Tile("Certified worst case", _bound(worst["pose"]), [
+            "Wherever its clearances rest, at this pose",
+            *(["; over the map ", *_bound(over)] if over is not None else []), ".",
+        ]))  # fmt: skip
+        tiles += _governing_tiles(results, worst["pose"])
+    force = max(
+        (float(np.linalg.norm(results.assembly.wrenches[i, 3:])), frame.name)
+        for i, frame in enumerate(results.robot.frames)
+    )
+    tiles.append(Tile("Force to close it", [Value(force[0], "N")], [
+        f"largest, at {force[1]}; energy ", Value(results.assembly.energy, "J"), ".",
+    ]))  # fmt: skip
+    passed = sum(v == "passed" for v in results.verdicts.values())
+    note = (
+        [f"Not checked: {', '.join(results.unchecked)}."] if results.unchecked else []
+    )
+    answer = f"{passed} of {len(results.verdicts)} passed"
+    return [*tiles, Tile("Independent checks", [answer], note)]
+
+
+def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
+    """The part whose imperfection costs most, and what is won by removing it."""
+    known = [
+        one for one in results.governing
+        if one["translation"] is not None and np.isfinite(one["translation"])
+    ]  # fmt: skip
+    whole = worst["translation"]
+    if not known or not np.isfinite(whole) or whole == 0.0:
+        return []
+    best = known[0]
+    won = 1 - best["translation"] / whole
+    if won < 0.01:
+        none = "No single part: each alone changes it by less than 1 %."
+        return [Tile("What governs it", ["many parts"], [none])]
+    further = ", ".join(
+        f"{one['part']} ({one['what']}, {_percent(one['translation'] / whole)})"
+        for one in known[1:4]
+        if one["translation"] < 0.99 * whole
+    )
     return [
-        ["linearisation error, rotation [rad]", _size(error["rotation"])],
-        ["linearisation error, translation [m]", _size(error["translation"])],
-        ["linearisation error, energy", f"{100 * error['relative_energy']:+.3g} %"],
-    ]
-
-
-def _size(vector: NDArray) -> str:
-    """Length of a vector."""
-    return f"{np.linalg.norm(vector):.2e}"
-
-
-def _pose_error(results: StudyResults) -> str:
-    """Bounds of (27) in each reading."""
-    rows = []
-    for reading, bounds in results.error.items():
-        row = [reading]
-        for key in ("rotation", "translation"):
-            row += [f"{1e3 * bounds[key][side]:.6g}" for side in ("lower", "upper")]
-        rows.append([*row, _CLEARANCE_OF[reading]])
-    head = [
-        "reading",
-        "rotation >=",
-        "<= [mrad]",
-        "translation >=",
-        "<= [mm]",
-        "clearances",
-    ]
-    return (
-        "<p>Largest error of the platform's pose, problem (27), between certified "
-        "bounds.</p>" + html_table(head, rows)
-    )
-
-
-def _wrenches(results: StudyResults) -> str:
-    """Wrench through each elastic link."""
-    frames = results.solution["frames"]
-    rows = [
-        [f.name, *(f"{v:.4g}" for v in frames[f.name]["wrench"])]
-        for f in results.robot.frames
-        if f.link is not None
-    ]
-    head = ["link", "MX", "MY", "MZ [N m]", "FX", "FY", "FZ [N]"]
-    return (
-        "<p>Wrench each elastic link transmits, at its tip in its own axes:</p>"
-        + html_table(head, rows)
-    )
-
-
-def _reference(results: StudyResults) -> str:
-    """The printed problems solved again."""
-    reference, solution = results.reference, results.solution
-    assert reference is not None
-    if "reason" in reference:
-        return (
-            "<h2>The same problems as printed, in cvxpy</h2>"
-            f"<p>Not compared: {html.escape(reference['reason'])}</p>"
-        )
-    ours = {"energy": solution["energy"], "margin": solution["zone"]["margin"]}
-    ours["margin_free"] = solution["zone"]["margin_free"]
-    rows = [
-        [k, _number(ours[k], 10), _number(reference[k], 10),
-         "nothing to compare" if np.isnan(d) else f"{d:.1e}"]
-        for k, d in reference["relative_difference"].items()
+        Tile("What governs it", [best["part"]], [f"its {best['what']}."]),
+        Tile("What to tighten", [f"{best['part']}: {-100 * won:.0f} %"], [
+            f"without its {best['what']} the worst case is ",
+            Value(best["translation"], "m"), f"; then {further}." if further else ".",
+        ]),
     ]  # fmt: skip
-    return (
-        "<h2>The same problems as printed, in cvxpy</h2>"
-        "<p>Every screw of every frame a variable, every constraint an equation of the "
-        f"paper; differences must stay below {reference['tolerance']:g}.</p>"
-        + html_table(["", "reduced problem", "cvxpy", "relative difference"], rows)
-    )
 
 
-def _stiffness(stiffness: dict[str, dict[str, Any]]) -> str:
-    """Beam against finite elements."""
-    from validation.crosscheck.plot import stiffness_figure
-
-    name, compared = next(iter(stiffness.items()))
-    shared = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
-    fea, euler, timoshenko = (compared[k] for k in ("fea", "euler", "timoshenko"))
-    rows = [
-        [f"{SCREW[i]}, {SCREW[j]}", f"{euler[i, j]:.6g}", f"{timoshenko[i, j]:.6g}",
-         f"{fea[i, j]:.6g}", f"{100 * (fea[i, j] / timoshenko[i, j] - 1):+.2f} %"]
-        for i, j in zip(*np.nonzero(np.triu(_significant(euler))), strict=True)
-    ]  # fmt: skip
-    count = compared["mesh"].get("elements", "?")
-    return (
-        f"<h2>Link stiffness K_E: beam and finite elements</h2><p>Link "
-        f"{html.escape(name)}{shared}, {count} cubic tetrahedra, estimated error "
-        f"{100 * compared['relative_error_estimate']:.2g} %. A solid held at a "
-        "rigid face is stiffer than a beam by about r/L of itself, and a beam without "
-        "shear (Euler-Bernoulli) is stiffer than one with it: a few per cent between "
-        "the columns are physics, not an error.</p>"
-        + html_table(
-            ["entry [N m/rad .. N/m]", "Euler-Bernoulli", "Timoshenko",
-             "finite elements", "to Timoshenko"],
-            rows,
-        )
-        + html_figure(
-            stiffness_figure(timoshenko, fea),
-            "Finite elements minus Timoshenko beam, entry by entry.",
-        )
-    )  # fmt: skip
+def _percent(ratio: float) -> str:
+    """A change in per cent."""
+    return f"{100 * (ratio - 1):+.0f} %"
 
 
-def _significant(K: NDArray) -> NDArray:
-    """(6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
-    size = np.sqrt(np.diag(K))
-    return np.abs(K) > 1e-3 * np.outer(size, size)
-
-
-def _maps(results: StudyResults) -> str:
-    """Maps over the grid."""
-    from assembly.sweeps.maps import map_figure
-
-    summary = map_summary(results.maps)
-    rows = [
-        [name, *(f"{factor * v:.4g}" for v in summary[key])]
-        for key, name, factor in _MAPPED
-        if key in summary
-    ]
-    counts = html.escape(", ".join(f"{k}: {v}" for k, v in summary["status"].items()))
-    share = summary["share_assemblable_free"]
-    if share is None:
-        return f"<h2>Over the workspace</h2><p>{counts}. No point has an answer.</p>"
-    axes = [d for d in results.maps["energy"].dims if results.maps.sizes[d] > 1]
-    picture = ""
-    if len(axes) == 2:
-        picture = html_figure(
-            map_figure(results.maps),
-            "Maps over the grid; the platform's errors are the bounds of (27), "
-            "clearances anywhere.",
-        )
-    return (
-        f"<h2>Over the workspace</h2><p>{counts}. Assembles rigidly with "
-        f"compliant joints free at {100 * share:.1f} % of the points with an answer."
-        "</p>" + html_table(["", "least", "median", "largest"], rows) + picture
-    )
-
-
-def _picture(results: StudyResults) -> str:
-    """The robot, deformed."""
-    from assembly.report.plot import robot_plotter
-
-    assert results.assembly is not None
-    plotter = robot_plotter(results.assembly)
-    pixels = plotter.screenshot(return_img=True)
-    plotter.close()
-    caption = (
-        "Nominal (grey) and forced robot, its clearances at least energy; the "
-        "exaggeration is on the picture."
-    )
-    return "<h2>The forced robot</h2>" + html_image(png_bytes(pixels), caption)
-
-
-def _crosscheck(results: StudyResults) -> str:
-    """VJM against the multibody simulation."""
-    from validation.crosscheck.plot import closing_figure, slope_figure
-
-    check = results.crosscheck
-    head = "<h2>Against a multibody simulation</h2><p>"
-    if check is None:
-        return f"{head}Not compared: {html.escape(results.crosscheck_failure)}</p>"
-    closing = ""
-    if results.closing is not None:
-        figure = closing_figure(check.posture, results.closing)
-        closing = html_figure(figure, "The simulation closes the open robot by force.")
-    return (
-        head + "The same forced assembly, without "
-        "clearances, as a geometrically nonlinear flexible multibody system (Exudyn). "
-        "A linearised model must differ from it by the square of the errors' size: "
-        f"slope 2. {_slope_text(check.slope)} {html.escape(verdict_text(check))}.</p>"
-        + html_table(check.metric.header(), check.metric.rows())
-        + html_figure(
-            slope_figure(check),
-            "Difference of the platform's pose, without clearances.",
-        )
-        + closing
-    )
-
-
-def _slope_text(slope: float) -> str:
-    """The slope measured, if there is one."""
-    if np.isnan(slope):
-        return "Nothing separates the two here, so there is no slope."
-    return f"Measured: {slope:.3f}."
-
-
-def _left_out() -> str:
-    """Limits of the model."""
-    return (
-        "<h2>What this leaves out</h2><p>Small screws: the closures are linear in "
-        "them, and the cross-check above shows what that costs at these errors. Links "
-        "act at their ends; no contact stiffness, friction, temperature or dynamics. "
-        "The cross-check leaves the clearances out on both sides.</p>"
-    )
-
-
-def _number(value: float | None, digits: int = 6) -> str:
-    """A number, or that there is none."""
-    return "none" if value is None else f"{value:.{digits}g}"
+def _bound(bounds: dict[str, float]) -> list[str | Value]:
+    """A pose error that is not exceeded."""
+    return [Value(bounds["translation"], "m", 3), " and ",
+            Value(bounds["rotation"], "rad", 3)]  # fmt: skip

@@ -30,6 +30,7 @@ from validation.multibody.simulation import (
     closing_sequence,
     without_clearance,
 )
+from validation.study.governing import governing
 from validation.study.printed_problems import compare_printed
 from validation.study.study_file import Study
 
@@ -53,6 +54,8 @@ class StudyResults:
         crosscheck: against the multibody simulation.
         crosscheck_failure: why there is none although it was asked for; empty if so.
         platform_stiffness: K_C there, as ``assembly stiffness`` gives it.
+        governing: bounds of (27) with one part made perfect, as
+            :func:`validation.study.governing.governing` gives them.
         closing: (k, n, 4, 4) frames while the simulation closes the closures, None
             where it cannot.
     """
@@ -69,6 +72,7 @@ class StudyResults:
     crosscheck_failure: str
     closing: NDArray | None
     platform_stiffness: dict[str, Any]
+    governing: list[dict[str, Any]]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -176,6 +180,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         crosscheck_failure=failure.get("reason", ""),
         closing=closing,
         platform_stiffness=stiffness_of(posture),
+        governing=governing(posture) if solved else [],
     )
 
 

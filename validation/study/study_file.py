@@ -42,6 +42,7 @@ class Study:
         checks: names of the checks to run.
         asked: those of them that the file asks for by name, by a grid or by scales.
         folder: to write.
+        files: that were read: the study's own, a robot's, a surface's.
     """
 
     title: str
@@ -56,6 +57,7 @@ class Study:
     checks: tuple[str, ...]
     asked: tuple[str, ...]
     folder: Path
+    files: tuple[Path, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -108,6 +110,16 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
         checks=checks,
         asked=wanted,
         folder=folder,
+        files=_files(path, root, meshes),
+    )
+
+
+def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
+    """The files that a study is made of, each once."""
+    robot = path.parent / root.text("robot")
+    surfaces = (Path(mesh.surface) for mesh in meshes.values())
+    return tuple(
+        dict.fromkeys([path, *([robot] if robot.is_file() else []), *surfaces])
     )
 
 

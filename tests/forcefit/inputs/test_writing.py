@@ -39,7 +39,7 @@ _MAY = {
     "stiffness/mesh/mesh_worker.py",  # likewise
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "forcefit/commands/assembly.py",  # pixels of a screenshot
-    "validation/html.py",  # into memory
+    "forcefit/page/page.py",  # into memory
     "assembly/statistics/replay.py",  # likewise
     "validation/study/report.py",  # likewise
 }

@@ -202,19 +202,6 @@ def test_the_closing_sequence_goes_from_open_to_shut(rng):
     np.testing.assert_allclose(sequence[-1], shut, rtol=0, atol=1e-9)
 
 
-def test_the_closing_figure_marks_the_open_closures(rng):
-    from validation.crosscheck.plot import closing_figure
-
-    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
-    panels = closing_figure(posture, closing_sequence(posture)).axes
-    assert [panel.get_title() for panel in panels] == ["open", "closing", "shut"]
-    lengths = []
-    for panel in panels:
-        ends = np.array([line.get_data_3d() for line in panel.lines[-2:]])
-        lengths.append(np.linalg.norm(np.diff(ends, axis=2), axis=1).max())
-    assert lengths[0] > lengths[1] > 1e6 * lengths[2]
-
-
 def resident():
     """[MiB] memory of this process."""
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()

@@ -1,0 +1,112 @@
+"""The robot as a scene of a page: turned, exaggerated and closed by the reader."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.linear.energy import Assembly
+from assembly.linear.error_body import ErrorBody
+from assembly.report.plot import DisplacedBodies, displaced_bodies, readable_factor
+from forcefit.page.charts import scene
+from forcefit.page.units import shown_in
+from stiffness.screws import skew
+
+_SAMPLES = 9  # points along a body, enough for the cubic of a bent beam
+
+
+def robot_scene(
+    assembly: Assembly, closing: NDArray | None, body: ErrorBody | None, caption: str
+) -> str:
+    """An assembled robot, nominal and forced, as HTML.
+
+    Displacements are linear in the exaggeration: those of small screws, a bent link the
+    cubic of a beam.
+
+    Args:
+        assembly: of a robot of n frames.
+        closing: (k, n, 4, 4) frames while a simulation closes it, None without.
+        body: of the errors its platform can have, None without.
+        caption: below it.
+
+    Returns:
+        A figure of a page.
+    """
+    posture = assembly.posture
+    bodies = displaced_bodies(assembly)
+    ends = posture.transforms[:, :3, 3]
+    size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
+    middle = (ends.max(axis=0) + ends.min(axis=0)) / 2
+    half = np.maximum(np.ptp(ends, axis=0) / 2, 0.15 * size) + 0.15 * size
+    largest = float(np.linalg.norm(bodies.end_screws[:, 3:], axis=1).max())
+    spec = {
+        "bodies": [_body(assembly, bodies, i) for i in range(len(ends))],
+        "closures": [
+            [posture.robot.index(name) for name in pair]
+            for pair in posture.robot.closures
+        ],
+        "closing": [] if closing is None else closing[:, :, :3, 3] - ends,
+        "forces": _forces(assembly),
+        "body": None if body is None else _error_body(body, posture.platform[:3, 3]),
+        "exaggeration": readable_factor(bodies, size),
+        "box": np.stack([middle - half, middle + half], axis=1),
+        "length": asdict(shown_in("m", size)),
+        "displacement": asdict(shown_in("m", largest)),
+    }
+    return scene(spec, caption)
+
+
+def _body(assembly: Assembly, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
+    """A body: points along it, how far each is moved, and what it ends in."""
+    robot = assembly.posture.robot
+    frame, parent = robot.frames[i], int(robot.parents[i])
+    start, end = bodies.starts[i], bodies.ends[i]
+    s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+    return {
+        "name": frame.name, "parent": parent, "joint": frame.joint,
+        "actuated": frame.actuated, "elastic": frame.link is not None,
+        "kind": "elastic" if frame.link is not None else "rigid",
+        "long": bool(np.linalg.norm(end - start) > 1e-9),
+        "nominal": start + s * (end - start), "moved": _moved(bodies, i, s),
+    }  # fmt: skip
+
+
+def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
+    """(k, 3) [m] displacements along a body: a cubic with the turns of its ends."""
+    chord = bodies.ends[i] - bodies.starts[i]
+    a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
+    if not np.any(bodies.bends[i]):
+        return a + s * (b - a)
+    # exact for a cantilever loaded at its end: its deflection is a cubic
+    turn = bodies.start_screws[i, :3]
+    slope_a, slope_b = skew(turn) @ chord, skew(turn + bodies.bends[i]) @ chord
+    return (
+        (2 * s**3 - 3 * s**2 + 1) * a + (s**3 - 2 * s**2 + s) * slope_a
+        + (3 * s**2 - 2 * s**3) * b + (s**3 - s**2) * slope_b
+    )  # fmt: skip
+
+
+def _forces(assembly: Assembly) -> list[dict[str, Any]]:
+    """Forces [N] that elastic links transmit at their tips, base axes."""
+    posture = assembly.posture
+    turned = posture.transforms[:, :3, :3] @ assembly.wrenches[:, 3:, None]
+    largest = float(np.abs(turned).max(initial=0.0))
+    return [
+        {"body": i, "force": force}
+        for i, (frame, force) in enumerate(
+            zip(posture.robot.frames, turned[..., 0], strict=True)
+        )
+        if frame.link is not None and np.linalg.norm(force) > 1e-6 * largest
+    ]
+
+
+def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
+    """The errors the platform can have, around its origin."""
+    sizes = np.linalg.norm(body.points, axis=1)
+    shown = shown_in("m", float(sizes.max(initial=0.0)))
+    text = f"errors the platform can have, up to {sizes.max() * shown.factor:.4g}"
+    return {
+        "points": body.points, "faces": body.faces, "origin": origin,
+        "text": f"{text} {shown.shown}",
+    }  # fmt: skip

@@ -1,0 +1,94 @@
+"""The commands ``forcefit report``, and the option ``--report`` of others."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from forcefit.commands.options import JsonOption
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import PAGE, check_writable, write_json, write_text
+
+if TYPE_CHECKING:
+    from forcefit.page.page import Provenance
+
+app = typer.Typer(no_args_is_help=True)
+
+
+def _checked(path: Path | None) -> Path | None:
+    """Refuse a page that could not be written, before the computation."""
+    if path is not None:
+        check_writable(path, PAGE)
+    return path
+
+
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(help="Also write a report, one HTML file.", callback=_checked),
+]
+_File = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A report, or JSON of a command.")
+]
+
+
+@app.callback()
+def report() -> None:
+    """Reports of runs."""
+
+
+@app.command()
+def compare(
+    first: _File,
+    second: _File,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="HTML page.", callback=_checked),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Two runs side by side: what changed, the largest change first."""
+    from forcefit.page.comparison import compare as compare_results
+    from forcefit.page.comparison import comparison_page, comparison_text
+
+    names = (first.name, second.name) if first.name != second.name else (
+        str(first), str(second)
+    )  # fmt: skip
+    comparison = compare_results(_results(first), _results(second), names)
+    if output is not None:
+        source = provenance(first, second)
+        write_text(comparison_page(comparison, source), output)
+    write_json(comparison.table(), json)
+    if json != "-":
+        print(comparison_text(comparison))
+
+
+def _results(path: Path) -> dict:
+    """What a report or a JSON file holds."""
+    from forcefit.page.page import results_in
+
+    try:
+        return results_in(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise BadInput(f"{path}: cannot be read: {reason}") from None
+
+
+def provenance(*sources: Path | str | None) -> "Provenance":
+    """The command that runs and the files it read.
+
+    Args:
+        sources: files, folders for the files in them, names of built-in robots, None.
+
+    Returns:
+        The command as typed and the files that exist.
+    """
+    from forcefit.page.page import Provenance, command_line
+
+    paths = [Path(source) for source in sources if source is not None]
+    files = [
+        file
+        for path in paths
+        for file in (sorted(path.iterdir()) if path.is_dir() else [path])
+        if file.is_file()
+    ]
+    return Provenance(command_line(), files)

@@ -1,0 +1,252 @@
+"""Two results side by side: every number that changed, the largest change first."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from forcefit.page.page import Page, Provenance, Tile, page, section
+from forcefit.page.tables import Cell, Value, table
+from forcefit.page.words import in_words, unit_of
+
+SAME = 1e-9  # relative: less is rounding
+# pure numbers that say how well, not what
+_MEASURES = {"certificate", "seconds", "cuts"}
+_NAMES = ("name", "part", "what", "error", "term", "frame", "component")
+_HEADLINES = {"worst_play", "within_limits", "error", "allocation"}
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number or text of two results.
+
+    Attributes:
+        place: keys that lead to it.
+        before: in the first; None where it has none.
+        after: in the second; None where it has none.
+    """
+
+    place: tuple[str, ...]
+    before: Any
+    after: Any
+
+    @property
+    def relative(self) -> float:
+        """Change over the first value; infinite from zero, NaN where there is none."""
+        a, b = self.before, self.after
+        if not (_is_number(a) and _is_number(b)):
+            return math.nan
+        return (b - a) / abs(a) if a else math.copysign(math.inf, b)
+
+    @property
+    def name(self) -> str:
+        """The place in words."""
+        return ", ".join(map(in_words, self.place))
+
+    @property
+    def unit(self) -> str:
+        """SI unit, where the key that ends the place, or one before, has one."""
+        units = (unit_of(key) for key in reversed(self.place))
+        return next(filter(None, units), "")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What differs between two results.
+
+    Attributes:
+        names: of both.
+        titles: what each is of, such as its robot.
+        changes: numbers first, the largest relative change on top, then texts.
+        same: how many values are the same.
+        only: places that one of the two has alone.
+    """
+
+    names: tuple[str, str]
+    titles: tuple[str, str]
+    changes: tuple[Change, ...]
+    same: int
+    only: tuple[Change, ...]
+
+    def table(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "compared": list(self.names), "same": self.same,
+            "changes": [_plain(one) for one in self.changes],
+            "only_in_one": [_plain(one) for one in self.only],
+        }  # fmt: skip
+
+
+def compare(
+    first: Mapping[str, Any], second: Mapping[str, Any], names: tuple[str, str]
+) -> Comparison:
+    """Two results of the same command.
+
+    Args:
+        first: plain values, of a report or a JSON file.
+        second: the same of another run.
+        names: of both.
+
+    Returns:
+        All differences; the numbers of a certificate are left out, which say how well
+        the others are known.
+    """
+    a, b = (dict(_leaves(one, ())) for one in (first, second))
+    both = [place for place in a if place in b]
+    changes = [Change(p, a[p], b[p]) for p in both if not _same(a[p], b[p])]
+    only = [Change(p, v, None) for p, v in a.items() if p not in b]
+    only += [Change(p, None, v) for p, v in b.items() if p not in a]
+    titles = (_title(first), _title(second))
+    return Comparison(
+        names, titles, tuple(sorted(changes, key=_size)), len(both) - len(changes),
+        tuple(only),
+    )  # fmt: skip
+
+
+def _leaves(value: Any, place: tuple[str, ...]) -> Any:
+    """Every number and text, with the keys that lead to it."""
+    if isinstance(value, Mapping):
+        for key, one in value.items():
+            if key not in _MEASURES:
+                yield from _leaves(one, (*place, str(key)))
+    elif isinstance(value, list):
+        for k, one in enumerate(value):
+            yield from _leaves(one, (*place, _named(one) or str(k + 1)))
+    else:
+        yield place, value
+
+
+def _named(row: Any) -> str:
+    """What a row of a list is of, as its order may change; empty if it has no name."""
+    if not isinstance(row, Mapping):
+        return ""
+    names = (row.get(key) for key in _NAMES)
+    return " ".join(name for name in names if isinstance(name, str))
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number, not a truth."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Whether two values are one, up to rounding."""
+    if _is_number(a) and _is_number(b):
+        return math.isclose(a, b, rel_tol=SAME, abs_tol=1e-15)
+    return bool(a == b)
+
+
+def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
+    """Numbers first, those of headlines before all, the largest change on top."""
+    relative = change.relative
+    group = 2 if math.isnan(relative) else int(change.place[0] not in _HEADLINES)
+    return (group, 0.0 if group == 2 else -abs(relative), change.place)
+
+
+def _title(results: Mapping[str, Any]) -> str:
+    """What results are of."""
+    keys = [key for key in ("title", "campaign", "robot") if key in results]
+    return str(results[keys[0]]) if keys else "results"
+
+
+def _plain(change: Change) -> dict[str, Any]:
+    """A change as plain values."""
+    relative = change.relative
+    return {
+        "place": list(change.place), "before": change.before, "after": change.after,
+        "relative": relative if math.isfinite(relative) else None,
+    }  # fmt: skip
+
+
+def comparison_text(comparison: Comparison, most: int = 20) -> str:
+    """A comparison for people.
+
+    Args:
+        comparison: of two results.
+        most: lines.
+
+    Returns:
+        A sentence and a line for each change, the largest on top.
+    """
+    lines = [_sentence(comparison)]
+    for one in comparison.changes[:most]:
+        values = " to ".join(map(_brief, (one.before, one.after)))
+        change = f" ({_percent(one)})" if math.isfinite(one.relative) else ""
+        lines.append(f"  {one.name}: {values} {one.unit}".rstrip() + change)
+    if len(comparison.changes) > most:
+        lines.append(f"  and {len(comparison.changes) - most} more")
+    return "\n".join(lines)
+
+
+def _brief(value: Any) -> str:
+    """A value on a few characters."""
+    return f"{value:.6g}" if _is_number(value) else str(value)[:60]
+
+
+def _sentence(comparison: Comparison) -> str:
+    """How much changed."""
+    changed, same = len(comparison.changes), comparison.same
+    text = f"{changed} of {changed + same} values differ"
+    if comparison.only:
+        text += f"; {len(comparison.only)} are in one of the two alone"
+    return text + "."
+
+
+def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
+    """A comparison as a page.
+
+    Args:
+        comparison: of two results.
+        provenance: command and both files.
+
+    Returns:
+        HTML, which needs no other file.
+    """
+    numbers = [c for c in comparison.changes if not math.isnan(c.relative)]
+    tiles = [
+        Tile(
+            one.name,
+            [Value(one.before, one.unit), " to ", Value(one.after, one.unit)],
+            [_percent(one)],
+        )
+        for one in numbers
+        if one.place[0] in _HEADLINES
+    ][:4]
+    a, b = comparison.names
+    rows = [_row(c) for c in comparison.changes]
+    body = [section("Every change", table(["what", a, b, "change"], rows, "changes"))]
+    if comparison.only:
+        rows = [_row(c) for c in comparison.only]
+        title = "In one of the two alone"
+        body.append(section(title, table(["what", a, b, "change"], rows)))
+    return page(
+        Page(
+            title=" and ".join(dict.fromkeys(comparison.titles)) + ": two runs",
+            verdict=_sentence(comparison),
+            good=True,
+            tiles=tiles,
+            about=f"{a} and {b}.",
+            body=body,
+            assumed=[
+                f"Numbers within {SAME:g} of themselves are the same.",
+                "Certificates, which say how well numbers are known, are left out.",
+            ],
+            provenance=provenance,
+            results=comparison.table(),
+        )
+    )
+
+
+def _row(change: Change) -> list[Cell]:
+    """A change as a row of a table."""
+    cells = [
+        Value(v, change.unit, 6) if _is_number(v) else "-" if v is None else str(v)
+        for v in (change.before, change.after)
+    ]
+    return [change.name, *cells, _percent(change)]
+
+
+def _percent(change: Change) -> str:
+    """The change in per cent."""
+    relative = change.relative
+    return f"{100 * relative:+.3g} %" if math.isfinite(relative) else "-"

@@ -1,0 +1,322 @@
+"use strict";
+// Draws the figures of a page, sorts and copies its tables, opens points, switches units.
+// Data are SI; what is shown is factor times that, or SI itself.
+(() => {
+  const all = (query, at = document) => [...at.querySelectorAll(query)];
+  const redraw = []; // one function a figure, to draw it again
+  let si = false;
+
+  function element(tag, text = "", attributes = {}) {
+    const made = document.createElement(tag);
+    made.textContent = text; // never as HTML: names come from files
+    return Object.assign(made, attributes);
+  }
+  const number = v => typeof v !== "number" ? "none" : String(Number(v.toPrecision(4)));
+  const factor = u => si ? 1 : u.factor;
+  const unit = u => si ? u.unit : u.shown;
+  const amount = (v, u) => typeof v !== "number" ? "none"
+    : `${number(v * factor(u))} ${unit(u)}`.trim();
+  const scaled = (v, k) => Array.isArray(v) ? v.map(one => scaled(one, k))
+    : typeof v === "number" ? v * k : v;
+  const title = axis => axis.title + (unit(axis) ? ` [${unit(axis)}]` : "");
+  const escaped = text => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+  const SETTINGS = { displaylogo: false, responsive: true };
+  const axisLayout = axis => ({ title: { text: title(axis) }, automargin: true,
+    ...axis.options });
+
+  function show(figure, traces, layout) {
+    const plot = figure.querySelector(".plot");
+    return Plotly.react(plot, traces, { margin: { l: 60, r: 20, t: 20, b: 50 },
+      font: { family: "system-ui, sans-serif", size: 12 }, uirevision: 1,
+      legend: { orientation: "h", y: 1.12 }, ...layout }, SETTINGS);
+  }
+
+  // charts ----------------------------------------------------------------------------
+  function chart(figure, spec) {
+    const { x, y } = spec.axes;
+    const error = (bars, axis) => bars && { ...bars,
+      array: scaled(bars.array, factor(axis)),
+      arrayminus: scaled(bars.arrayminus, factor(axis)) };
+    redraw.push(() => show(figure, spec.traces.map(t => ({ ...t,
+      x: scaled(t.x, factor(x)), y: scaled(t.y, factor(y)),
+      error_x: error(t.error_x, x), error_y: error(t.error_y, y) })),
+      { height: spec.height, xaxis: axisLayout(x), yaxis: axisLayout(y),
+        barmode: spec.barmode || "overlay",
+        showlegend: spec.traces.filter(t => t.name).length > 1 }));
+  }
+
+  // maps: a choice of quantities, the values under the pointer, all of a point by a click
+  function map(figure, spec) {
+    const { x, y } = spec.axes, drawn = spec.layers.filter(l => l.drawn);
+    const choice = element("select", "", { ariaLabel: "quantity of the map" });
+    drawn.forEach((l, k) => choice.append(element("option", l.title, { value: k })));
+    figure.querySelector(".controls").append(choice);
+    const at = (values, i, j) => y ? values[i][j] : values[i];
+    const below = (i, j) => [
+      ...[[x, i], ...(y ? [[y, j]] : [])].map(([a, k]) =>
+        [a.title, a.values[k], a]),
+      ...spec.layers.map(l => [l.title, at(l.values, i, j), l])];
+    const hover = (i, j) => [at(spec.states, i, j), ...below(i, j).map(
+      ([name, v, u]) => `${escaped(name)}: ${amount(v, u)}`)].join("<br>");
+    const paint = () => {
+      const layer = drawn[choice.value], xs = scaled(x.values, factor(x));
+      const common = { hovertemplate: "%{text}<extra></extra>" };
+      const values = scaled(layer.values, factor(layer));
+      const trace = y ? { ...common, type: "heatmap", x: xs,
+        y: scaled(y.values, factor(y)), colorscale: "Viridis",
+        z: y.values.map((_, j) => xs.map((_, i) => values[i][j])),
+        text: y.values.map((_, j) => xs.map((_, i) => hover(i, j))),
+        colorbar: { title: { text: unit(layer), side: "right" } } }
+        : { ...common, type: "scatter", mode: "lines+markers", x: xs, y: values,
+          text: xs.map((_, i) => hover(i)) };
+      return show(figure, [trace], { height: 460, title: { text: escaped(layer.title),
+        font: { size: 13 } }, margin: { l: 60, r: 20, t: 40, b: 50 }, xaxis: axisLayout(x),
+        yaxis: axisLayout(y || { ...layer, options: {} }) });
+    };
+    const open = (i, j) => {
+      const table = element("table");
+      table.createTBody().append(row("point", at(spec.states, i, j)),
+        ...below(i, j).map(([name, v, u]) => row(name, amount(v, u), v, u)));
+      figure.querySelector(".point").replaceChildren(table);
+    };
+    let opened = null;
+    choice.addEventListener("change", paint);
+    redraw.push(async () => {
+      const plot = await paint();
+      if (opened) open(...opened);
+      if (plot.opens) return;
+      plot.opens = true;
+      plot.on("plotly_click", event => {
+        const index = event.points[0].pointIndex;
+        opened = y ? [index[1], index[0]] : [index];
+        open(...opened);
+      });
+    });
+  }
+  function row(name, text, value, u) {
+    const made = element("tr"), cell = element("td", text);
+    if (typeof value === "number") cell.dataset.v = value;
+    if (u && u.unit) cell.dataset.u = u.unit;
+    made.append(element("td", name), cell);
+    return made;
+  }
+
+  // the robot -------------------------------------------------------------------------
+  function scene(figure, spec) {
+    const controls = figure.querySelector(".controls"), steps = spec.closing.length;
+    const switches = {};
+    const wanted = ["nominal", "forced", "joints", "names", "forces", "error body"];
+    for (const name of wanted) {
+      if (name === "forces" && !spec.forces.length) continue;
+      if (name === "error body" && !spec.body) continue;
+      const box = element("input", "", { type: "checkbox" });
+      box.checked = !["names", "forces"].includes(name);
+      box.addEventListener("change", () => paint());
+      const word = element("label", ` ${name}`);
+      word.prepend(box);
+      controls.append(word);
+      switches[name] = box;
+    }
+    const on = name => switches[name] && switches[name].checked;
+    const slider = (word, most, step, value) => {
+      const range = element("input", "", { type: "range", min: 0, max: most, step,
+        value, ariaLabel: word });
+      const text = element("label", `${word} `), told = element("output");
+      text.append(range, told);
+      controls.append(text);
+      range.addEventListener("input", () => paint());
+      return [range, told];
+    };
+    const most = 2 * spec.exaggeration;
+    const [larger, told] = slider("exaggeration", most, most / 200, spec.exaggeration);
+    larger.className = "exaggeration";
+    let closing = null;
+    if (steps) {
+      closing = slider("closing", steps, 1, steps)[0];
+      closing.className = "closing";
+      const play = element("button", "play the closing", { type: "button" });
+      play.addEventListener("click", async () => {
+        for (let k = 0; k <= steps; k++) {
+          closing.value = k;
+          await paint();
+          await new Promise(done => setTimeout(done, k < steps ? 150 : 0));
+        }
+      });
+      controls.append(play);
+    }
+    const moved = (point, by, k) => point.map((v, c) => v + k * by[c]);
+    const nothing = [null, null, null];
+    function paths(lines) { // [points, texts] as one trace, with gaps
+      const points = lines.flatMap(([line]) => [...line, nothing]);
+      return { type: "scatter3d", mode: "lines", hoverinfo: "text",
+        text: lines.flatMap(([line, text]) => [...line.map(() => text), ""]),
+        ...coordinates(points) };
+    }
+    const coordinates = points => ({ x: points.map(p => along(p, 0)),
+      y: points.map(p => along(p, 1)), z: points.map(p => along(p, 2)) });
+    const along = (p, c) => p[c] === null ? null : p[c] * factor(spec.length);
+    const size = Math.max(...spec.box.map(([low, high]) => high - low));
+    function traces(k, step) {
+      const drawn = [], bodies = spec.bodies;
+      const at = bodies.map((b, i) => moved(b.nominal[b.nominal.length - 1],
+        step === null ? b.moved[b.moved.length - 1] : spec.closing[step][i], k));
+      const started = b => b.parent < 0 ? b.nominal[0] : at[b.parent];
+      const shape = (b, i) => step === null ? b.nominal.map((p, s) =>
+        moved(p, b.moved[s], k)) : [started(b), at[i]];
+      const text = b => `${escaped(b.name)} (${b.kind})<br>moved by ${amount(
+        Math.hypot(...b.moved[b.moved.length - 1]), spec.displacement)}`;
+      const solid = bodies.map((b, i) => [b, i]).filter(([b]) => b.long);
+      if (on("nominal")) drawn.push({ ...paths(solid.map(([b]) =>
+        [b.nominal, escaped(b.name)])), name: "nominal",
+        line: { color: "#c3c9cf", width: 5 } });
+      for (const [name, color, elastic] of [["forced, elastic", "#c0392b", true],
+        ["forced, rigid", "#1f6fb4", false]]) {
+        const some = solid.filter(([b]) => b.elastic === elastic);
+        if (on("forced") && some.length) drawn.push({ ...paths(some.map(([b, i]) =>
+          [shape(b, i), text(b)])), name, line: { color, width: 8 } });
+      }
+      if (on("joints") || on("names")) drawn.push({ type: "scatter3d", name: "joints",
+        mode: [on("joints") && "markers", on("names") && "text"].filter(Boolean)
+          .join("+"), ...coordinates(at), hoverinfo: "text",
+        text: bodies.map(b => escaped(b.name)), textfont: { size: 10 },
+        hovertext: bodies.map(b => `${escaped(b.name)}: ${
+          b.actuated ? "driven " : ""}${b.joint} joint`),
+        marker: { size: 4, color: bodies.map(b => b.joint === "fixed" ? "#9aa3ab"
+          : b.actuated ? "#d68910" : "#1d2733") } });
+      const gaps = step === null ? [] : spec.closures.map(([a, b]) =>
+        [[at[a], at[b]], "still open"]);
+      if (gaps.length) drawn.push({ ...paths(gaps), name: "still open",
+        line: { color: "#8e44ad", width: 6 } });
+      if (on("forces") && step === null) drawn.push(...arrows(at));
+      if (on("error body")) drawn.push(errorBody(k));
+      return drawn;
+    }
+    function arrows(at) {
+      const largest = Math.max(...spec.forces.map(f => Math.hypot(...f.force)));
+      const tips = spec.forces.map(f => moved(at[f.body], f.force,
+        0.25 * size / largest));
+      const texts = spec.forces.map(f => `${escaped(spec.bodies[f.body].name)}: ${
+        amount(Math.hypot(...f.force), { unit: "N", shown: "N", factor: 1 })}`);
+      const color = "#2a9d6f", directions = spec.forces.map(f =>
+        f.force.map(v => v / Math.hypot(...f.force)));
+      return [{ ...paths(spec.forces.map((f, k) => [[at[f.body], tips[k]], texts[k]])),
+        name: "forces", line: { color, width: 4 } },
+      { type: "cone", ...coordinates(tips), u: directions.map(d => d[0]),
+        v: directions.map(d => d[1]), w: directions.map(d => d[2]), anchor: "tip",
+        sizemode: "absolute", sizeref: 0.03 * size * factor(spec.length),
+        colorscale: [[0, color], [1, color]], showscale: false, text: texts,
+        hoverinfo: "text", name: "forces" }];
+    }
+    function errorBody(k) {
+      const { points, faces, origin, text } = spec.body;
+      const drawn = { ...coordinates(points.map(p => moved(origin, p, k))),
+        hoverinfo: "text", text, name: "error body" };
+      return faces.length ? { ...drawn, type: "mesh3d", color: "#e0a800", opacity: 0.5,
+        i: faces.map(f => f[0]), j: faces.map(f => f[1]), k: faces.map(f => f[2]) }
+        : { ...drawn, type: "scatter3d", mode: "markers",
+          marker: { size: 3, color: "#e0a800" } };
+    }
+    async function paint() {
+      const k = Number(larger.value);
+      told.textContent = ` × ${number(k)}`;
+      const step = closing && Number(closing.value) < steps ? Number(closing.value)
+        : null;
+      const spans = spec.box.map(([low, high]) => (high - low) / size);
+      const thin = spans.indexOf(Math.min(...spans));
+      const eye = [0.55, 0.55, 0.4].map((v, c) => c === thin ? 1.5 : v);
+      const axis = c => ({ title: { text: `${"xyz"[c]} [${unit(spec.length)}]` },
+        range: spec.box[c].map(v => v * factor(spec.length)) });
+      const told3d = { aspectmode: "manual", xaxis: axis(0), yaxis: axis(1),
+        zaxis: axis(2), aspectratio: { x: spans[0], y: spans[1], z: spans[2] },
+        camera: { eye: { x: eye[0], y: -eye[1], z: eye[2] } } };
+      await show(figure, traces(k, step), { height: 560, scene: told3d,
+        margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: true });
+    }
+    redraw.push(paint);
+  }
+
+  // tables ----------------------------------------------------------------------------
+  const key = cell => cell.dataset.v === undefined ? cell.textContent
+    : Number(cell.dataset.v);
+  function sort(head) {
+    const column = [...head.parentNode.children].indexOf(head);
+    const up = head.getAttribute("aria-sort") !== "ascending";
+    all("th", head.parentNode).forEach(other => other.removeAttribute("aria-sort"));
+    head.setAttribute("aria-sort", up ? "ascending" : "descending");
+    const body = head.closest("table").tBodies[0];
+    const order = (a, b) => {
+      const [p, q] = [a, b].map(tr => key(tr.children[column]));
+      return typeof p === "number" && typeof q === "number" ? p - q
+        : String(p).localeCompare(String(q), "en", { numeric: true });
+    };
+    body.append(...[...body.rows].sort((a, b) => up ? order(a, b) : order(b, a)));
+  }
+  function csv(table) { // in SI and in full, whatever is shown
+    const whole = cell => {
+      const si_text = si ? cell.textContent : cell.dataset.si || cell.textContent;
+      if (cell.tagName === "TH") return si_text;
+      const { v, u } = cell.dataset;
+      return v === undefined ? cell.textContent : u ? `${v} ${u}` : v;
+    };
+    const quoted = text => /[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text;
+    return [...table.rows].map(tr => [...tr.cells].map(c => quoted(whole(c))).join(","))
+      .join("\n") + "\n";
+  }
+  async function copy(button) {
+    const text = csv(button.parentNode.querySelector("table"));
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch { // pages from a file may not use the clipboard
+      const area = element("textarea", "", { value: text });
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    button.textContent = "copied";
+    setTimeout(() => { button.textContent = "CSV"; }, 1500);
+  }
+  function switchUnits(button) {
+    si = !si;
+    button.textContent = si ? "units of a drawing" : "SI units";
+    for (const cell of all("[data-si]")) {
+      [cell.textContent, cell.dataset.si] = [cell.dataset.si, cell.textContent];
+    }
+    redraw.forEach(draw => draw());
+  }
+  document.addEventListener("click", event => {
+    const on = query => event.target.closest(query);
+    if (on("thead th")) sort(on("thead th"));
+    if (on(".copy")) copy(on(".copy"));
+    if (on("#units")) switchUnits(on("#units"));
+    if (on("#print")) window.print();
+  });
+
+  // plotly.js is kept compressed ------------------------------------------------------
+  async function load() {
+    const packed = document.getElementById("plotly").textContent;
+    const bytes = Uint8Array.fromBase64 ? Uint8Array.fromBase64(packed)
+      : Uint8Array.from(atob(packed), c => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream();
+    const plain = stream.pipeThrough(new DecompressionStream("gzip"));
+    document.head.append(element("script", await new Response(plain).text()));
+  }
+  async function start() {
+    const kinds = { chart, map, scene };
+    const figures = all("figure").filter(f => f.querySelector("script.spec"));
+    if (figures.length) await load();
+    for (const figure of figures) {
+      const spec = JSON.parse(figure.querySelector("script.spec").textContent);
+      kinds[figure.className](figure, spec);
+    }
+    const below = figures.findIndex(f => f.getBoundingClientRect().top > innerHeight);
+    for (const [k, draw] of redraw.entries()) {
+      if (k === below) performance.mark("first screen");
+      await draw();
+      await new Promise(done => setTimeout(done)); // the reader may scroll meanwhile
+    }
+    performance.mark("drawn");
+    document.documentElement.dataset.drawn = figures.length;
+  }
+  start();
+})();

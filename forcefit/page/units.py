@@ -1,0 +1,60 @@
+"""Units a page shows: those of a drawing, with SI beside them for the switch."""
+
+import math
+from dataclasses import dataclass
+
+# SI unit: (least size [SI], shown unit, factor), the coarsest first
+_SHOWN: dict[str, tuple[tuple[float, str, float], ...]] = {
+    "m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)),
+    "rad": ((0.1, "deg", 180 / math.pi), (1e-4, "mrad", 1e3), (0.0, "µrad", 1e6)),
+    "J": ((1e-1, "J", 1.0), (0.0, "mJ", 1e3)),
+    "Pa": ((1e8, "GPa", 1e-9), (0.0, "MPa", 1e-6)),
+    "N/m": ((0.0, "N/µm", 1e-6),),
+    "N m/rad": ((0.0, "N m/mrad", 1e-3),),
+    "m/N": ((0.0, "µm/N", 1e6),),
+    "rad/(N m)": ((0.0, "µrad/(N m)", 1e6),),
+}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How numbers of one SI unit are shown.
+
+    Attributes:
+        unit: SI, empty for a pure number.
+        shown: the unit shown.
+        factor: number shown = factor * number in SI.
+    """
+
+    unit: str
+    shown: str
+    factor: float
+
+
+def shown_in(unit: str, size: float = 1.0) -> Shown:
+    """The unit in which sizes of an SI unit are read easily.
+
+    Args:
+        unit: SI, such as ``"m"``; empty, ``"1"`` or ``"-"`` for a pure number.
+        size: [unit] of the largest of the numbers.
+
+    Returns:
+        The unit and its factor; SI itself for one without another usual unit.
+    """
+    if unit in {"", "1", "-"}:
+        return Shown("", "", 1.0)
+    usual = _SHOWN.get(unit, ((0.0, unit, 1.0),))
+    size = abs(size) if math.isfinite(size) else math.inf
+    size = size or 1e-3  # zero is shown in mm and mrad
+    return next(
+        Shown(unit, name, factor) for least, name, factor in usual if size >= least
+    )
+
+
+def number_text(value: float, unit: str = "", digits: int = 4) -> str:
+    """A number with its unit; in words where it is none."""
+    if math.isnan(value):
+        return "none"
+    if math.isinf(value):
+        return "unbounded"
+    return f"{value:.{digits}g} {unit}".rstrip()

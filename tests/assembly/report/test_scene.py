@@ -1,0 +1,66 @@
+"""The robot as a scene: displacements and forces are those of the assembly."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.error_body import ErrorBody
+from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.report.scene import robot_scene
+from tests.pages_for_tests import parse
+
+FORCE, LENGTH = 50.0, 0.4
+
+
+def cantilever(force=FORCE):
+    """A round bar along x, held at its base, loaded at its tip."""
+    beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler")
+    tip = Frame("tip <b>", translation=[LENGTH, 0, 0], link=beam)
+    return solve_assembly(home_posture(Robot("bar", "tip <b>", (tip,))),
+                          [0, 0, 0, 0, 0, -force])  # fmt: skip
+
+
+def scene_of(assembly, closing=None, body=None):
+    (spec,) = parse(robot_scene(assembly, closing, body, "")).figures
+    return spec
+
+
+def test_a_bent_bar_has_the_elastic_line_of_a_cantilever():
+    """w(s) = F s^2 (3 L - s) / (6 E I); halfway 5/16 of the tip's."""
+    (bar,) = scene_of(cantilever())["bodies"]
+    moved, nominal = np.array(bar["moved"]), np.array(bar["nominal"])
+    s = nominal[:, 0]
+    stiffness = 2e11 * np.pi * 0.01**4 / 4
+    line = -FORCE * s**2 * (3 * LENGTH - s) / (6 * stiffness)
+    np.testing.assert_allclose(moved[:, 2], line, rtol=1e-9, atol=1e-15)
+    assert moved[4, 2] / moved[-1, 2] == pytest.approx(5 / 16)
+    np.testing.assert_allclose(moved[:, :2], 0.0, atol=1e-12)
+    assert bar["name"] == "tip <b>"
+    assert bar["elastic"]
+
+
+def test_arrows_are_the_forces_in_base_axes():
+    (arrow,) = scene_of(cantilever())["forces"]
+    np.testing.assert_allclose(arrow["force"], [0, 0, -FORCE], atol=1e-9)
+
+
+def test_the_closing_and_the_error_body_are_kept_as_they_are():
+    assembly = cantilever()
+    frames = np.tile(assembly.posture.transforms, (3, 1, 1, 1))
+    frames[0, 0, 2, 3] += 1e-3
+    points = 1e-4 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, -1, -1]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+    body = ErrorBody("translation", points, faces, np.eye(3), np.ones(3))
+    spec = scene_of(assembly, frames, body)
+    np.testing.assert_allclose(np.array(spec["closing"])[:, 0, 2], [1e-3, 0, 0])
+    np.testing.assert_array_equal(spec["body"]["points"], points)
+    np.testing.assert_allclose(spec["body"]["origin"], [LENGTH, 0, 0])
+    assert "0.1732 mm" in spec["body"]["text"]  # sqrt(3) of 0.1 mm
+
+
+def test_a_robot_that_nothing_moves_is_drawn_too():
+    spec = scene_of(cantilever(0.0))
+    assert spec["forces"] == []
+    assert spec["exaggeration"] == 1.0
+    assert not np.any(spec["bodies"][0]["moved"])

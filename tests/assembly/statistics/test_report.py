@@ -1,0 +1,107 @@
+"""Pages of draws and tolerances: their numbers are those of the JSON."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from assembly.files.robot_file import write_robot
+from tests.pages_for_tests import parse
+from tests.robots_for_tests import NUMBERS, irsbot2_with
+
+ERRORS = Path(__file__).parents[3] / "examples" / "hexapod_errors.toml"
+PLAN = """
+[[tolerance]]
+name = "link <length>"
+frames = ["link_a", "link_b"]
+components = ["TX"]
+[[tolerance]]
+name = "elbows"
+frames = ["elbow_a", "elbow_b"]
+components = ["RX", "RY"]
+"""
+
+
+def shown(path):
+    """A page, and its numbers by the first words of their row."""
+    seen = parse(path.read_text(encoding="utf-8"))
+    rows = {row[0].text: row[1:] for table in seen.tables for row in table[1:]}
+    assert seen.fetched == []
+    return seen, rows
+
+
+def test_the_page_of_draws_is_their_summary(tmp_path, run):
+    page, written = tmp_path / "s.html", tmp_path / "s.json"
+    status, _, err = run(
+        "assembly", "statistics", "hexapod", "--errors", ERRORS, "--draws", 100,
+        "--limit", "translation=2.5e-4", "--importance", 16, "--report", page,
+        "--json", written, "--play", "least", "--no-margins",
+    )  # fmt: skip
+    assert status == 0, err
+    summary = json.loads(written.read_text())
+    seen, rows = shown(page)
+    assert seen.results == summary
+    limits = summary["within_limits"]
+    cells = rows["all limits kept"]
+    assert [c.value for c in cells[:3]] == [
+        limits[k] for k in ("probability", "lower", "upper")
+    ]
+    translation = summary["quantities"]["translation"]
+    cells = rows["platform position error (play least)"]
+    expected = [translation["mean"]["value"], translation["most_probable"]["value"]]
+    expected += [translation["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
+    assert [c.value for c in cells] == expected
+    counted = [figure["traces"][0] for figure in seen.figures]
+    bins = [one for one in counted if one["type"] == "bar" and "orientation" not in one]
+    assert {sum(one["y"]) for one in bins} == {100}
+    shares = summary["importance"]["quantities"]["translation"]["total_index"]
+    largest = max(shares, key=lambda name: shares[name][0])
+    assert "What governs it" in page.read_text(encoding="utf-8")
+    assert rows[largest][0].value == shares[largest][0]
+    assert str(ERRORS.name) in " ".join(rows)  # with its digest
+
+
+def test_the_page_of_tolerances_is_their_json(tmp_path, run):
+    (tmp_path / "plan.toml").write_text(PLAN)
+    page, written = tmp_path / "t.html", tmp_path / "t.json"
+    status, _, err = run(
+        "assembly", "tolerances", "irsbot2", "--grid", "tx=0.1,tz=-0.5", "--fresh", 20,
+        "--plan", tmp_path / "plan.toml", "--report", page, "--json", written,
+    )  # fmt: skip
+    assert status == 0, err
+    results = json.loads(written.read_text())
+    seen, rows = shown(page)
+    assert seen.results == results
+    assert "<length>" not in page.read_text(encoding="utf-8")
+    for one in results["allocation"]["tolerances"]:
+        assert rows[one["name"]][0].value == one["tolerance"]
+    worst = results["allocation"]["worst"]["margin_free"]
+    cells = rows["zone margin, compliant joints free"]
+    assert [c.value for c in cells] == [1.0, worst["found"], worst["proven"]]
+
+
+def test_the_page_of_the_errors_there_are_ranks_them(tmp_path, run):
+    write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
+    page, written = tmp_path / "t.html", tmp_path / "t.json"
+    status, _, err = run(
+        "assembly", "tolerances", tmp_path / "robot.toml", "--grid", "tx=0.1,tz=-0.5",
+        "--report", page, "--json", written,
+    )  # fmt: skip
+    assert status == 0, err
+    present = json.loads(written.read_text())["present"]
+    seen, rows = shown(page)
+    first = present["slopes"][0]
+    assert rows[first["error"]][1].value == first["share_of_margin"]
+    assert seen.numbers[0].value == present["largest_margin"]
+
+
+@pytest.mark.parametrize("command", ["statistics", "tolerances"])
+def test_a_page_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path, run, command
+):
+    status, printed, err = run(
+        "assembly", command, "hexapod", "--errors" if command == "statistics" else
+        "--grid", ERRORS, "--report", tmp_path / "x.txt",
+    )  # fmt: skip
+    assert (status, printed) == (2, "")
+    assert 'found the ending ".txt", expected an HTML page' in err

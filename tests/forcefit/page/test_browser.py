@@ -1,0 +1,229 @@
+"""A study's page in a real browser: it draws; slider, click and switch do their work.
+
+Headless Chromium by selenium; skipped where there is none.
+"""
+
+import base64
+import csv
+import io
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from validation.study.report import write_study
+from validation.study.study import run_study
+from validation.study.study_file import read_study
+
+pytestmark = [pytest.mark.slow, pytest.mark.exudyn]
+STUDY = """
+robot = "irsbot2"
+grid = "tx=-0.2:0.2:0.1,tz=-0.5:-0.4:0.1"
+scales = [1.0, 0.5]
+[errors]
+frames = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
+least = [1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6]
+most = [2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4]
+seed = 1
+[pose]
+tx = 0.0
+tz = -0.5
+"""
+PATIENCE = 60  # [s] of a loaded machine
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "study.toml").write_text(STUDY)
+    results = run_study(read_study(folder / "study.toml", folder / "out"))
+    write_study(results)
+    return results
+
+
+def browser():
+    """Headless Chromium, or a skip that says what is missing."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is absent")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    program = next(filter(None, map(shutil.which, names)), None)
+    driver = shutil.which("chromedriver")
+    if program is None or driver is None:
+        pytest.skip("no Chromium with its chromedriver on this machine")
+    options = webdriver.ChromeOptions()
+    options.binary_location = program
+    for word in ("headless=new", "no-sandbox", "use-angle=swiftshader",
+                 "enable-unsafe-swiftshader", "window-size=1200,1000"):  # fmt: skip
+        options.add_argument(f"--{word}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    service = webdriver.ChromeService(driver)
+    return webdriver.Chrome(options=options, service=service)
+
+
+@pytest.fixture(scope="module")
+def tab(results):
+    opened = browser()
+    try:
+        opened.get((results.study.folder / "report.html").resolve().as_uri())
+        wait(opened, "return document.documentElement.dataset.drawn")
+        yield opened
+    finally:
+        opened.quit()
+
+
+def wait(tab, script):
+    """What a script returns, once it returns something."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    return WebDriverWait(tab, PATIENCE, 0.05).until(lambda t: t.execute_script(script))
+
+
+def traces(tab):
+    """Name and points of what the scene draws."""
+    drawn = tab.execute_script(
+        "return document.querySelector('figure.scene .plot').data"
+        ".map(t => [t.name, t.x, t.y, t.z])"
+    )
+    return {name: np.array(points, dtype=float).T for name, *points in drawn}
+
+
+def slide(tab, name, value):
+    """Move a slider, and wait until the scene is drawn again."""
+    tab.execute_script(
+        "const s = document.querySelector(`input.${arguments[0]}`);"
+        "s.value = arguments[1]; document.querySelector('figure.scene .plot')"
+        ".once('plotly_afterplot', () => { window.again = true; });"
+        "window.again = false; s.dispatchEvent(new Event('input'))",
+        name, value,
+    )  # fmt: skip
+    wait(tab, "return window.again")
+
+
+def test_it_opens_without_a_word_in_the_console_and_without_a_network(tab):
+    said = [one for one in tab.get_log("browser") if one["level"] == "SEVERE"]
+    assert said == []
+    fetched = tab.execute_script(
+        "return performance.getEntriesByType('resource').map(e => e.name)"
+        ".filter(name => !name.startsWith('data:') && !name.startsWith('blob:'))"
+    )
+    assert fetched == []
+    figures = tab.execute_script(
+        "return [...document.querySelectorAll('.plot')].map(p => p.childElementCount)"
+    )
+    assert all(figures)
+
+
+def test_the_slider_exaggerates_in_proportion(tab, results):
+    names = ("forced, elastic", "forced, rigid")
+    most = float(tab.execute_script(
+        "return document.querySelector('input.exaggeration').max"
+    ))  # fmt: skip
+    drawn = {}
+    for share in (0.0, 0.5, 1.0):
+        slide(tab, "exaggeration", share * most)
+        drawn[share] = np.vstack([traces(tab)[name] for name in names])
+    once, twice = drawn[0.5] - drawn[0.0], drawn[1.0] - drawn[0.0]
+    assert np.nanmax(np.abs(once)) > 1.0  # mm
+    np.testing.assert_allclose(twice, 2 * once, atol=1e-9)
+    slide(tab, "exaggeration", 0.5 * most)
+
+
+def test_the_closing_begins_open_and_ends_shut(tab):
+    steps = int(tab.execute_script("return document.querySelector('.closing').max"))
+    gaps = []
+    for step in (0, steps - 1):
+        slide(tab, "closing", step)
+        open_at = traces(tab)["still open"].reshape(-1, 3, 3)
+        gaps.append(np.linalg.norm(open_at[:, 0] - open_at[:, 1], axis=1).max())
+    assert gaps[0] > 1.0  # mm, exaggerated
+    assert gaps[1] < 1e-6 * gaps[0]
+    slide(tab, "closing", steps)
+    assert "still open" not in traces(tab)
+
+
+def test_a_click_on_the_map_opens_the_points_numbers(tab, results):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+
+    plot = tab.find_element(By.CSS_SELECTOR, "figure.map .nsewdrag")
+    tab.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    width = plot.size["width"]
+    # the fourth of five columns, the lower of two rows
+    ActionChains(tab).move_to_element_with_offset(
+        plot, int(0.2 * width), int(0.25 * plot.size["height"])
+    ).pause(0.3).click().perform()
+    rows = wait(tab, "const r = [...document.querySelectorAll('figure.map .point tr')]"
+                ".map(r => [r.cells[0].textContent, r.cells[1].dataset.v,"
+                " r.cells[1].textContent]); return r.length && r")  # fmt: skip
+    values = {name: value for name, value, _ in rows}
+    assert float(values["tx"]) == pytest.approx(0.1)
+    assert float(values["tz"]) == pytest.approx(-0.5)
+    there = results.maps.sel(tx=0.1, tz=-0.5, method="nearest")
+    shift = float(there["translation_error"].sel(bound="upper"))
+    assert float(values["largest shift, eq. (27), clearances anywhere"]) == shift
+    assert float(values["energy, eq. (22)"]) == float(there["energy"])
+    texts = {name: text for name, _, text in rows}
+    assert texts["tx"] == "100 mm"
+
+
+def test_the_choice_of_a_quantity_changes_the_map(tab, results):
+    tab.execute_script(
+        "const s = document.querySelector('figure.map select');"
+        "s.value = [...s.options].find(o => o.text.startsWith('energy')).value;"
+        "s.dispatchEvent(new Event('change'))"
+    )
+    drawn = wait(
+        tab,
+        "const t = document.querySelector('figure.map .plot');"
+        "return t.layout.title.text.startsWith('energy') && t.data[0].z",
+    )
+    energies = results.maps["energy"].transpose("tz", "tx").values
+    np.testing.assert_allclose(np.array(drawn, dtype=float), energies)
+
+
+def test_a_click_sorts_and_a_button_copies_in_full(tab, results):
+    tab.execute_script(
+        "window.copied = []; navigator.clipboard.writeText = async text => {"
+        " window.copied.push(text); };"
+        "const t = [...document.querySelectorAll('table')].find(t =>"
+        " t.rows[0].cells[1].textContent === 'made perfect');"
+        "t.rows[0].cells[4].click(); t.parentNode.querySelector('.copy').click()"
+    )
+    (text,) = wait(tab, "return window.copied.length && window.copied")
+    head, *rows = csv.reader(io.StringIO(text))
+    assert head[:3] == ["part", "made perfect", "largest shift"]
+    turns = [float(row[4].removesuffix(" rad")) for row in rows]
+    assert turns == sorted(turns)
+    bounds = {(one["part"], one["what"]): one for one in results.governing}
+    for row in rows:
+        one = bounds[row[0], row[1]]
+        assert row[2] == f"{one['translation']!r} m"
+        assert row[4] == f"{one['rotation']!r} rad"
+
+
+def test_the_switch_shows_si_and_back(tab, results):
+    first = "return document.querySelector('.tile .answer span').textContent"
+    axis = "return document.querySelector('figure.map .plot').layout.xaxis.title.text"
+    own = tab.execute_script(first)
+    assert (own, tab.execute_script(axis)) == ("0.794 mm", "tx [mm]")
+    press = "document.getElementById('units').click()"
+    tab.execute_script(press)
+    wait(tab, axis + " === 'tx [m]'")
+    bound = results.error["frozen"]["translation"]["upper"]
+    assert tab.execute_script(first) == f"{bound:.3g} m"
+    tab.execute_script(press)
+    wait(tab, axis + " === 'tx [mm]'")
+    assert tab.execute_script(first) == own
+
+
+def test_the_numbers_in_the_browser_are_the_json(tab, results):
+    held = tab.execute_script("return document.querySelector('script.results').text")
+    written = (results.study.folder / "results.json").read_text()
+    assert json.loads(held) == json.loads(written)
+
+
+def test_it_prints_without_its_buttons(tab):
+    pdf = tab.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    content = base64.b64decode(pdf["data"])
+    assert content.startswith(b"%PDF")
+    assert len(content) > 50_000  # with its pictures

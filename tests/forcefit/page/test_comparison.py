@@ -1,0 +1,82 @@
+"""Two runs side by side: what changed, and by how much."""
+
+import json
+
+import pytest
+
+from forcefit.page.comparison import compare, comparison_page
+from forcefit.page.page import Provenance
+from tests.pages_for_tests import parse
+
+BEFORE = {
+    "title": "robot", "worst_play": {"pose": {"translation": 8e-4, "rotation": 0.0}},
+    "passed": True, "certificate": {"gap": 1e-12},
+    "governing": [
+        {"part": "a", "what": "clearance", "translation": 7e-4},
+        {"part": "b", "what": "clearance", "translation": 6e-4},
+    ],
+}  # fmt: skip
+AFTER = {
+    "title": "robot", "worst_play": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
+    "passed": False, "certificate": {"gap": 3e-12}, "new": 1,
+    # another order, the same parts
+    "governing": [
+        {"part": "b", "what": "clearance", "translation": 3e-4},
+        {"part": "a", "what": "clearance", "translation": 7e-4 * (1 + 1e-12)},
+    ],
+}  # fmt: skip
+
+
+def test_every_change_is_found_the_largest_first():
+    seen = compare(BEFORE, AFTER, ("x", "y"))
+    assert [(c.place[-2:], c.before, c.after) for c in seen.changes] == [
+        (("pose", "rotation"), 0.0, 1e-3),
+        (("pose", "translation"), 8e-4, 4e-4),
+        (("b clearance", "translation"), 6e-4, 3e-4),
+        (("passed",), True, False),
+    ]
+    assert seen.changes[1].relative == -0.5
+    assert seen.changes[1].unit == "m"
+    assert seen.changes[1].name == "certified worst case, pose, shift"
+    assert [c.place for c in seen.only] == [("new",)]
+    assert compare(BEFORE, BEFORE, ("x", "x")).changes == ()
+
+
+def test_a_comparison_is_a_page_without_charts():
+    text = comparison_page(compare(BEFORE, AFTER, ("x", "y")), Provenance())
+    rows = {row[0].text: row[1:] for row in parse(text).tables[0][1:]}
+    cells = rows["certified worst case, pose, shift"]
+    assert [cell.text for cell in cells] == ["0.8 mm", "0.4 mm", "-50 %"]
+    assert [cell.value for cell in cells[:2]] == [8e-4, 4e-4]
+    assert len(text) < 100_000
+
+
+def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    first.write_text(json.dumps(BEFORE))
+    second.write_text(json.dumps(AFTER))
+    pages = [tmp_path / "c.html", tmp_path / "d.html"]
+    for page in pages:
+        status, printed, err = run("report", "compare", first, second, "-o", page)
+        assert (status, err) == (0, "")
+    assert "certified worst case, pose, shift: 0.0008 to 0.0004 m (-50 %)" in printed
+    status, printed, _ = run("report", "compare", *pages, "--json", "-")
+    assert status == 0
+    assert json.loads(printed)["changes"] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.json", None, "none.json: cannot be read: No such file"),
+        ("a.json", b"\xff\xfe\xff", "a.json: cannot be read: it is not text"),
+        ("a.json", b"[1]", "a.json: found a JSON list or value, expected results"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(tmp_path, run, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    status, printed, err = run("report", "compare", tmp_path / name, tmp_path / name)
+    assert (status, printed) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1

@@ -1,0 +1,153 @@
+"""Pages: their numbers are the results', nothing is fetched, names stay names."""
+
+import math
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.errors import BadInput
+from forcefit.page.charts import Axis, Layer, bars, chart, matrix, value_map
+from forcefit.page.page import Page, Provenance, Tile, page, results_in, section
+from forcefit.page.tables import Column, Value, table
+from forcefit.page.units import shown_in
+from tests.pages_for_tests import parse
+
+ODD = "</script><b>&\"' $x$ \\u003c"
+SIZE = 5_000_000  # bytes of a page
+
+
+def written(*body, **changes):
+    content = {
+        "title": ODD, "verdict": ODD, "good": True, "about": ODD, "body": body,
+        "tiles": [Tile(ODD, [ODD, Value(7.943e-4, "m", 3)])], "assumed": [ODD],
+        "provenance": Provenance(ODD), "results": {ODD: [ODD, 1.5, math.nan]},
+    }  # fmt: skip
+    return page(Page(**{**content, **changes}))
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (7.943e-4, "m", "0.7943 mm"),
+        (7.943e-5, "m", "79.43 µm"),
+        (-0.013, "rad", "-13 mrad"),
+        (math.pi / 2, "rad", "90 deg"),
+        (2.5e-5, "rad", "25 µrad"),
+        (0.0, "m", "0 mm"),
+        (1.926, "J", "1.926 J"),
+        (3.874e3, "N", "3874 N"),
+        (2.1e11, "Pa", "210 GPa"),
+        (2.5e8, "N/m", "250 N/µm"),
+        (math.inf, "m", "unbounded"),
+        (math.nan, "m", "none"),
+        (0.25, "", "0.25"),
+        (3.0, "m/s^2", "3 m/s^2"),
+    ],
+)
+def test_numbers_are_shown_in_the_units_of_a_drawing(value, unit, text):
+    (cell,) = parse(table(["a"], [[Value(value, unit)]])).tables[0][1]
+    assert cell.text == text
+    assert cell.value == pytest.approx(value, nan_ok=True)
+
+
+def test_a_units_factor_takes_si_to_what_is_shown():
+    for unit, size in (("m", 1.0), ("m", 1e-6), ("rad", 1e-3), ("Pa", 1e6), ("N", 1.0)):
+        shown = shown_in(unit, size)
+        assert shown.unit == unit
+        ratio = {"mm": 1e3, "µm": 1e6, "mrad": 1e3, "MPa": 1e-6, "N": 1.0}
+        assert shown.factor == ratio[shown.shown]
+
+
+def test_a_column_states_its_unit_once_and_keeps_every_digit():
+    value = 0.1 + 0.2  # 0.30000000000000004
+    rows = [["a", value], ["b", 2.0]]
+    head, first, _ = parse(table(["", Column("shift", "m")], rows)).tables[0]
+    assert [cell.text for cell in head] == ["", "shift [mm]"]
+    assert head[1].si == "shift [m]"
+    assert (first[1].text, first[1].value, first[1].si) == ("300", value, "0.3")
+
+
+def test_names_are_never_tags_and_never_end_the_data():
+    trace = {"type": "scatter", "x": [0.0], "y": [1.0], "name": ODD}
+    named = bars({ODD: 1.0}, Axis(ODD, "m"), ODD)
+    drawn = chart([trace], Axis(ODD), Axis(ODD), ODD)
+    text = written(section(ODD, table([ODD], [[ODD]], ODD)), named, drawn)
+    assert "<b>" not in text
+    seen = parse(text)
+    assert seen.results == {ODD: [ODD, 1.5, None]}
+    assert seen.tables[0][1][0].text == ODD
+    assert seen.figures[1]["traces"][0]["name"] == ODD
+    assert "<" not in seen.figures[0]["traces"][0]["y"][0]  # plotly reads tags
+    assert results_in(text, "x") == seen.results
+
+
+def test_a_page_fetches_nothing_and_is_small():
+    text = written(bars({"a": 1.0}, Axis("x"), ""))
+    assert parse(text).fetched == []
+    assert "@import" not in text
+    assert "url(" not in text
+    assert 1_000_000 < len(text) < SIZE  # with plotly.js
+    assert len(written()) < 50_000  # nothing to draw
+    assert written() == written()
+
+
+def test_a_map_holds_every_number_in_si():
+    values = np.array([[1e-4, 2e-4, np.nan], [4e-4, 5e-4, 6e-4]])
+    axes = [(Axis("tx", "m"), np.array([0.0, 0.1])), (Axis("tz", "m"), np.arange(3.0))]
+    layers = [Layer("shift", "shift", "m", values)]
+    states = np.full((2, 3), "ok")
+    (spec,) = parse(value_map(axes, layers, states, "")).figures
+    held = np.array(spec["layers"][0]["values"], dtype=float)
+    np.testing.assert_array_equal(held, values)
+    assert (spec["layers"][0]["shown"], spec["layers"][0]["factor"]) == ("mm", 1e3)
+    assert spec["axes"]["x"]["values"] == [0.0, 0.1]
+
+
+def test_what_is_the_same_everywhere_is_said_not_drawn():
+    """A map of zeros and rounding once had colours from -0.1 to 0.1."""
+    axes = [(Axis("tx", "m"), np.arange(3.0))]
+    flat = Layer("energy", "energy", "J", np.full(3, 2.0) * (1 + 1e-16 * np.arange(3)))
+    none = Layer("margin", "margin", "", np.full(3, np.inf))
+    text = value_map(axes, [flat, none], np.full(3, "ok"), "")
+    assert parse(text).figures == []
+    assert "energy is the same everywhere" in text
+    assert parse(text).numbers[0].text == "2 J"
+    some = Layer("shift", "shift", "m", np.arange(3.0))
+    (spec,) = parse(value_map(axes, [flat, some], np.full(3, "ok"), "")).figures
+    assert [layer["drawn"] for layer in spec["layers"]] == [False, True]
+
+
+def test_a_matrix_around_zero_has_colours_of_both_signs():
+    (spec,) = parse(matrix([[1.0, -3.0], [0.5, 2.0]], "ab", "t", "c", True)).figures
+    (trace,) = spec["traces"]
+    assert (trace["zmin"], trace["zmax"]) == (-3.0, 3.0)
+
+
+def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
+    read = tmp_path / "robot.toml"
+    read.write_bytes(b"abc")
+    gone = tmp_path / "gone.toml"
+    provenance = Provenance("forcefit study x.toml", [read, gone])
+    rows = {
+        r[0].text: r[1].text for r in parse(written(provenance=provenance)).tables[0]
+    }
+    assert rows["command"] == "forcefit study x.toml"
+    # FIPS 180-2, example of "abc"
+    assert rows["SHA-256 of robot.toml"] == (
+        "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    )
+    assert rows["SHA-256 of gone.toml"].startswith("cannot be read any more")
+    assert {"forcefit", "Python", "numpy", "clarabel", "plotly"} <= set(rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<!doctype html><p>", "x: found a page without results of forcefit"),
+        ("hello", "x: found other text, expected a report of forcefit or the JSON"),
+        ("[1]", "x: found a JSON list or value, expected results"),
+    ],
+)
+def test_what_holds_no_results_is_refused(text, message):
+    with pytest.raises(BadInput, match=message):
+        results_in(text, "x")

@@ -1,0 +1,84 @@
+"""Reading a page as a program does: its tables, numbers, figures and results."""
+
+import json
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+
+
+@dataclass
+class Cell:
+    """A cell, or a number in a sentence: what is shown, and the SI value behind it."""
+
+    text: str
+    value: float | None
+    si: str | None
+
+
+@dataclass
+class ParsedPage(HTMLParser):
+    """A page's pieces, in their order."""
+
+    tables: list = field(default_factory=list)
+    numbers: list = field(default_factory=list)
+    figures: list = field(default_factory=list)
+    results: dict = field(default_factory=dict)
+    fetched: list = field(default_factory=list)
+    tags: set = field(default_factory=set)
+
+    def __post_init__(self):
+        super().__init__()
+        self._script = self._cell = self._number = None
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.tags.add(tag)
+        links = (given.get(k) for k in ("src", "href", "action", "data"))
+        self.fetched += [link for link in links if link and link[:5] != "data:"]
+        value = given.get("data-v")
+        cell = Cell("", None if value is None else float(value), given.get("data-si"))
+        if tag == "table":
+            self.tables.append([])
+        elif tag == "tr":
+            self.tables[-1].append([])
+        elif tag in {"td", "th"}:
+            self._cell = cell
+            self.tables[-1][-1].append(cell)
+        elif tag == "span":
+            self._number = cell
+            self.numbers.append(cell)
+        elif tag == "script":
+            self._script = given.get("class") or given.get("type") or "code"
+
+    def handle_endtag(self, tag):
+        if tag in {"td", "th"}:
+            self._cell = None
+        elif tag == "span":
+            self._number = None
+        elif tag == "script":
+            self._script = None
+
+    def handle_data(self, data):
+        if self._script == "results":
+            self.results = json.loads(data)
+        elif self._script == "spec":
+            self.figures.append(json.loads(data))
+        elif self._cell is not None:
+            self._cell.text += data
+        elif self._number is not None:
+            self._number.text += data
+
+    def table(self, *heads):
+        """The one table whose columns begin so."""
+        (one,) = (
+            table
+            for table in self.tables
+            if [cell.text for cell in table[0][: len(heads)]] == list(heads)
+        )
+        return one
+
+
+def parse(text):
+    """A page's pieces."""
+    page = ParsedPage()
+    page.feed(text)
+    return page

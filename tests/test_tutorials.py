@@ -1,0 +1,88 @@
+"""The tutorials run as they stand: files written, commands run, outputs as printed.
+
+Of a page, in its order: a block with a title is a file; ``sh`` is run; ``output`` are
+lines of which each begins or is part of a line the commands before it printed;
+``python`` blocks are one session.  Blocks of ``python`` on other pages run too.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```', re.M | re.S)
+TUTORIALS = sorted(path.stem for path in (DOCS / "tutorials").glob("*.md"))
+# beside tutorials: pages whose Python needs nothing that is not there
+PAGES = ("reports",)
+
+
+def blocks(page):
+    """Language, title and text of each block of a page."""
+    return BLOCK.findall(page.read_text(encoding="utf-8"))
+
+
+def follow(page, folder):
+    """Do what a page says, in an empty folder beside the repository's meshes."""
+    (folder / "meshes").symlink_to(ROOT / "meshes")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHON": sys.executable}
+    shell = 'set -euo pipefail\nforcefit() { "$PYTHON" -m forcefit "$@"; }\n'
+    session, printed = [], ""
+    for language, title, text in blocks(page):
+        if title:
+            (folder / title).write_text(text, encoding="utf-8")
+        elif language == "sh":
+            done = subprocess.run(
+                ["bash", "-c", shell + text], cwd=folder, env=environment,
+                capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            assert done.returncode == 0, text + done.stderr
+            printed = done.stdout
+        elif language == "output":
+            for line in text.strip().splitlines():
+                assert line in printed, f"{line}\nis not in\n{printed}"
+        elif language == "python":
+            session.append(text)
+            # what was defined before is defined again: cheap, and one process a block
+            code = "\n".join(session)
+            done = subprocess.run(
+                [sys.executable, "-c", code], cwd=folder, env=environment,
+                capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            assert done.returncode == 0, text + done.stderr
+
+
+def test_there_are_four_tutorials():
+    assert TUTORIALS == ["cad_link", "own_robot", "tolerances", "tracker"]
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_a_tutorial_runs_as_it_stands(tmp_path, name):
+    follow(DOCS / "tutorials" / f"{name}.md", tmp_path)
+
+
+@pytest.mark.slow
+def test_the_measuring_protocol_s_files_are_a_campaign(tmp_path):
+    """Its last block names a campaign that is still to be measured."""
+    page = (DOCS / "measuring_protocol.md").read_text(encoding="utf-8")
+    own, mark, _ = page.partition("Then, with the whole session")
+    assert mark
+    (tmp_path / "page.md").write_text(own, encoding="utf-8")
+    (tmp_path / "lab").mkdir()
+    follow(tmp_path / "page.md", tmp_path / "lab")
+    inspected = json.loads((tmp_path / "lab" / "inspected.json").read_text())
+    assert inspected["rows"] == 5  # points that were read
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_python_of_a_page_runs(tmp_path, name):
+    for language, _, text in blocks(DOCS / f"{name}.md"):
+        if language == "python":
+            exec(compile(text, name, "exec"), {})

@@ -1,0 +1,51 @@
+"""What governs the worst case: bounds with one imperfection removed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Clearance, Frame, Robot
+from validation.study.governing import CLEARANCE, ERROR, governing
+
+
+def chain(*parts):
+    """Frames on top of each other, with the errors along x and the axial clearances."""
+    frames, parent = [], "base"
+    for k, (shift, clearance) in enumerate(parts):
+        frames.append(Frame(
+            f"f{k}", parent=parent, geometric_error=[0, 0, 0, shift, 0, 0],
+            clearance=Clearance(axial=clearance) if clearance else None,
+        ))  # fmt: skip
+        parent = f"f{k}"
+    return home_posture(Robot("chain", f"f{len(parts) - 1}", tuple(frames)))
+
+
+def test_errors_of_a_chain_add_up_and_so_do_what_is_left_without_one():
+    """Along x errors 3 and -1, along z clearances 4: sqrt(2^2 + 4^2) of 0.1 mm."""
+    rows = governing(chain((3e-4, None), (-1e-4, None), (0.0, 4e-4)))
+    seen = [(one["part"], one["what"], one["translation"]) for one in rows]
+    expected = [
+        ("f2", CLEARANCE, 2e-4),  # 3 - 1
+        ("f0", ERROR, np.hypot(1e-4, 4e-4)),
+        ("f1", ERROR, np.hypot(3e-4, 4e-4)),  # what it cancelled is back
+    ]
+    assert [one[:2] for one in seen] == [one[:2] for one in expected]
+    # bounds from above, as tight as problem (27) was asked for: 1 um
+    for (*_, bound), (*_, size) in zip(seen, expected, strict=True):
+        assert size * (1 - 1e-9) <= bound <= size + 1e-6
+    assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
+
+
+def test_a_joints_own_motion_is_not_taken_for_a_clearance():
+    posture = chain((0.0, None), (1e-4, None))
+    first, second = posture.robot.frames
+    hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))
+    robot = replace(posture.robot, frames=(hinge, second))
+    rows = governing(replace(posture, robot=robot))
+    assert [(one["part"], one["what"]) for one in rows] == [("f1", ERROR)]
+
+
+def test_a_perfect_robot_has_nothing_that_governs():
+    assert governing(chain((0.0, None), (0.0, None))) == []

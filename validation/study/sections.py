@@ -1,0 +1,366 @@
+"""Sections of a study's page: tables, charts, maps and the robot, as HTML."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.linear.error_body import ErrorBody, error_body
+from assembly.linear.reach import reachable_screws
+from assembly.report.scene import robot_scene
+from assembly.solvers.conic import SolverFailed
+from forcefit.page.charts import GREY, Axis, Layer, chart, matrix, value_map
+from forcefit.page.page import paragraph, section
+from forcefit.page.tables import Cell, Column, Value, table
+from forcefit.page.words import in_words, unit_of
+from stiffness.link import scaled
+from stiffness.screws import SCREW
+from validation.crosscheck.verdict import verdict_text
+from validation.study.headline import WORST, worst_clearance
+from validation.study.study import StudyResults
+
+_CLEARANCE_OF = {
+    "frozen": "anywhere while no deformation changes",
+    "free": "anywhere, and compliant joints turn about their own axis",
+    "budget": "anywhere, and springs too, with 5 % more than the least energy",
+}
+# of the maps: key, words
+MAPPED = {
+    "translation_error": "largest shift, eq. (27), clearances anywhere",
+    "rotation_error": "largest turn, eq. (27), clearances anywhere",
+    "energy": "energy, eq. (22)",
+    "margin_free": "zone margin, compliant joints free",
+    "margin": "zone margin, eq. (21)",
+}
+_POSE = ("rad", "rad", "rad", "m", "m", "m")
+_PARTS = ("translation", "rotation")
+WRENCH = ("N m", "N m", "N m", "N", "N", "N")
+_UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
+
+
+def unchecked_section(results: StudyResults) -> str:
+    """What could not be checked, and why."""
+    rows = [[in_words(name), why] for name, why in results.unchecked.items()]
+    return section("What could not be checked", table(["check", "why"], rows)) if (
+        rows
+    ) else ""  # fmt: skip
+
+
+def robot_section(results: StudyResults) -> str:
+    """The forced robot, to be turned and closed."""
+    if results.assembly is None or "picture" not in results.study.checks:
+        return ""
+    caption = (
+        "Nominal (grey) and forced robot, its clearances at least energy. Red: elastic "
+        "links; blue: rigid bodies; orange: driven joints; yellow: the errors that "
+        f"clearances leave its platform (reading {WORST}), as exaggerated as the rest."
+    )
+    if results.closing is not None:
+        caption += " The closing is simulated without clearances."
+    body = _error_body(results)
+    return section(
+        "The forced robot",
+        robot_scene(results.assembly, results.closing, body, caption),
+    )
+
+
+def _error_body(results: StudyResults) -> ErrorBody | None:
+    """The shifts that clearances leave the platform; None where nothing bounds them."""
+    assert results.assembly is not None
+    reach = reachable_screws(results.assembly, WORST)
+    if reach.unbounded(3):
+        return None
+    try:
+        return error_body(reach, "translation")
+    except SolverFailed:
+        return None
+
+
+def governing_section(results: StudyResults) -> str:
+    """The certified worst case with one part perfect."""
+    worst = worst_clearance(results)["pose"]
+    if worst is None or not results.governing:
+        return ""
+    rows = [
+        [one["part"], one["what"], *(_change(one, worst, k) for k in _PARTS)]
+        for one in results.governing
+    ]
+    head = ["part", "made perfect"]
+    for part in _PARTS:
+        head += [f"largest {in_words(part)}", "change"]
+    flat = [[*row[:2], *(cell for pair in row[2:] for cell in pair)] for row in rows]
+    return section(
+        "What governs the worst case",
+        paragraph(
+            "The certified bound at this pose is ", Value(worst["translation"], "m"),
+            " and ", Value(worst["rotation"], "rad"),
+            ". Here it is with one imperfection removed. Errors may cancel each "
+            "other; then it rises.",
+        ),
+        table(head, flat, "what governs"),
+    )  # fmt: skip
+
+
+def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any]:
+    """A bound without a part, and its change in per cent."""
+    value = one[part]
+    if value is None or not np.isfinite([value, worst[part]]).all():
+        return ["none" if value is None else Value(value, unit_of(part)), "-"]
+    if worst[part] == 0.0:
+        return [Value(value, unit_of(part)), "-"]
+    return [Value(value, unit_of(part)), f"{100 * (value / worst[part] - 1):+.1f} %"]
+
+
+def solution_section(results: StudyResults) -> str:
+    """The assembly at the study's pose, with its certificate."""
+    solution = results.solution
+    pose = [
+        text
+        for k, v in solution["pose"].items()
+        for text in (
+            f"{', ' if k != 'tx' else ''}{k} = ",
+            Value(round(v, 9), _UNITS[k]),
+        )
+    ]
+    rows: list[list[Any]] = [[in_words(k), str(v)] if isinstance(v, int) else
+                             [in_words(k), Value(v)]
+                             for k, v in solution["mobility"].items()]  # fmt: skip
+    zone = solution.get("zone", {})
+    for key in ("margin", "margin_free"):
+        rows.append([f"{in_words(key)}, eq. (21)", _number(zone.get(key), "")])
+    if solution["status"] == "ok":
+        rows.append(["energy, eq. (22)", Value(solution["energy"], "J", 9)])
+        for k, value in enumerate(solution["platform_screw"]):
+            quantity = f"platform error {SCREW[k]}, clearances at least energy"
+            rows.append([quantity, Value(value, _POSE[k], 6)])
+        for key, value in solution["certificate"].items():
+            rows.append([f"certificate: {in_words(key)}", _number(value, unit_of(key))])
+        rows += _linearisation_rows(solution["linearisation_error"])
+    parts = [
+        paragraph("Nominal pose: ", *pose, "."), table(["quantity", "value"], rows)
+    ]  # fmt: skip
+    if solution["status"] == "ok":
+        parts.append(_wrenches(results))
+    if results.error:
+        parts.append(_pose_error(results))
+    return section("Assembly at one pose", *parts)
+
+
+def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
+    """What linear closures cost against finite motions."""
+    if error["status"] != "ok":
+        return [["linearisation error", error["status"]]]
+    turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
+    return [
+        ["linearisation error, turn", Value(turn, "rad", 3)],
+        ["linearisation error, shift", Value(shift, "m", 3)],
+        ["linearisation error, energy", f"{100 * error['relative_energy']:+.3g} %"],
+    ]
+
+
+def _pose_error(results: StudyResults) -> str:
+    """Bounds of (27) in each reading."""
+    rows = [
+        [
+            reading,
+            *(
+                bounds[key][side] if bounds[key] else float("nan")
+                for key in ("rotation", "translation")
+                for side in ("lower", "upper")
+            ),
+            _CLEARANCE_OF[reading],
+        ]
+        for reading, bounds in results.error.items()
+    ]
+    head: list[str | Column] = [
+        "reading", Column("turn at least", "rad", 6), Column("at most", "rad", 6),
+        Column("shift at least", "m", 6), Column("at most", "m", 6), "clearances",
+    ]  # fmt: skip
+    return paragraph(
+        "Largest error of the platform's pose, problem (27), between certified bounds."
+    ) + table(head, rows, "pose errors")
+
+
+def _wrenches(results: StudyResults) -> str:
+    """Wrench through each elastic link."""
+    frames = results.solution["frames"]
+    rows = [
+        [f.name, *frames[f.name]["wrench"]]
+        for f in results.robot.frames
+        if f.link is not None
+    ]
+    names = ("MX", "MY", "MZ", "FX", "FY", "FZ")
+    head: list[str | Column] = [
+        "link",
+        *(Column(n, u) for n, u in zip(names, WRENCH, strict=True)),
+    ]
+    return paragraph(
+        "Wrench each elastic link transmits, at its tip in its own axes:"
+    ) + table(head, rows, "wrenches")
+
+
+def reference_section(results: StudyResults) -> str:
+    """The printed problems solved again."""
+    reference, solution = results.reference, results.solution
+    title = "The same problems as printed, in cvxpy"
+    if reference is None:
+        return ""
+    if "reason" in reference:
+        return section(title, paragraph(f"Not compared: {reference['reason']}"))
+    ours = {"energy": solution["energy"], "margin": solution["zone"]["margin"]}
+    ours["margin_free"] = solution["zone"]["margin_free"]
+    rows = [
+        [in_words(k), _number(ours[k], unit_of(k), 10),
+         _number(reference[k], unit_of(k), 10),
+         "nothing to compare" if np.isnan(d) else Value(d, "", 2)]
+        for k, d in reference["relative_difference"].items()
+    ]  # fmt: skip
+    return section(
+        title,
+        paragraph(
+            "Every screw of every frame a variable, every constraint an equation of "
+            f"the paper; differences must stay below {reference['tolerance']:g}."
+        ),
+        table(["", "reduced problem", "cvxpy", "relative difference"], rows),
+    )
+
+
+def stiffness_section(results: StudyResults) -> str:
+    """Beam against finite elements."""
+    if not results.stiffness:
+        return ""
+    stiffness = results.stiffness
+    name, compared = next(iter(stiffness.items()))
+    shared = f" ({len(stiffness)} links share this shape)" if len(stiffness) > 1 else ""
+    fea, euler, timoshenko = (compared[k] for k in ("fea", "euler", "timoshenko"))
+    rows: list[list[Cell]] = [
+        [f"{SCREW[i]}, {SCREW[j]}",
+         *(Value(K[i, j], _stiffness_unit(i, j), 6) for K in (euler, timoshenko, fea)),
+         f"{100 * (fea[i, j] / timoshenko[i, j] - 1):+.2f} %"]
+        for i, j in zip(*np.nonzero(np.triu(_significant(euler))), strict=True)
+    ]  # fmt: skip
+    count = compared["mesh"].get("elements", "?")
+    return section(
+        "Link stiffness K_E: beam and finite elements",
+        paragraph(
+            f"Link {name}{shared}, {count} cubic tetrahedra, estimated error "
+            f"{100 * compared['relative_error_estimate']:.2g} %. A solid held at a "
+            "rigid face is stiffer than a beam by about r/L of itself, and a beam "
+            "without shear (Euler-Bernoulli) is stiffer than one with it: a few per "
+            "cent between the columns are physics, not an error."
+        ),
+        table(
+            ["entry", "Euler-Bernoulli", "Timoshenko", "finite elements",
+             "to Timoshenko"],
+            rows, "link stiffness",
+        ),
+        matrix(
+            100 * scaled(fea - timoshenko, timoshenko), SCREW,
+            "difference [% of sqrt(K_ii K_jj)]",
+            "Finite elements minus Timoshenko beam, entry by entry.", around=True,
+        ),
+    )  # fmt: skip
+
+
+def _stiffness_unit(i: int, j: int) -> str:
+    """SI unit of an entry of a stiffness matrix."""
+    return ("N m/rad", "N", "N/m")[int(i > 2) + int(j > 2)]
+
+
+def _significant(K: NDArray) -> NDArray:
+    """(6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
+    size = np.sqrt(np.diag(K))
+    return np.abs(K) > 1e-3 * np.outer(size, size)
+
+
+def maps_section(results: StudyResults, summary: dict[str, Any]) -> str:
+    """Maps over the grid, their values under the pointer."""
+    maps, title = results.maps, "Over the workspace"
+    counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
+    share = summary["share_assemblable_free"]
+    if share is None:
+        return section(title, paragraph(f"{counts}. No point has an answer."))
+    rows: list[list[Cell]] = [
+        [name, *(Value(v, unit_of(key)) for v in summary[key])]
+        for key, name in MAPPED.items()
+        if key in summary
+    ]
+    names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
+    drawn = ""
+    if len(names) in {1, 2}:
+        view = maps.squeeze(drop=True).transpose(*names, ...)
+        layers = [
+            Layer(key, text, unit_of(key), _of_map(view, key))
+            for key, text in MAPPED.items()
+        ]
+        axes = [(Axis(n, _UNITS.get(n, "")), view[n].values) for n in names]
+        states = view["status"].values.astype(str)
+        drawn = value_map(axes, layers, states, "Over the grid.")
+    return section(
+        title,
+        paragraph(
+            f"{counts}. Assembles rigidly with compliant joints free at "
+            f"{100 * share:.1f} % of the points with an answer."
+        ),
+        table(["", "least", "median", "largest"], rows, "maps"),
+        drawn,
+    )
+
+
+def _of_map(view: Any, key: str) -> NDArray:
+    """A quantity over the grid; of pose errors the certified upper bound."""
+    one = view[key].sel(bound="upper") if "bound" in view[key].dims else view[key]
+    return np.asarray(one.values, dtype=float)
+
+
+def crosscheck_section(results: StudyResults) -> str:
+    """VJM against the multibody simulation."""
+    check, title = results.crosscheck, "Against a multibody simulation"
+    if check is None:
+        if not results.crosscheck_failure:
+            return ""
+        return section(title, paragraph(f"Not compared: {results.crosscheck_failure}"))
+    return section(
+        title,
+        paragraph(
+            "The same forced assembly, without clearances, as a geometrically "
+            "nonlinear flexible multibody system (Exudyn). A linearised model must "
+            "differ from it by the square of the errors' size: slope 2. "
+            f"{_slope_text(check.slope)} {verdict_text(check)}."
+        ),
+        table(check.metric.header(), check.metric.rows(), "cross-check"),
+        _slope_chart(check),
+    )
+
+
+def _slope_chart(check: Any) -> str:
+    """Differences against the scale of the errors, beside a line of slope 2."""
+    scales = np.asarray(check.scales)
+    traces: list[dict[str, Any]] = []
+    for name, values in check.metric.differences.items():
+        shown = np.where(values > 0, values, np.nan)
+        traces.append({"type": "scatter", "mode": "markers", "x": scales, "y": shown,
+                       "name": f"{in_words(name)} [{unit_of(name)}]"})  # fmt: skip
+        traces.append({
+            "type": "scatter", "mode": "lines", "x": scales, "name": "slope 2",
+            "y": shown[-1] * (scales / scales[-1]) ** 2, "line": {"color": GREY},
+            "showlegend": len(traces) == 1,
+        })  # fmt: skip
+    log = {"type": "log"}
+    return chart(
+        traces, Axis("scale of the errors", options=log),
+        Axis("simulation minus linear model [rad, m]", options=log),
+        "Difference of the platform's pose, without clearances.",
+    )  # fmt: skip
+
+
+def _slope_text(slope: float) -> str:
+    """The slope measured, if there is one."""
+    if np.isnan(slope):
+        return "Nothing separates the two here, so there is no slope."
+    return f"Measured: {slope:.3f}."
+
+
+def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
+    """A number, or that there is none."""
+    return "none" if value is None else Value(value, unit, digits)
