@@ -37,14 +37,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import Posture, place_many
 from assembly.linear import reference
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import solve_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.reduction import reduce_problem
-from assembly.linear.zone import zone_margin
+from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from assembly.solvers import conic

@@ -6,13 +6,10 @@ import numpy as np
 
 from assembly.batch.many_draws import prepare_energies
 from assembly.batch.many_margins import prepare_margins
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.zone import zone_margin, zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import position_clearances
