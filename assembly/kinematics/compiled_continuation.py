@@ -27,6 +27,7 @@ _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
 _ROUNDED = 1e-5  # scaled residual accepted where it cannot be made smaller
 _NEAR = 1e-4  # scaled residual accepted on the way
 _JUMP = 0.4  # [rad or lengths] largest joint motion in a step: keeps the assembly mode
+_FAR = 1.0  # the same where the tangent is a guide to the whole step
 _LONG = 0.7  # of it: the step that is tried, by the tangent
 _SHORT = 0.03  # of the way: where long steps lead nowhere
 _FIRST_STEP = 0.125  # there, and where the target does not determine all joints
@@ -103,7 +104,7 @@ def _follow(
     for k in range(3):
         home_pose[k], home_pose[3 + k] = p[platform, k], turn[k]
     part, part_held, tried = vector(6), vector(n), vector(n)
-    jump = np.inf if guess else _JUMP * max(1.0, size)
+    jump = np.inf if guess else _FAR * max(1.0, size)
     done, step, careful = 0.0, 1.0, guess
     while done < 1.0 and step > _SMALLEST_STEP:
         goal = min(1.0, done + step)
@@ -123,7 +124,7 @@ def _follow(
         if not careful and (not determined or step < _SHORT):
             # where it ends depends on the way, or the way is hard: by short steps
             copy(start, q)
-            done, step, careful = 0.0, _FIRST_STEP, True
+            done, step, careful, jump = 0.0, _FIRST_STEP, True, _JUMP * max(1.0, size)
             continue
         for j in range(n):
             # a jump, or a coordinate that is NaN: another assembly mode
@@ -134,10 +135,10 @@ def _follow(
             return 1.0 if fine else 0.0
         if fine:
             done = goal
-            step *= 2.0
-        else:
-            shorter = _LONG * jump / ahead if ahead > jump else 0.5
-            step *= 0.5 if careful else min(0.5, shorter)
+        factor = 2.0 if fine else 0.5
+        if not careful and (fine or ahead > jump):
+            factor = min(4.0, _LONG * jump / max(ahead, 1e-9))
+        step *= factor
     return done
 
 
