@@ -7,13 +7,13 @@ import pytest
 
 from assembly.kinematics.posture import Posture, home_posture, place_many
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import minimise_energies
+from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import (
     CannotAssemble,
     reference_assembly,
     reference_margin,
 )
-from assembly.linear.zone import Zone, zone_margins
+from assembly.linear.zone import Zone, zone_margin, zone_margins
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
@@ -382,3 +382,57 @@ def test_a_margin_has_two_readings():
     robot = coaxial_beams(np.zeros(6))
     with pytest.raises(ValueError, match="compliant is 'soft'"):
         zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")
+
+
+def test_many_answers_are_indexed_and_each_is_the_single_one(grid):
+    robot, postures = grid
+    many = solve_assembly(postures[:3])
+    assert len(many) == 3
+    for one, posture in zip(many, postures, strict=False):
+        assert one.energy == solve_assembly(posture).energy
+    assert many[-1].energy == many.energy[2] == solve_assembly(postures[2]).energy
+    with pytest.raises(IndexError):
+        many[3]
+    errors = np.array([0.5, 1.0])[:, None, None] * robot.errors
+    halved = solve_assembly(postures[0], errors=errors)
+    assert halved.energy[1] == many.energy[0]
+    half = replace(postures[0], robot=robot.with_errors(errors[0]))
+    assert halved[0].energy == solve_assembly(half).energy
+    margins = zone_margin(postures[:3], "free")
+    assert [zone.margin for zone in margins] == margins.margin.tolist()
+    assert margins[1] == zone_margin(postures[1], "free")
+
+
+def test_many_answers_under_a_load_are_those_one_by_one(grid):
+    _, postures = grid
+    load = [0.0, 0, 0, 10, 0, -50]
+    many = solve_assembly(postures[:2], load)
+    assert many.fallbacks() == {"loads": 2}
+    for i in range(2):
+        one = solve_assembly(postures[i], load)
+        assert many.energy[i] == one.energy
+        assert np.array_equal(many[i].load, load)
+
+
+def test_a_single_answer_closes_and_has_the_least_wrenches(grid):
+    """Springs of a compiled answer close to rounding; wrenches are the reference's."""
+    _, postures = grid
+    for posture in postures[::9]:
+        answer, reference = solve_assembly(posture), reference_assembly(posture)
+        assert answer.closure_residual() < 1e-14
+        assert answer.stored == pytest.approx(reference.stored, rel=1e-8)
+        size = np.linalg.norm(reference.closure_wrenches, axis=0)
+        off = np.abs(answer.closure_wrenches - reference.closure_wrenches)
+        # known to the root of the gap, 1e-4 of the springs
+        assert np.all(off < 2e-3 * size)
+        assert answer.ranks == reference.ranks
+
+
+def test_margins_of_a_perfect_robot_are_zero_and_none_goes_to_the_fallback(grid):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for compliant in ("rigid", "free"):
+        margins = zone_margins(robot, T, compliant, mismatch, 0.0 * robot.errors)
+        assert not margins.fallback.any()
+        assert np.array_equal(margins.margin, np.zeros(len(T)))
+        assert np.array_equal(margins.bound, margins.margin)
