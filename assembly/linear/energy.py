@@ -188,7 +188,7 @@ def _solve_compiled(
     )
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
-    else:
+    elif errors.any():  # else nothing has to move, and zeros are the answer
         assemble_all(structure, T, errors, mismatch, out)
     return out
 

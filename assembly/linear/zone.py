@@ -223,11 +223,13 @@ def _compiled(
 
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
+    own = robot.errors if errors is None else errors
+    if not own.any():  # no clearance is needed
+        return np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(T), dtype=np.int64)
     joints, structure = structure_of(robot, compliant)
     margin, bound = np.full((2, len(T)), np.nan)
     outcome = np.full(len(T), FALLBACK)
     if joints.scaled.all():
-        own = robot.errors if errors is None else errors
         # writable and in C order, whatever comes: the kernels are compiled for one kind
         all_margins(
             structure, np.require(T, requirements=["C", "W"]),
