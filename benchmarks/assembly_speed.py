@@ -7,10 +7,11 @@ grid of its workspace.  Printed, in this order:
 - microseconds of processor time a point for the energy (22), at the errors times 1 and
   times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``assembly.linear.reduction`` (reduction counted), ``solve_assembly`` and
-  ``minimise_energies`` (linearisation, reduction and certificate counted), with the
-  ratio of cvxpy's DPP to each;
+  reduced by ``assembly.linear.reduction`` (reduction counted), our reference in numpy,
+  ``solve_assembly`` and ``minimise_energies`` (linearisation, reduction and certificate
+  counted), with the ratio of cvxpy's DPP to each;
 - the same for the margin (21), both readings;
+- what other single calls take, and placing many poses;
 - the share of the grid's points with a certified energy at six multiples of the errors,
   and how many of them the fallback had to solve.
 
@@ -37,14 +38,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
-from assembly.kinematics.posture import Posture, place_many
+from assembly.kinematics.posture import Posture, place_many, place_robot
 from assembly.linear import reference
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import solve_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.fallback import reference_assembly, reference_margin
+from assembly.linear.moving_clearances import Asked
+from assembly.linear.pose_error import bound_pose_error, reference_pose_error
 from assembly.linear.reduction import reduce_problem
-from assembly.linear.zone import zone_margin
+from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from assembly.solvers import conic
@@ -165,7 +167,7 @@ def clarabel_full(posture: Posture) -> object:
     b = np.concatenate([-misfit, radii])
     q = np.zeros(A.shape[1])
     return conic._clarabel(
-        P.tocsc(), q, A.tocsc(), b, len(misfit), group, regularisation=1e-8
+        P.tocsc(), q, A.tocsc(), b, conic._Cones(equal=len(misfit), group=group), 1e-8
     )
 
 
@@ -219,7 +221,8 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
         "cvxpy DPP, scaled": timed(Dpp(robot, "elastic", False, data), data),
         "Clarabel, full problem, scaled": timed(clarabel_full, few),
         "Clarabel, our reduction (numpy)": timed(clarabel_reduced, few),
-        "ours, one at a time": timed(solve_assembly, few),
+        "ours, reference in numpy": timed(reference_assembly, few),
+        "ours, one at a time": timed(solve_assembly, own),
         "ours, batched": batched(minimise_energies, own),
     }
     print_table(f"energy (22), errors times {kappa:g}", rows)
@@ -231,15 +234,45 @@ def print_margins(postures: list[Posture]) -> None:
     for reading in READINGS:
         ours = partial(zone_margin, compliant=reading)
         ours(few[0])
+        reference = partial(reference_margin, compliant=reading)
         data = [closure_matrices(p, reading) for p in few]
         rows = {
             "cvxpy DPP, scaled": timed(Dpp(few[0].robot, reading, True, data), data),
-            "ours, one at a time": timed(ours, few),
+            "ours, reference in numpy": timed(reference, few),
+            "ours, one at a time": timed(ours, postures),
             "ours, batched": batched(
                 partial(zone_margins, compliant=reading), postures
             ),
         }
         print_table(f"margin (21), compliant {reading}", rows)
+
+
+def print_calls(robot: Robot, postures: list[Posture]) -> None:
+    """The table of what else is called one at a time, and of placing."""
+    some = [solve_assembly(posture) for posture in postures[::8]]
+    poses = [{k: v for k, v in p.pose().items() if k in ("tx", "tz")} for p in postures]
+    grid = np.full((len(poses), 6), np.nan)
+    grid[:, [0, 2]] = [list(pose.values()) for pose in poses]
+    calls: dict[str, tuple[Callable[..., object], list]] = {
+        f"bound_pose_error, {reading}": (
+            partial(bound_pose_error, reading=reading), some
+        )
+        for reading in ("frozen", "free")
+    }  # fmt: skip
+    for reading in ("frozen", "free"):
+        asked = Asked(reading)
+        calls[f"the same in numpy, {reading}"] = (
+            partial(reference_pose_error, asked=asked), some[::12]
+        )  # fmt: skip
+    calls["place_robot"] = partial(place_robot, robot), poses[::4]
+    print("\nother calls, us")
+    for name, (call, questions) in calls.items():
+        call(questions[0])
+        print(f"{name:38}{timed(call, questions):10.1f}")
+    start = time.process_time()
+    place_many(robot, grid)
+    taken = (time.process_time() - start) / len(grid) * 1e6
+    print(f"{'place_many, a pose within reach':38}{taken:10.1f}")
 
 
 def print_certified(robot: Robot, postures: list[Posture]) -> None:
@@ -265,6 +298,7 @@ def main() -> None:
     for kappa in (1.0, 0.2):
         print_energies(robot, postures, kappa)
     print_margins(postures)
+    print_calls(robot, postures)
     print_certified(robot, postures)
 
 

@@ -5,7 +5,7 @@ up to a share of the paper's.  Printed for each share: how many of the draws cos
 nothing, how many were certified and how many needed the fallback; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; draws per second of the clock on two threads; and the batched
-solver of :mod:`assembly.batch.many_postures`, which reduces each draw anew, per second
+solver of :mod:`assembly.linear.energy`, which reduces each draw anew, per second
 of processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from assembly.batch.many_draws import OnePosture, prepare_energies
-from assembly.batch.many_postures import minimise_energies
 from assembly.kinematics.posture import place_robot
+from assembly.linear.energy import minimise_energies
 from assembly.model.error_distributions import ErrorSources
 from assembly.model.random_errors import frames_named
 from assembly.robots import load_robot

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from assembly.batch.many_postures import minimise_energies
 from assembly.kinematics.posture import place_many
+from assembly.linear.energy import minimise_energies
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot

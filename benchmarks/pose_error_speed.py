@@ -35,13 +35,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import Posture, place_many
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reach import ReachableSet, reachable_screws
+from assembly.linear.zone import zone_margins
 from assembly.model.robot import Robot
 from assembly.solvers import conic
 from benchmarks.assembly_speed import paper_robot, workspace

@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import solve_assembly, solve_with
+from assembly.linear.energy import solve_assembly
+from assembly.linear.fallback import margin_with, solve_with
 from assembly.linear.load import loads_on_frames, weights
-from assembly.linear.zone import Zone, margin_with
+from assembly.linear.zone import Zone
 from assembly.model.clearance import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints
@@ -55,7 +56,7 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
         SolverFailed: the cone solver gave up.
     """
     joints = bush_joints(virtual_joints(posture.robot, compliant))
-    return margin_with(linearise(posture), joints)[0]
+    return Zone(*margin_with(linearise(posture), joints)[:2])
 
 
 def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:

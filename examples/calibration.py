@@ -58,7 +58,7 @@ class Rows:
         """The same commands given to another robot of the same frames."""
         q = self.here.coordinates
         start = home_posture(robot).coordinates
-        track = follow(robot, start, Target(coordinates=q), steps=1)
+        track = follow(robot, start, Target(coordinates=q), guess=True)
         errors = np.broadcast_to(robot.errors, self.here.errors.shape)
         moved = replace(
             self.here, robot=robot, transforms=track.transforms, errors=errors

@@ -1,5 +1,4 @@
-"""The same problems compiled, for many postures or many draws of the errors.
+"""One posture, prepared once for many draws of the errors: (22) and (21).
 
-Begin at ``many_postures.py`` and ``zone_margins.py``; ``many_draws.py`` and
-``many_margins.py`` keep the posture and take many draws of the errors.
+Begin at ``many_draws.py`` and ``many_margins.py``.
 """

@@ -1,15 +1,15 @@
 """Problem (22) for many right sides h at one posture, compiled.
 
 The reduction is shared: only h differs from draw to draw.  The certificate is that of
-:mod:`assembly.batch.compiled_energy`, from matrices made once of the columns before
+:mod:`assembly.linear.compiled_energy`, from matrices made once of the columns before
 any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.compiled_energy import small_answer
-from assembly.batch.compiled_zone import farthest, turn_first
+from assembly.linear.compiled_energy import small_answer
+from assembly.linear.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE

@@ -16,7 +16,7 @@ class Draws:
         multipliers: (k, 6 closures) of the scaled closure rows.
         platform_screw: (k, 6) [rad, m] at the platform's origin, base axes.
         fallback: (k,) bool, solved by
-            :func:`assembly.batch.many_postures.minimise_energies`, or, under loads, by
+            :func:`assembly.linear.energy.minimise_energies`, or, under loads, by
             :func:`assembly.linear.energy.solve_assembly`.
     """
 

@@ -3,7 +3,7 @@
 Free motions and springs are eliminated once: only the right sides differ from draw to
 draw, and every result, certificates included, is a linear map of few numbers.  A draw
 whose certificate falls short, or that this does not cover, is solved again: without
-loads by :mod:`assembly.batch.many_postures`, under loads by
+loads by :mod:`assembly.linear.energy`, under loads by
 :mod:`assembly.linear.energy`.
 """
 
@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.batch.draws import Draws
-from assembly.batch.many_postures import minimise_energies
 from assembly.batch.posture_loads import PostureLoads
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
-from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN

@@ -20,11 +20,19 @@ from assembly.solvers.compiled import (
     kernel,
     part,
 )
-from assembly.solvers.vectors import indices, matrices, matrix, vector
+from assembly.solvers.layers import FAST, LANES
+from assembly.solvers.vectors import copy, indices, matrices, matrix, vector
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
 _ROUNDED = 1e-5  # scaled residual accepted where it cannot be made smaller
+_NEAR = 1e-4  # scaled residual accepted on the way
 _JUMP = 0.4  # [rad or lengths] largest joint motion in a step: keeps the assembly mode
+_FAR = 1.0  # the same where the tangent is a guide to the whole step
+_LONG = 0.7  # of it: the step that is tried, by the tangent
+_SHORT = 0.03  # of the way: where long steps lead nowhere
+_FIRST_STEP = 0.125  # there, and where the target does not determine all joints
+_CURVED = 0.25  # of the tangent's step: largest correction of it
+_CLEAR = 1e4  # times the damping: a joint motion of its own
 _SMALLEST_STEP = 1e-5
 _NEWTON = 12  # iterations; quadratic convergence needs about 4
 
@@ -33,7 +41,7 @@ _NEWTON = 12  # iterations; quadratic convergence needs about 4
 def follow_all(
     parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
     platform: int, start: NDArray, poses: NDArray, held: NDArray, size: float,
-    steps: int, T: NDArray,
+    guess: bool, T: NDArray, still_open: NDArray,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Follow every target along its straight line.
 
@@ -48,8 +56,9 @@ def follow_all(
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
         held: (k, n) coordinates, NaN where free.
         size: [m] reference length.
-        steps: first number of steps; 1 takes any step, for a start that is a guess.
+        guess: the start is one, and does not close: one step, of any length.
         T: (k, n, 4, 4) to fill: rotations and origins of all frames where tracks end.
+        still_open: (k, closures) to fill [rad, m]: largest component of each closure.
 
     Returns:
         (k, n) coordinates where each track ends and (k,) progress, 1 where reached.
@@ -62,7 +71,7 @@ def follow_all(
             pose[k] = poses[i, k] if len(poses) else np.nan
         progress[i] = _follow(
             parents, kinds, fixed, carries, pairs, platform, start, pose, held[i],
-            size, steps, ends[i],
+            size, guess, ends[i],
         )  # fmt: skip
         R, p = forward(parents, kinds, fixed, ends[i])
         for j in range(n):
@@ -70,6 +79,14 @@ def follow_all(
                 T[i, j, k, 3] = p[j, k]
                 for l in range(3):
                     T[i, j, k, l] = R[j, k, l]
+        for c in range(len(pairs)):
+            a, b = pairs[c]
+            turn = rotation_log(_times_transposed(R[a], R[b]))
+            for k in range(3):
+                most = max(abs(turn[k]), abs(p[a, k] - p[b, k]))
+                # written so that NaN stays
+                if not most <= still_open[i, c]:
+                    still_open[i, c] = most
     return ends, progress
 
 
@@ -77,82 +94,108 @@ def follow_all(
 def _follow(
     parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
     pairs: IndexRows, platform: int, start: Vector, pose: Vector,
-    held: Vector, size: float, steps: int, q: Vector,
+    held: Vector, size: float, guess: bool, q: Vector,
 ) -> float:  # fmt: skip
-    """One target, q: steps that halve where Newton fails, double where it does not."""
-    for j in range(len(q)):
-        q[j] = start[j]
+    """One target, q: as far a step as the tangent allows, half of it where it fails."""
+    n = len(q)
+    copy(start, q)
     R, p = forward(parents, kinds, fixed, q)
     home_pose, turn = vector(6), rotation_log(R[platform])
     for k in range(3):
         home_pose[k], home_pose[3 + k] = p[platform, k], turn[k]
-    done, step = 0.0, 1.0 / steps
-    part, part_held = vector(6), vector(len(q))
-    farthest = _JUMP * max(1.0, size)
+    part, part_held, tried = vector(6), vector(n), vector(n)
+    jump = np.inf if guess else _FAR * max(1.0, size)
+    done, step, careful = 0.0, 1.0, guess
     while done < 1.0 and step > _SMALLEST_STEP:
         goal = min(1.0, done + step)
         for i in range(6):
             part[i] = pose[i]
             if goal < 1.0:
                 part[i] = home_pose[i] + goal * (pose[i] - home_pose[i])
-        for j in range(len(q)):
+        for j in range(n):
             part_held[j] = held[j]
             if goal < 1.0:
                 part_held[j] = start[j] + goal * (held[j] - start[j])
-        tried, fine = _newton(
-            parents, kinds, fixed, carries, pairs, platform, q, part, part_held, size
-        )
-        for j in range(len(q)):
+            tried[j] = q[j]
+        fine, determined, ahead = _newton(
+            parents, kinds, fixed, carries, pairs, platform, tried, part, part_held,
+            size, goal < 1.0, jump, careful,
+        )  # fmt: skip
+        if not careful and (not determined or step < _SHORT):
+            # where it ends depends on the way, or the way is hard: by short steps
+            copy(start, q)
+            done, step, careful, jump = 0.0, _FIRST_STEP, True, _JUMP * max(1.0, size)
+            continue
+        for j in range(n):
             # a jump, or a coordinate that is NaN: another assembly mode
-            fine = fine and (steps == 1 or abs(tried[j] - q[j]) < farthest)
-        if fine or steps == 1:
-            for j in range(len(q)):
-                q[j] = tried[j]
-        if steps == 1:
+            fine = fine and abs(tried[j] - q[j]) < jump
+        if fine or guess:
+            copy(tried, q)
+        if guess:
             return 1.0 if fine else 0.0
         if fine:
             done = goal
-        step *= 2.0 if fine else 0.5
+        factor = 2.0 if fine else 0.5
+        if not careful and (fine or ahead > jump):
+            factor = min(4.0, _LONG * jump / max(ahead, 1e-9))
+        step *= factor
     return done
 
 
 @part
 def _newton(
     parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
-    pairs: IndexRows, platform: int, begin: Vector, pose: Vector,
-    held: Vector, size: float,
-) -> tuple[Vector, bool]:  # fmt: skip
-    """Damped Gauss-Newton of least norm on closures and pose; whether it converged."""
-    n, count = len(begin), 0
-    q, free, unit = vector(n), indices(n), vector(n)
+    pairs: IndexRows, platform: int, q: Vector, pose: Vector, held: Vector,
+    size: float, near: bool, jump: float, careful: bool,
+) -> tuple[bool, bool, float]:  # fmt: skip
+    """Damped Gauss-Newton of least norm on closures and pose.
+
+    Returns:
+        Whether q converged, or is near enough; whether the target determines it, if
+        that was asked; how far the tangent moves a joint.
+    """
+    n, count = len(q), 0
+    free, unit = indices(n), vector(n)
+    ahead = 0.0
     for j in range(n):
-        given = np.isfinite(held[j])
-        q[j] = held[j] if given else begin[j]
-        if kinds[j] > 0 and not given:
+        if np.isfinite(held[j]):
+            ahead = max(ahead, abs(held[j] - q[j]))
+            q[j] = held[j]
+        elif kinds[j] > 0:
             free[count], unit[count] = j, size if kinds[j] == 2 else 1.0
             count += 1
     free, unit = free[:count], unit[:count]
     rows = 6 * len(pairs) + 6
-    r, J = vector(rows), matrix(rows, count)
-    fine, before = False, np.inf
-    for _ in range(_NEWTON):
+    # columns as rows, padded with zeros to a multiple of the vector registers
+    r, J = vector(rows + -rows % LANES), matrix(count, rows + -rows % LANES)
+    before, first = np.inf, 0.0
+    for iteration in range(_NEWTON):
         R, p = forward(parents, kinds, fixed, q)
         _equations(kinds, carries, pairs, platform, R, p, pose, free, unit, size, r, J)
         worst = _largest(r)
-        x = _least_step(J, r)
+        if near and not careful and worst < _NEAR:
+            return True, True, ahead
+        x, determined = _least_step(J, r)
         largest = _largest(x)
         still = largest < 1e-9
-        # converged: solved, or as well as a rounded overconstrained file can be
-        fine = worst < _SOLVED or (still and worst < _ROUNDED)
+        if iteration == 0 and not careful:
+            for i in range(count):
+                ahead = max(ahead, abs(x[i] * unit[i]))
+            if ahead > jump or not determined:
+                return False, determined, ahead
+        if iteration == 1 and not careful and largest > _CURVED * first:
+            return False, True, ahead  # the tangent is no guide: a shorter step
+        first = max(first, largest)
         limit = 0.5 / max(0.5, largest)
         for i in range(count):
             q[free[i]] -= x[i] * limit * unit[i]
         if worst < 1e-14 or still or not np.isfinite(worst):
-            break
+            # solved, or as well as a rounded overconstrained file can be
+            return worst < _SOLVED or (still and worst < _ROUNDED), True, ahead
         if worst > _ROUNDED and worst > 0.7 * before:
-            break  # it does not converge: try a smaller step
+            return False, True, ahead  # it does not converge: try a smaller step
         before = worst
-    return q, fine
+    return before < _SOLVED, True, ahead
 
 
 @part
@@ -191,7 +234,7 @@ def _equations(
     p: Matrix, pose: Vector, free: Indices, unit: Vector, size: float, r: Vector,
     J: Matrix,
 ) -> None:  # fmt: skip
-    """Scaled residuals and their derivatives by the free joints."""
+    """Scaled residuals and, a row for each free joint, their derivatives."""
     for c in range(len(pairs)):
         a, b = pairs[c]
         row = 6 * c
@@ -201,26 +244,29 @@ def _equations(
         for i in range(len(free)):
             j = free[i]
             sign = carries[a, j] - carries[b, j]
-            _move(kinds[j], R[j], p[j], p[a], sign * unit[i], size, J, row, i)
+            if sign != 0.0:
+                _move(kinds[j], R[j], p[j], p[a], sign * unit[i], size, J[i], row)
     row = 6 * len(pairs)
-    whole = True
+    whole, none = True, True
     for k in range(3):
         whole = whole and np.isfinite(pose[3 + k])
+        none = none and not np.isfinite(pose[3 + k])
     for i in range(len(free)):
         j = free[i]
-        factor = carries[platform, j] * unit[i]
-        _move(kinds[j], R[j], p[j], p[platform], factor, size, J, row, i)
-    turn = rotation_log(R[platform])
+        if carries[platform, j] != 0.0:
+            _move(kinds[j], R[j], p[j], p[platform], unit[i], size, J[i], row)
+    turn = vector(3)
     if whole:
         # regular near half a turn when the whole rotation is given
         asked = _rotation_exp(pose[3], pose[4], pose[5])
         turn = rotation_log(_times_transposed(R[platform], asked))
-    else:
+    elif not none:
+        turn = rotation_log(R[platform])
         left = _inverse_left_jacobian(turn)
         for i in range(len(free)):
-            a0, a1, a2 = J[row, i], J[row + 1, i], J[row + 2, i]
+            a0, a1, a2 = J[i, row], J[i, row + 1], J[i, row + 2]
             for k in range(3):
-                J[row + k, i] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
+                J[i, row + k] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
         for k in range(3):
             turn[k] -= pose[3 + k]
     for k in range(3):
@@ -229,25 +275,25 @@ def _equations(
         if not np.isfinite(pose[(k + 3) % 6]):
             r[row + k] = 0.0
             for i in range(len(free)):
-                J[row + k, i] = 0.0
+                J[i, row + k] = 0.0
 
 
 @part
 def _move(
     kind: int, R: Matrix, origin: Vector, point: Vector, factor: float, size: float,
-    J: Matrix, row: int, column: int,
+    J: Vector, row: int,
 ) -> None:  # fmt: skip
-    """Screw of a unit joint motion at a point, scaled, into a column from a row on."""
+    """Screw of a unit joint motion at a point, scaled, from a place on."""
     for k in range(3):
         l, m = (k + 1) % 3, (k + 2) % 3
         if kind == 1:
-            J[row + k, column] = factor * R[k, 2]
+            J[row + k] = factor * R[k, 2]
             moment = R[l, 2] * (point[m] - origin[m])
             moment -= R[m, 2] * (point[l] - origin[l])
-            J[row + 3 + k, column] = factor * moment / size
+            J[row + 3 + k] = factor * moment / size
         else:
-            J[row + k, column] = 0.0
-            J[row + 3 + k, column] = factor * R[k, 2] / size
+            J[row + k] = 0.0
+            J[row + 3 + k] = factor * R[k, 2] / size
 
 
 @part
@@ -262,42 +308,49 @@ def _largest(v: Vector) -> float:
     return largest
 
 
-@part
-def _least_step(J: Matrix, r: Vector) -> Vector:
-    """Least-squares solution of J x = r, of least norm by damping at rounding level."""
-    n = J.shape[1]
+@part(fastmath=FAST)
+def _least_step(J: Matrix, r: Vector) -> tuple[Vector, bool]:
+    """Least-squares x of J^T x = r, of least norm by damping at rounding level.
+
+    Returns:
+        x; whether it is determined without that.
+    """
+    n = len(J)
     N, x = matrix(n, n), vector(n)
-    Jt = matrix(n, len(r))
-    for i in range(n):
-        for l in range(len(r)):
-            Jt[i, l] = J[l, i]
-            x[i] += Jt[i, l] * r[l]
-        for j in range(i + 1):
-            total = 0.0
-            for l in range(len(r)):
-                total += Jt[i, l] * Jt[j, l]
-            N[i, j] = total
     damping = 1e-30
     for i in range(n):
+        row, right = J[i], 0.0
+        for l in range(len(r)):
+            right += row[l] * r[l]
+        x[i] = right
+        for j in range(i + 1):
+            other, total = J[j], 0.0
+            for l in range(len(r)):
+                total += row[l] * other[l]
+            N[i, j] = total
         damping += 1e-13 * N[i, i]
+    determined = True
     for i in range(n):
         N[i, i] += damping
+        row = N[i]
         for j in range(i + 1):
+            other, total = N[j], row[j]
             for l in range(j):
-                N[i, j] -= N[i, l] * N[j, l]
+                total -= row[l] * other[l]
             if j < i:
-                N[i, j] /= N[j, j]
-            else:
-                N[i, i] = math.sqrt(max(N[i, i], 0.1 * damping))
+                row[j] = total * other[j]
+            else:  # kept as its inverse
+                determined = determined and total > _CLEAR * damping
+                row[j] = 1.0 / math.sqrt(max(total, 0.1 * damping))
     for i in range(n):
         for l in range(i):
             x[i] -= N[i, l] * x[l]
-        x[i] /= N[i, i]
+        x[i] *= N[i, i]
     for i in range(n - 1, -1, -1):
-        for l in range(i + 1, n):
-            x[i] -= N[l, i] * x[l]
-        x[i] /= N[i, i]
-    return x
+        x[i] *= N[i, i]
+        for l in range(i):
+            x[l] -= N[i, l] * x[i]
+    return x, determined
 
 
 @part

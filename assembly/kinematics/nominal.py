@@ -7,12 +7,13 @@ loops are compiled, in :mod:`assembly.kinematics.compiled_continuation`.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import JOINTS, Robot
-from stiffness.screws import rotation_vector
 
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
@@ -89,45 +90,56 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
     return np.where(prismatic, sliding, turning) * mobile(robot)[:, None]
 
 
-def follow(robot: Robot, start: NDArray, target: Target, steps: int = 8) -> Track:
+class _Tree(NamedTuple):
+    """A robot as the compiled continuation reads it, its first arguments."""
+
+    parents: NDArray
+    kinds: NDArray
+    fixed: NDArray
+    carries: NDArray
+    pairs: NDArray
+    platform: int
+
+
+@lru_cache(maxsize=64)
+def _tree(robot: Robot) -> _Tree:
+    """The arrays, once for each robot."""
+    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    return _Tree(
+        parents=robot.parents,
+        kinds=np.array([JOINTS.index(f.joint) for f in robot.frames]),
+        fixed=robot.fixed_transforms,
+        # a joint's motion comes after its own frame
+        carries=robot.on_path - np.eye(len(robot.frames)),
+        pairs=np.array(pairs, dtype=int).reshape(-1, 2),
+        platform=robot.index(robot.platform),
+    )
+
+
+def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) -> Track:
     """Follow the nominal closures from one configuration to many targets.
 
     Args:
         robot: of n frames.
-        start: (n,) coordinates that close (or are the first guess, with ``steps=1``).
+        start: (n,) coordinates that close.
         target: k poses or sets of held coordinates.
-        steps: first number of steps; they shrink and grow by themselves.
+        guess: the start need not close: it is the first guess of one step.
 
     Returns:
         The ends of the tracks, and their progress.
     """
     from assembly.kinematics.compiled_continuation import follow_all
 
+    tree = _tree(robot)
     count, n = len(target), len(robot.frames)
-    carries = robot.on_path - np.eye(n)  # a joint's motion comes after its own frame
-    kinds = np.array([JOINTS.index(f.joint) for f in robot.frames])
-    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     held = np.full((count, n), np.nan)
     if target.coordinates is not None:
-        held = np.where(kinds > 0, target.coordinates, np.nan)
+        held = np.where(tree.kinds > 0, target.coordinates, np.nan)
     poses = np.zeros((0, 6)) if target.pose is None else target.pose
-    T = np.zeros((count, n, 4, 4))
+    T, still_open = np.zeros((count, n, 4, 4)), np.zeros((count, len(tree.pairs)))
     T[..., 3, 3] = 1.0
     q, progress = follow_all(
-        robot.parents, kinds, robot.fixed_transforms, carries,
-        np.array(pairs, dtype=int).reshape(-1, 2), robot.index(robot.platform),
-        np.array(start, dtype=float), np.array(poses, dtype=float), held,
-        size_of(robot), steps, T,
+        *tree, np.array(start, dtype=float), np.array(poses, dtype=float), held,
+        size_of(robot), guess, T, still_open,
     )  # fmt: skip
-    return Track(q, T, progress, _closure_mismatch(robot, T))
-
-
-def _closure_mismatch(robot: Robot, T: NDArray) -> NDArray:
-    """(k, closures) [rad, m] largest open component of each closure."""
-    worst = np.zeros((len(T), len(robot.closures)))
-    for k, (a, b) in enumerate(robot.closures):
-        A, B = T[:, robot.index(a)], T[:, robot.index(b)]
-        turn = rotation_vector(A[:, :3, :3] @ np.swapaxes(B[:, :3, :3], 1, 2))
-        shift = A[:, :3, 3] - B[:, :3, 3]
-        worst[:, k] = np.abs(np.concatenate([turn, shift], axis=1)).max(axis=1)
-    return worst
+    return Track(q, T, progress, still_open)

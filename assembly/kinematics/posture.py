@@ -130,6 +130,7 @@ def pose_components(T: NDArray) -> NDArray:
     return np.concatenate([T[..., :3, 3], rotation_vector(T[..., :3, :3])], axis=-1)
 
 
+@lru_cache(maxsize=64)
 def home_posture(robot: Robot) -> Posture:
     """The home pose: actuated joints at ``position``, passive ones solved from it.
 
@@ -144,7 +145,7 @@ def home_posture(robot: Robot) -> Posture:
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
-    track = follow(robot, robot.positions, Target(coordinates=held[None]), steps=1)
+    track = follow(robot, robot.positions, Target(coordinates=held[None]), guess=True)
     if not track.mismatch[0] < _HOME_TOLERANCE:
         k = int(np.argmax(track.closure_mismatch[0]))
         a, b = robot.closures[k]

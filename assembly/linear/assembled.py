@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import Linearisation, VirtualJoints, closure_signs
 from assembly.linear.load import FrameLoads, loads_on_frames, weights
+from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
 from assembly.solvers.conic import cone_sizes
@@ -40,7 +41,7 @@ class Assembly:
     """A manipulator forced together at least energy; it exists only if solved.
 
     Attributes:
-        linearisation: the assembly constraints it satisfies.
+        linearisation: the assembly constraints it satisfies; where it stands.
         joints: what was allowed to move.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         frame_loads: all loads, this one among them, on every small screw.
@@ -49,7 +50,6 @@ class Assembly:
         motions: (nq,) [rad, m] free motions.
         multipliers: (6 closures,) of the scaled closure rows.
         energy_without_clearance: [J] least energy with all clearances at zero.
-        ranks: numbers of rows of the closures: free, elastic, rigid, redundant.
     """
 
     linearisation: Linearisation
@@ -61,7 +61,6 @@ class Assembly:
     motions: NDArray
     multipliers: NDArray
     energy_without_clearance: float
-    ranks: dict[str, int]
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -91,6 +90,11 @@ class Assembly:
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
+
+    @property
+    def ranks(self) -> dict[str, int]:
+        """Numbers of rows of the closures: free, elastic, rigid, redundant."""
+        return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
     def posture(self) -> Posture:

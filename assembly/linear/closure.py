@@ -190,18 +190,33 @@ class Linearisation:
 
     Attributes:
         posture: where the robot stands.
-        rows: (6 closures, 6 n) with rows @ screws = 0 for the total screws: the blocks
-            sign_kj M_j; translations divided by ``size``.
-        platform: (6, 6 n) screws to the platform screw, eq. (8), not scaled.
         size: [m] reference length.
     """
 
     posture: Posture
-    rows: NDArray
-    platform: NDArray
     size: float
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    @cached_property
+    def rows(self) -> NDArray:
+        """(6 closures, 6 n) with rows @ screws = 0 for the total screws.
+
+        The blocks sign_kj M_j; translations divided by :attr:`size`.
+        """
+        robot = self.posture.robot
+        scale = np.repeat([1.0, 1.0 / self.size], 3)
+        blocks = closure_signs(robot)[:, :, None, None] * self.posture.paths
+        rows = np.swapaxes(blocks * scale[:, None], 1, 2)
+        return rows.reshape(6 * len(robot.closures), 6 * len(robot.frames))
+
+    @cached_property
+    def platform(self) -> NDArray:
+        """(6, 6 n) screws to the platform screw, eq. (8), not scaled."""
+        robot = self.posture.robot
+        on_path = robot.on_path[robot.index(robot.platform)]
+        platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)
+        return platform.reshape(6, 6 * len(robot.frames))
 
     @cached_property
     def misfit(self) -> NDArray:
@@ -221,7 +236,22 @@ def linearise(posture: Posture) -> Linearisation:
     Raises:
         BadInput: a geometric error is beyond 1e6 rad or m.
     """
-    robot = posture.robot
+    return Linearisation(posture, checked_size(posture.robot))
+
+
+@lru_cache(maxsize=64)
+def checked_size(robot: Robot) -> float:
+    """[m] reference length of a robot whose errors are small enough to compute with.
+
+    Args:
+        robot: any.
+
+    Returns:
+        :func:`assembly.kinematics.nominal.size_of` it.
+
+    Raises:
+        BadInput: a geometric error is beyond 1e6 rad or m.
+    """
     too_large = ~(np.abs(robot.errors) <= LARGEST_LENGTH).all(axis=1)
     if too_large.any():
         frame = robot.frames[int(np.argmax(too_large))]
@@ -230,24 +260,15 @@ def linearise(posture: Posture) -> Linearisation:
             f"{np.abs(frame.geometric_error).max():g}, expected numbers of size at "
             f"most {LARGEST_LENGTH:g} [rad, m]"
         )
-    size = size_of(robot)
-    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
-    blocks = closure_signs(robot)[:, :, None, None] * posture.paths
-    rows = np.swapaxes(blocks * scale[:, None], 1, 2)
-    on_path = robot.on_path[robot.index(robot.platform)]
-    platform = np.swapaxes(posture.paths * on_path[:, None, None], 0, 1)
-    count = len(robot.frames)
-    return Linearisation(
-        posture=posture,
-        rows=rows.reshape(6 * len(robot.closures), 6 * count),
-        platform=platform.reshape(6, 6 * count),
-        size=size,
-    )
+    return size_of(robot)
 
 
+@lru_cache(maxsize=64)
 def closure_signs(robot: Robot) -> NDArray:
     """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
     paths = robot.on_path.astype(int)
     pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
     count = len(robot.frames)
-    return np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)
+    signs = np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)
+    signs.setflags(write=False)
+    return signs

@@ -1,160 +1,275 @@
-"""The least energy that closes a manipulator, problem (22)."""
+"""The least energy that closes a manipulator, problem (22): one answer or many.
 
-from dataclasses import replace
+Compiled from the frames' poses to the certificate
+(:mod:`assembly.linear.compiled_energy`): about a tenth of a millisecond a point.  What
+this does not cover, or where its certificate falls short, is solved by
+:mod:`assembly.linear.fallback`, and is counted.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly, all_loads
-from assembly.linear.closure import (
-    Linearisation,
-    VirtualJoints,
-    linearise,
-    virtual_joints,
+from assembly.linear.assemblies import (
+    COMPILED,
+    OUTCOMES,
+    Assemblies,
+    excess_of,
+    solve_again,
+    solve_each,
+)
+from assembly.linear.closure import checked_size, linearise
+from assembly.linear.fallback import (
+    CannotAssemble,
+    reference_assembly,
+    without_own_springs,
 )
 from assembly.linear.load import FrameLoads
-from assembly.linear.reduction import FreeMotion, Reduction, reduce_problem
-from assembly.linear.rounding import differs_from_zero, stiffness_spread
-from assembly.model.clearance import Compliant, has_bounded_motion
-from assembly.solvers.conic import LeastEnergy, minimise_energy
+from assembly.linear.robot_structure import structure_of
+from assembly.linear.rounding import (
+    SPREAD,
+    closure_rounding,
+    drop_zeros,
+    stiffness_spread,
+)
+from assembly.model.clearance import Compliant
+from assembly.model.largest import LARGEST_LENGTH
+from assembly.model.robot import Robot
+
+if TYPE_CHECKING:
+    from assembly.linear.compiled_energy import Solutions
 
 __all__ = [
-    "Assembly", "CannotAssemble", "solve_assembly", "solve_with", "without_own_springs",
+    "Assemblies", "Assembly", "CannotAssemble", "minimise_energies", "solve_assembly",
 ]  # fmt: skip
-_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 
 
-class CannotAssemble(Exception):
-    """No clearance and no elasticity of the model lets the closures hold.
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, errors: None = None,
+) -> Assembly: ...  # fmt: skip
 
-    A result, not a mistake of the caller: some closure is rigid in every direction.
-    """
+
+@overload
+def solve_assembly(
+    posture: Sequence[Posture], load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    errors: ArrayLike | None = None,
+) -> Assemblies: ...  # fmt: skip
+
+
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, *, errors: ArrayLike,
+) -> Assemblies: ...  # fmt: skip
 
 
 def solve_assembly(
-    posture: Posture,
+    posture: Posture | Sequence[Posture],
     load: ArrayLike | None = None,
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-) -> Assembly:
+    errors: ArrayLike | None = None,
+) -> Assembly | Assemblies:
     """Close a manipulator at least energy, problem (22), under optional loads.
 
     Args:
         posture: where the robot stands; its errors, clearances, links and joint
-            springs are the robot's.
+            springs are the robot's.  Or many postures of one robot.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes; energy
             minus its work is then what is minimised.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames, each at its
             frame's origin, base axes.
         gravity: (3,) [m/s^2] base axes; links with a density and bodies with a mass
             then have weight.
+        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
+            each of k postures, or k sets at one.
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
-        where its certificate falls short after all fallbacks.
+        where its certificate falls short after all fallbacks.  Of many postures or sets
+        of errors all of them, where one without a solution says so and raises nothing.
 
     Raises:
         CannotAssemble: a closure is open that no clearance and no spring can close.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
+        ValueError: errors do not fit the robot or the postures.
     """
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    frame_loads = all_loads(posture, wrench, bodies, gravity)
-    return _solve_within(linearise(posture), "elastic", wrench, frame_loads)
+    if isinstance(posture, Posture) and errors is None:
+        return _solve_one(posture, load, bodies, gravity)
+    postures = [posture] if isinstance(posture, Posture) else list(posture)
+    robot = postures[0].robot
+    sets = None if errors is None else np.asarray(errors, dtype=float)
+    if sets is not None and len(postures) == 1:
+        postures = postures * len(sets)
+    T = np.array([p.transforms for p in postures])
+    mismatch = np.array([p.mismatch for p in postures])
+    if load is None and bodies is None and gravity is None:
+        return minimise_energies(robot, T, sets, mismatch)
+    at = partial(_posture_at, robot, T, sets, mismatch)
+    return solve_each(robot, len(T), lambda i: _solve_one(at(i), load, bodies, gravity))
 
 
-def _solve_within(
-    lin: Linearisation, compliant: Compliant, load: NDArray, frame_loads: FrameLoads
-) -> Assembly:
-    """Close a manipulator; bounds of passive joints' motion count where they matter."""
-    robot = lin.posture.robot
-    try:
-        joints = virtual_joints(robot, compliant)
-        assembly = solve_with(lin, joints, load, frame_loads)
-    except FreeMotion:
-        if not has_bounded_motion(robot):
-            raise
-    else:
-        if assembly.clearance_excess(compliant) <= 1e-9:
+def _solve_one(
+    posture: Posture, load: ArrayLike | None, bodies: ArrayLike | None,
+    gravity: ArrayLike | None,
+) -> Assembly:  # fmt: skip
+    """One posture: compiled without loads, else, or in doubt, the fallback."""
+    frame_loads = None
+    if load is not None or bodies is not None or gravity is not None:
+        frame_loads = all_loads(posture, load, bodies, gravity)
+    if not frame_loads:
+        assembly = _compiled_assembly(posture)
+        if assembly is not None:
             return assembly
-    # the bound of a passive joint's own motion was left out, but it is active
-    joints = virtual_joints(robot, compliant, bounded_motion=True)
-    return solve_with(lin, joints, load, frame_loads)
+    return reference_assembly(posture, load, bodies, gravity)
 
 
-def solve_with(
-    lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
-) -> Assembly:
-    """Close a manipulator at least energy with a given choice of what may move.
+def _compiled_assembly(posture: Posture) -> Assembly | None:
+    """One posture without loads; None where it is left to the fallback."""
+    robot = posture.robot
+    size = checked_size(robot)
+    joints, _ = structure_of(robot)
+    out = _solve_compiled(
+        robot, posture.transforms[None].copy(), robot.errors[None].copy(),
+        np.array([posture.mismatch]), "elastic", len(joints.links),
+    )  # fmt: skip
+    if out.outcome[0] >= COMPILED:
+        return None
+    residual = out.residual + closure_rounding(robot.errors, joints, size)
+    drop_zeros(out.energy, out.bound, out.multipliers, residual)
+    multipliers = out.multipliers[0]
+    assembly = Assembly(
+        linearisation=linearise(posture),
+        joints=joints,
+        load=np.zeros(6),
+        frame_loads=FrameLoads(*np.zeros((2, robot.errors.size))),
+        elastic=out.elastic[0] if multipliers.any() else np.zeros(len(joints.links)),
+        clearances=out.clearances[0],
+        motions=out.motions[0],
+        multipliers=multipliers,
+        energy_without_clearance=float(out.without_clearance[0]),
+    )
+    # known already, and so not computed again when somebody asks
+    vars(assembly).update(
+        energy=float(out.energy[0]), platform_screw=out.platform_screw[0]
+    )
+    return assembly
+
+
+def _solve_compiled(
+    robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
+    springs: int,
+) -> "Solutions":  # fmt: skip
+    """Rows of k points, and of the deformations of so many springs."""
+    from assembly.linear.compiled_energy import Solutions, assemble_all
+
+    joints, structure = structure_of(robot, compliant)
+    count = len(T)
+    out = Solutions(
+        outcome=np.zeros(count, dtype=np.int64),
+        energy=np.zeros(count),
+        bound=np.zeros(count),
+        without_clearance=np.zeros(count),
+        platform_screw=np.zeros((count, 6)),
+        clearances=np.zeros((count, joints.cones.shape[1])),
+        motions=np.zeros((count, joints.free.shape[1])),
+        multipliers=np.zeros((count, 6 * len(robot.closures))),
+        residual=np.zeros(count),
+        elastic=np.zeros((count if springs else 0, springs)),
+    )
+    if stiffness_spread(joints, structure.size) > SPREAD:
+        out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
+    elif errors.any():  # else nothing has to move, and zeros are the answer
+        assemble_all(structure, T, errors, mismatch, out)
+    return out
+
+
+def minimise_energies(
+    robot: Robot,
+    transforms: ArrayLike,
+    errors: ArrayLike | None = None,
+    mismatch: ArrayLike = 0.0,
+    compliant: Compliant = "elastic",
+) -> Assemblies:
+    """Close a manipulator at least energy, problem (22), at many points.
 
     Args:
-        lin: the assembly constraints.
-        joints: what may move.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        frame_loads: all loads, this one among them.
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base, as of
+            :attr:`~assembly.kinematics.posture.Posture.transforms`.
+        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        compliant: ``"elastic"``, or ``"hinged"``: compliant joints turn freely about
+            their own axis, see :func:`assembly.linear.closure.virtual_joints`.
 
     Returns:
-        The assembled manipulator.
+        Energies, screws and certificates, in the order given.
 
     Raises:
-        CannotAssemble: a closure is open that nothing can close.
-        FreeMotion: a load drives a motion that nothing resists.
-        SolverFailed: the cone solver gave up.
+        ValueError: a shape does not fit the robot, or a value is not finite.
     """
-    reduced = reduce_problem(lin, joints, frame_loads)
-    least = _minimise(reduced)
-    u = least.clearances
-    y = reduced.springs(u)
-    multipliers = reduced.multipliers(least.springs, least.rigid_multipliers)
-    assembly = Assembly(
-        linearisation=lin,
+    # writable and in C order, whatever comes: the kernels are compiled for one kind
+    T = np.require(transforms, dtype=float, requirements=["C", "W"])
+    count, n = len(T), len(robot.frames)
+    errors = robot.errors if errors is None else np.asarray(errors, dtype=float)
+    if T.shape != (count, n, 4, 4) or errors.shape not in {(n, 6), (count, n, 6)}:
+        raise ValueError(
+            f"minimise_energies: transforms have shape {T.shape} and errors "
+            f"{errors.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or (k, {n}, 6)"
+        )
+    if not (np.isfinite(T).all() and np.all(np.abs(errors) <= LARGEST_LENGTH)):
+        raise ValueError(
+            "minimise_energies: transforms or errors are not all finite, or an error "
+            f"is larger than {LARGEST_LENGTH:g} [rad, m]"
+        )
+    all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
+    joints, structure = structure_of(robot, compliant)
+    out = _solve_compiled(robot, T, all_errors, off, compliant, 0)
+    at = partial(_posture_at, robot, T, all_errors, off)
+
+    def one(i: int) -> Assembly:
+        assembly = _solve_one(at(i), None, None, None)
+        return without_own_springs(assembly) if compliant == "hinged" else assembly
+
+    energies = Assemblies(
+        energy=out.energy,
+        bound=out.bound,
+        energy_without_clearance=out.without_clearance,
+        platform_screw=out.platform_screw,
+        closure_residual=out.residual,
+        clearance_excess=excess_of(out.clearances, structure.starts),
+        clearances=out.clearances,
+        motions=out.motions,
+        multipliers=out.multipliers,
+        outcome=out.outcome,
+        status=np.full(count, "ok", dtype=object),
+        reason=np.full(count, "", dtype=object),
         joints=joints,
-        load=load,
-        frame_loads=frame_loads,
-        elastic=y,
-        clearances=u,
-        motions=reduced.motions(u, y),
-        multipliers=multipliers,
-        energy_without_clearance=reduced.energy_without_clearance,
-        ranks=reduced.ranks,
+        one=one,
     )
-    residual = assembly.closure_residual() + assembly.rounding
-    if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
-        return assembly
-    # no energy is needed: springs and wrenches are rounding of zero
-    return replace(
-        assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
-    )
+    for i in np.flatnonzero(out.outcome >= COMPILED).tolist():
+        solve_again(energies, i)
+    residual = energies.closure_residual
+    residual = residual + closure_rounding(all_errors, joints, structure.size)
+    drop_zeros(energies.energy, energies.bound, energies.multipliers, residual)
+    return energies
 
 
-def without_own_springs(assembly: Assembly) -> Assembly:
-    """The least energy when compliant joints turn freely about their own axis."""
-    return _solve_within(
-        assembly.linearisation, "hinged", assembly.load, assembly.frame_loads
-    )
-
-
-def _minimise(reduced: Reduction) -> LeastEnergy:
-    """Least energy of a reduced problem; infeasible ones are named."""
-    joints = reduced.joints
-    spread = stiffness_spread(joints, reduced.linearisation.size)
-    beyond = ""
-    if spread > _RIGID_BESIDE:
-        beyond = (
-            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
-            "stiffest count as rigid"
-        )
-    if reduced.inconsistent:
-        raise CannotAssemble(
-            f"a rigid part stays open by {reduced.inconsistent:.3g} (rad, or m per "
-            f"reference length): no clearance or spring acts there{beyond}"
-        )
-    least = minimise_energy(
-        reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group
-    )
-    if not least.feasible:
-        raise CannotAssemble(
-            f"no clearance within its bounds closes what no spring can{beyond}"
-        )
-    return least
+def _posture_at(
+    robot: Robot, T: NDArray, errors: NDArray | None, mismatch: NDArray, i: int
+) -> Posture:
+    """Posture i, of the robot with errors i."""
+    own = robot.errors if errors is None else errors[i if len(errors) > 1 else 0]
+    # one robot for all where the errors are its own: its columns are cached
+    erring = robot if np.array_equal(own, robot.errors) else robot.with_errors(own)
+    return Posture(erring, np.full(len(robot.frames), np.nan), T[i], float(mismatch[i]))

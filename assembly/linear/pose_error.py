@@ -16,18 +16,39 @@ largest error.
 
 The set of platform screws (:mod:`assembly.linear.reach`) is convex; its farthest one is
 bracketed by :mod:`assembly.solvers.farthest`, compiled, with Clarabel as its fallback.
-Many postures at once: :func:`assembly.batch.many_pose_errors.bound_pose_errors`.
+The first two readings are compiled whole (:mod:`assembly.linear.compiled_reach`): some
+tenths of a millisecond a point.  ``budget``, and a point that this does not cover, is
+left to numpy and counted.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.linear.assembled import Assembly
+from assembly.linear.assemblies import Assemblies, assemblies_of, failure_status
 from assembly.linear.certificate import unproved
-from assembly.linear.reach import ReachableSet, reachable_screws
-from forcefit.inputs.display import Figures, bracket, html_table, short_repr
+from assembly.linear.energy import minimise_energies
+from assembly.linear.fallback import CannotAssemble
+from assembly.linear.moving_clearances import Asked, compiled_bounds
+from assembly.linear.reach import reachable_screws
+from assembly.linear.robot_structure import structure_of
+from assembly.model.robot import Robot
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import (
+    Figures,
+    bracket,
+    html_table,
+    short_repr,
+)
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +62,7 @@ class PoseError:
         rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
         translation_screw: (6,) [rad, m] attains that of the translation.
         cuts: support functions computed.
-        unproved: what of the solution of (22), or of the width asked of the bounds, is
-            not proved; empty if nothing.
+        proof: says what of it is not proved.
     """
 
     reading: str
@@ -51,9 +71,17 @@ class PoseError:
     rotation_screw: NDArray
     translation_screw: NDArray
     cuts: int
-    unproved: str = ""
+    proof: Callable[[], str] = str
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+
+    @cached_property
+    def unproved(self) -> str:
+        """What of the solution of (22), or of the width asked, is not proved.
+
+        Empty if nothing; only found out when asked, it takes longer than the bounds.
+        """
+        return self.proof()
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly error`` prints of it."""
@@ -63,6 +91,73 @@ class PoseError:
             "translation": bracket(self.translation_error, "mm"),
         }
         return figures | ({"not proved": self.unproved} if self.unproved else {})
+
+
+@dataclass(frozen=True, eq=False)
+class PoseErrors:
+    """Certified bounds of the largest pose errors of k points; ``[i]`` is one of them.
+
+    Attributes:
+        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
+        rotation_error: (k, 2) [rad] lower and upper; NaN without a solution of (22).
+        translation_error: (k, 2) [m] likewise.
+        rotation_screw: (k, 6) [rad, m] attains the lower bound of the rotation.
+        translation_screw: (k, 6) [rad, m] attains that of the translation.
+        supports: (k,) support functions computed.
+        fallback: (k,) bool, solved by :mod:`assembly.linear.reach`.
+        status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
+            there is no solution or its certificate falls short.
+        reason: (k,) message where the status is not ok.
+    """
+
+    reading: str
+    rotation_error: NDArray
+    translation_error: NDArray
+    rotation_screw: NDArray
+    translation_screw: NDArray
+    supports: NDArray
+    fallback: NDArray
+    status: NDArray
+    reason: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __getitem__(self, i: int) -> PoseError:
+        """Point i; NaN, and why, where there is no solution."""
+        return PoseError(
+            reading=self.reading,
+            rotation_error=tuple(self.rotation_error[i].tolist()),
+            translation_error=tuple(self.translation_error[i].tolist()),
+            rotation_screw=self.rotation_screw[i],
+            translation_screw=self.translation_screw[i],
+            cuts=int(self.supports[i]),
+            proof=partial(str, self.reason[i]),
+        )
+
+    def __iter__(self) -> Iterator[PoseError]:
+        return (self[i] for i in range(len(self)))
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Over ``point``; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import points_dataset
+
+        return points_dataset({
+            "rotation_error": self.rotation_error,
+            "translation_error": self.translation_error,
+            "rotation_screw": self.rotation_screw,
+            "translation_screw": self.translation_screw,
+            "status": self.status,
+            "reason": self.reason,
+        })
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each point, columns (variable, component)."""
+        from assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
 
 
 def bound_pose_error(
@@ -92,24 +187,57 @@ def bound_pose_error(
         ValueError: the reading is unknown, or ``budget`` is asked under a load.
         SolverFailed: the cone solver gave up.
     """
-    reachable = reachable_screws(assembly, reading, energy_budget).at_point(offset)
-    rotation, rotation_screw, supports = _farthest(reachable, 0, tolerance_rotation)
-    translation, translation_screw, more = _farthest(
-        reachable, 3, tolerance_translation
+    asked = Asked(
+        reading, energy_budget, tolerance_rotation, tolerance_translation, offset
     )
-    open_ = (
-        unproved(assembly),
-        _too_wide("rotation", rotation, tolerance_rotation, "rad"),
-        _too_wide("translation", translation, tolerance_translation, "m"),
+    posture = assembly.posture
+    if assembly.joints is structure_of(posture.robot)[0] and not assembly.frame_loads:
+        bounds = _pose_errors(
+            posture.robot, posture.transforms[None], np.array([posture.mismatch]),
+            posture.robot.errors[None], assemblies_of(assembly), asked,
+        )  # fmt: skip
+        if not bounds.fallback[0]:
+            return replace(bounds[0], proof=partial(unproved, assembly))
+    return reference_pose_error(assembly, asked)
+
+
+def reference_pose_error(assembly: Assembly, asked: Asked) -> PoseError:
+    """The bounds in numpy but for the search: the reference, and the fallback.
+
+    Args:
+        assembly: of least energy, without a load in reading ``budget``.
+        asked: reading, widths and point.
+
+    Returns:
+        The bounds.
+
+    Raises:
+        ValueError: ``budget`` is asked under a load.
+        SolverFailed: the cone solver gave up.
+    """
+    reachable = reachable_screws(assembly, asked.reading, asked.energy_budget)
+    reachable = reachable.at_point(asked.offset)
+    rotation, rotation_screw, supports = reachable.farthest(0, asked.tolerance_rotation)
+    translation, translation_screw, more = reachable.farthest(
+        3, asked.tolerance_translation
     )
+
+    def proof() -> str:
+        open_ = (
+            unproved(assembly),
+            _too_wide("rotation", rotation, asked.tolerance_rotation, "rad"),
+            _too_wide("translation", translation, asked.tolerance_translation, "m"),
+        )
+        return "; ".join(filter(None, open_))
+
     return PoseError(
-        reading=reading,
+        reading=asked.reading,
         rotation_error=rotation,
         translation_error=translation,
         rotation_screw=rotation_screw,
         translation_screw=translation_screw,
         cuts=supports + more,
-        unproved="; ".join(filter(None, open_)),
+        proof=proof,
     )
 
 
@@ -127,19 +255,83 @@ def _too_wide(
     )
 
 
-def _farthest(
-    reachable: ReachableSet, part: int, tolerance: float
-) -> tuple[tuple[float, float], NDArray, int]:
-    """Bounds of the largest size of half a screw, a screw, and the supports it took."""
-    from assembly.solvers.farthest import NEEDED, begin_search, search_on
+def bound_pose_errors(
+    robot: Robot,
+    transforms: ArrayLike,
+    reading: str = "frozen",
+    errors: ArrayLike | None = None,
+    mismatch: ArrayLike = 0.0,
+    energies: Assemblies | None = None,
+    energy_budget: float = 0.05,
+    tolerance_rotation: float = 1e-6,
+    tolerance_translation: float = 1e-6,
+    offset: ArrayLike = (0.0, 0.0, 0.0),
+) -> PoseErrors:
+    """Bracket the largest rotation and translation errors at many points.
 
-    if reachable.unbounded(part):
-        return (np.inf, np.inf), reachable.centre, 0
-    body = reachable.body
-    search, nothing = begin_search(body, part, tolerance), np.zeros(0)
-    state = search_on(body, search, 0.0, nothing, nothing)
-    while state == NEEDED:
-        support = reachable.support(search.direction @ np.eye(6)[part : part + 3])
-        state = search_on(body, search, support.height, support.screw, support.gradient)
-    low, high = search.bounds.tolist()
-    return (low, high), search.best, int(search.counts[1])
+    Args:
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base.
+        reading: ``"frozen"``, ``"free"`` or ``"budget"``, see
+            :mod:`assembly.linear.pose_error`.
+        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        energies: of :func:`assembly.linear.energy.minimise_energies` for the same
+            arguments, if known.
+        energy_budget: eta of reading ``budget``.
+        tolerance_rotation: [rad] asked of upper minus lower bound.
+        tolerance_translation: [m] likewise.
+        offset: (3,) [m] from the platform's origin to the point whose error is meant.
+
+    Returns:
+        The bounds, in the order given.
+
+    Raises:
+        ValueError: the reading is unknown, or a shape does not fit the robot.
+    """
+    asked = Asked(
+        reading, energy_budget, tolerance_rotation, tolerance_translation, offset
+    )
+    if energies is None:
+        energies = minimise_energies(robot, transforms, errors, mismatch)
+    T = np.asarray(transforms, dtype=float)
+    if len(energies) != len(T):
+        raise ValueError(
+            f"bound_pose_errors: energies of {len(energies)} points, expected "
+            f"{len(T)}, one for each of the transforms"
+        )
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
+    bounds = _pose_errors(robot, T, off, errors, energies, asked)
+    for i in np.flatnonzero(bounds.fallback).tolist():
+        try:
+            one = reference_pose_error(energies[i], asked)
+        except (CannotAssemble, SolverFailed) as error:
+            bounds.status[i], bounds.reason[i] = failure_status(error), str(error)
+            continue
+        bounds.rotation_error[i] = one.rotation_error
+        bounds.translation_error[i] = one.translation_error
+        bounds.rotation_screw[i] = one.rotation_screw
+        bounds.translation_screw[i] = one.translation_screw
+        bounds.supports[i] = one.cuts
+        if one.unproved:
+            bounds.status[i], bounds.reason[i] = "solver failed", one.unproved
+    return bounds
+
+
+def _pose_errors(
+    robot: Robot, T: NDArray, off: NDArray, errors: ArrayLike | None,
+    energies: Assemblies, asked: Asked,
+) -> PoseErrors:  # fmt: skip
+    """The compiled bounds, with what is known of (22)."""
+    bounds = compiled_bounds(robot, T, off, errors, energies, asked)
+    return PoseErrors(
+        reading=asked.reading,
+        rotation_error=bounds.rotation,
+        translation_error=bounds.translation,
+        rotation_screw=bounds.rotation_screw,
+        translation_screw=bounds.translation_screw,
+        supports=bounds.supports,
+        fallback=(bounds.outcome > 0) & (energies.status == "ok"),
+        status=energies.status.copy(),
+        reason=energies.reason.copy(),
+    )

@@ -23,7 +23,7 @@ from scipy.linalg import svd
 
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.energy import without_own_springs
+from assembly.linear.fallback import without_own_springs
 from assembly.linear.reduction import complement
 from assembly.linear.thresholds import (
     MISMATCH_FACTOR,
@@ -159,6 +159,34 @@ class ReachableSet:
         screw = screw_near(body, least.clearances)
         reduced = gradient + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, reduced)
+
+    def farthest(
+        self, part: int, tolerance: float
+    ) -> tuple[tuple[float, float], NDArray, int]:
+        """Bounds of the largest size of half a screw, and what attains it.
+
+        Args:
+            part: 0 for the rotation, 3 for the translation.
+            tolerance: [rad or m] asked of upper minus lower bound.
+
+        Returns:
+            (lower, upper); (6,) [rad, m] the screw that attains the lower; how many.
+
+        Raises:
+            SolverFailed: the cone solver gave up.
+        """
+        from assembly.solvers.farthest import NEEDED, begin_search, search_on
+
+        if self.unbounded(part):
+            return (np.inf, np.inf), self.centre, 0
+        body = self.body
+        search, nothing = begin_search(body, part, tolerance), np.zeros(0)
+        state = search_on(body, search, 0.0, nothing, nothing)
+        while state == NEEDED:
+            s = self.support(search.direction @ np.eye(6)[part : part + 3])
+            state = search_on(body, search, s.height, s.screw, s.gradient)
+        low, high = search.bounds.tolist()
+        return (low, high), search.best, int(search.counts[1])
 
     @property
     def body(self) -> "ConvexBody":

@@ -4,6 +4,8 @@ Closures are sums of screws that cancel.  In floating point they stay open by so
 in the last place of their terms, and the wrenches' work on that means nothing.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,10 +26,17 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
     Returns:
         8 units in the last place of the sum of errors and clearances.
     """
+    weights = np.array([1.0] * 3 + [1.0 / size] * 3)
+    sums = (np.abs(errors) @ weights).sum(axis=-1)
+    return ROUNDING * (sums + _clearance_sum(joints, size))
+
+
+@lru_cache(maxsize=64)
+def _clearance_sum(joints: VirtualJoints, size: float) -> float:
+    """[rad, lengths] all clearances together."""
     weights = np.repeat([1.0, 1.0 / size], 3)
     clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
-    sums = (np.abs(errors) @ weights).sum(axis=-1) + float((clearances @ weights).sum())
-    return ROUNDING * sums
+    return float((clearances @ weights).sum())
 
 
 def differs_from_zero(
@@ -69,6 +78,7 @@ def drop_zeros(
     bound[zero] = np.minimum(bound[zero], 0.0)
 
 
+@lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
     """[-] stiffest over softest spring, turns counted at the reference length."""
     weights = np.tile(np.repeat([1.0, 1.0 / size], 3), len(joints.elastic) // 6)

@@ -8,28 +8,26 @@ As printed, (21) makes compliant joints rigid in every direction (``"rigid"``, t
 literal reading); ``"free"`` lets them turn about their own axis, as a hinge does.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import svd
+from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import (
-    Linearisation,
-    VirtualJoints,
-    linearise,
-    virtual_joints,
-)
-from assembly.linear.reduction import Reduction, reduce_problem
+from assembly.linear.closure import checked_size
+from assembly.linear.fallback import reference_margin
+from assembly.linear.robot_structure import structure_of
 from assembly.linear.thresholds import MARGIN_GAP
-from assembly.model.clearance import (
-    Compliant,
-    clearance_bounds,
-    clearance_excess,
-    scales_with_margin,
-)
-from assembly.solvers.conic import cone_sizes, least_factor
+from assembly.model.clearance import Compliant
+from assembly.model.robot import Robot
+from assembly.solvers.conic import SolverFailed
+from forcefit.inputs.display import html_table, short_repr
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins
@@ -67,77 +65,175 @@ class Zone:
         return f"the margin {self.margin:.9g} is proved down to {self.bound:.9g} only"
 
 
-def zone_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Zone margins of k points, each with its certificate; ``[i]`` is one of them.
+
+    Attributes:
+        margin: (k,) factor on all clearances at which it just assembles; inf where
+            none does, NaN where the solver failed.
+        bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
+            method solved.
+        fallback: (k,) bool, solved by :mod:`assembly.linear.fallback`.
+        reason: (k,) message where the solver failed, or what of the margin is not
+            proved; else empty.
+    """
+
+    margin: NDArray
+    bound: NDArray
+    fallback: NDArray
+    reason: NDArray
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def __len__(self) -> int:
+        return len(self.margin)
+
+    def __getitem__(self, i: int) -> Zone:
+        """Point i; raises where the solver failed."""
+        margin, bound = float(self.margin[i]), float(self.bound[i])
+        if np.isnan(margin):
+            raise SolverFailed("least factor on the clearances", self.reason[i])
+        return Zone(None, None) if np.isinf(margin) else Zone(margin, bound)
+
+    def __iter__(self) -> Iterator[Zone]:
+        return (self[i] for i in range(len(self)))
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Over ``point``; see :mod:`assembly.model.tables`."""
+        from assembly.model.tables import points_dataset
+
+        return points_dataset({
+            "margin": self.margin,
+            "margin_bound": self.bound,
+            "reason": self.reason,
+        })
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each point, columns (variable, component)."""
+        from assembly.model.tables import frame_table
+
+        return frame_table(self.to_xarray(), "point")
+
+
+@overload
+def zone_margin(
+    posture: Posture, compliant: Compliant = "rigid", errors: None = None
+) -> Zone: ...
+
+
+@overload
+def zone_margin(
+    posture: Sequence[Posture], compliant: Compliant = "rigid",
+    errors: ArrayLike | None = None,
+) -> Margins: ...  # fmt: skip
+
+
+@overload
+def zone_margin(
+    posture: Posture, compliant: Compliant = "rigid", *, errors: ArrayLike
+) -> Margins: ...
+
+
+def zone_margin(
+    posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
+    errors: ArrayLike | None = None,
+) -> Zone | Margins:  # fmt: skip
     """Factor on all clearances at which a rigid manipulator just assembles.
 
     Args:
-        posture: where the robot stands.
+        posture: where the robot stands; or many postures of one robot.
         compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness, see above.
+        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
+            each of k postures, or k sets at one.
 
     Returns:
-        The margin with a certified lower bound.
+        The margin with a certified lower bound; of many postures or sets all of them.
 
     Raises:
         ValueError: ``compliant`` is something else.
         SolverFailed: the cone solver gave up.
     """
-    if compliant not in {"rigid", "free"}:
-        raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
-    lin = linearise(posture)
-    zone, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
-    bounds = clearance_bounds(posture.robot, compliant)
-    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
-    if zone.margin is not None and clearance_excess(screws, ranges) > 1e-9:
-        # the range of a passive joint's motion was left out, but it is active
-        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
-        zone, _ = margin_with(lin, joints)
-    return zone
+    if isinstance(posture, Posture) and errors is None:
+        checked_size(posture.robot)
+        T, off = posture.transforms[None], np.array([posture.mismatch])
+        margin, bound, outcome = _compiled(posture.robot, T, compliant, off, None)
+        if outcome[0]:
+            return Zone(*reference_margin(posture, compliant))
+        return Zone(float(margin[0]), float(bound[0]))
+    postures = [posture] if isinstance(posture, Posture) else list(posture)
+    sets = None if errors is None else np.asarray(errors, dtype=float)
+    if sets is not None and len(postures) == 1:
+        postures = postures * len(sets)
+    return zone_margins(
+        postures[0].robot, np.array([p.transforms for p in postures]), compliant,
+        np.array([p.mismatch for p in postures]), sets,
+    )  # fmt: skip
 
 
-def margin_with(lin: Linearisation, joints: VirtualJoints) -> tuple[Zone, NDArray]:
-    """Margin with a given choice of what may move.
+def zone_margins(
+    robot: Robot, transforms: ArrayLike, compliant: Compliant = "rigid",
+    mismatch: ArrayLike = 0.0, errors: ArrayLike | None = None,
+) -> Margins:  # fmt: skip
+    """Margins of problem (21) at many postures, or for many errors.
 
     Args:
-        lin: the assembly constraints.
-        joints: what may move, without springs.
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
 
     Returns:
-        The margin, and the (n, 6) [rad, m] clearance screws that attain it.
+        The margins, in the order given.
 
     Raises:
-        SolverFailed: the cone solver gave up.
+        ValueError: ``compliant`` is something else.
     """
-    reduced = reduce_problem(lin, joints)
-    zone, u = _least(reduced)
-    if zone.margin is None:
-        return zone, np.zeros((len(joints.robot.frames), 6))
-    motions = reduced.motions(u, np.zeros(joints.elastic.shape[1]))
-    screws = joints.cones @ u + joints.free @ motions
-    return zone, screws.reshape(-1, 6)
+    T = np.asarray(transforms, dtype=float)
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
+    own = None if errors is None else np.asarray(errors, dtype=float)
+    margin, bound, outcome = _compiled(robot, T, compliant, off, own)
+    reason = np.full(len(T), "", dtype=object)
+    for i in np.flatnonzero(outcome).tolist():
+        erring = robot
+        if own is not None:
+            erring = robot.with_errors(own if own.ndim == 2 else own[i])
+        posture = Posture(
+            erring, np.full(len(robot.frames), np.nan), T[i], float(off[i])
+        )
+        margin[i] = bound[i] = np.nan
+        try:
+            zone = Zone(*reference_margin(posture, compliant))
+        except SolverFailed as error:
+            reason[i] = str(error)
+            continue
+        reason[i] = zone.unproved
+        margin[i] = np.inf if zone.margin is None else zone.margin
+        bound[i] = np.inf if zone.bound is None else zone.bound
+    return Margins(margin, bound, outcome > 0, reason)
 
 
-def _least(reduced: Reduction) -> tuple[Zone, NDArray]:
-    """Margin of a reduced problem, and the clearances that attain it."""
-    joints = reduced.joints
-    u = np.zeros(joints.cones.shape[1])
-    if reduced.inconsistent:
-        return Zone(None, None), u
-    if not np.any(reduced.k):
-        return Zone(0.0, 0.0), u
-    # orthonormal rows, whatever the units of the closures
-    U, S, B = svd(reduced.H, full_matrices=False)
-    right = U.T @ reduced.k / S
-    t, u, y = least_factor(B, right, joints.group, joints.scaled)
-    bound = None if t is None else _margin_bound(B, right, joints, y)
-    return Zone(t, bound), u
+def _compiled(
+    robot: Robot, T: NDArray, compliant: Compliant, mismatch: NDArray,
+    errors: NDArray | None,
+) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
+    """(k,) margins, their bounds, and whether each is left to the fallback."""
+    from assembly.linear.compiled_zone import FALLBACK, all_margins
 
-
-def _margin_bound(
-    B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
-) -> float:
-    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
-    sizes = cone_sizes(B.T @ y, joints.group)
-    first = np.searchsorted(joints.group, np.arange(len(sizes)))
-    scaled = joints.scaled[first]
-    work = float(y @ right) - float(sizes[~scaled].sum())
-    return max(0.0, work / max(float(sizes[scaled].sum()), 1e-300))
+    if compliant not in {"rigid", "free"}:
+        raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
+    own = robot.errors if errors is None else errors
+    if not own.any():  # no clearance is needed
+        return np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(T), dtype=np.int64)
+    joints, structure = structure_of(robot, compliant)
+    margin, bound = np.full((2, len(T)), np.nan)
+    outcome = np.full(len(T), FALLBACK)
+    if joints.scaled.all():
+        # writable and in C order, whatever comes: the kernels are compiled for one kind
+        all_margins(
+            structure, np.require(T, requirements=["C", "W"]),
+            np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),
+            mismatch, margin, bound, outcome,
+        )  # fmt: skip
+    return margin, bound, outcome

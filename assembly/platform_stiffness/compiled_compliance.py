@@ -6,13 +6,13 @@ first lets no free motion work, the second makes the springs' energy
     |y|^2 / 2,   y = B e + Y' mu,    Y = Z A_y,   B e = the springs under e and lambda_e
 
 least.  Every spring's y under the six unit wrenches is its part of the compliance,
-C = sum of y y' (Castigliano).  Built from :mod:`assembly.batch.compiled_reduction`, as
+C = sum of y y' (Castigliano).  Built from :mod:`assembly.linear.compiled_reduction`, as
 problem (22) is, and as exact: no compliances are added before anything is eliminated.
 """
 
 from numpy.typing import NDArray
 
-from assembly.batch.compiled_reduction import (
+from assembly.linear.compiled_reduction import (
     Structure,
     free_columns,
     grouped_springs,

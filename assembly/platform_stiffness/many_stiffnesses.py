@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.batch.many_postures import structure_of
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
+from assembly.linear.energy import structure_of
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
+from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import DeflectionCurve, load_deflection
-from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label

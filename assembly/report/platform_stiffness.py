@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.exact_tangent import exact_tangent
@@ -17,7 +18,6 @@ from assembly.platform_stiffness.linear_tangent import (
     without_clearance,
 )
 from assembly.platform_stiffness.matrices import PlatformStiffness
-from assembly.report.results import failure_status
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label

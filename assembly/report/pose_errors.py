@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reach import READINGS, reachable_screws
 from assembly.linear.reduction import FreeMotion
-from assembly.report.results import failure_status, proof_status
+from assembly.report.results import proof_status
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import bracket, numbers
 from forcefit.inputs.table import BadInput

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.linear.assemblies import failure_status
 from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.mobility import mobility
@@ -192,25 +193,6 @@ def exact_of(
         "linear": linear,
         "linearisation_error": vars(assembly.linearisation_error),
     }
-
-
-_STATUS = {
-    CannotAssemble: "cannot assemble",
-    FreeMotion: "no equilibrium",
-    SolverFailed: "solver failed",
-}
-
-
-def failure_status(error: Exception) -> str:
-    """The status of a posture without a solution.
-
-    Args:
-        error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
-
-    Returns:
-        The status of the public format.
-    """
-    return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
 
 
 def exact_text(results: dict[str, Any]) -> str:

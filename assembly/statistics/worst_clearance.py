@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
-from assembly.batch.many_pose_errors import bound_pose_errors
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.clearance_positions import (

@@ -4,7 +4,9 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from io import SEEK_SET, FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import unwritable, whole_file
@@ -33,6 +35,56 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
         finally:
             if target.failure is not None:
                 raise BadInput(unwritable(path, target.failure)) from None
+
+
+class Stored(NamedTuple):
+    """A variable of a file, by the names that xarray has for these.
+
+    Attributes:
+        dims: names of its axes.
+        values: all of it.
+        attrs: its attributes.
+    """
+
+    dims: tuple[str, ...]
+    values: NDArray
+    attrs: dict[str, Any]
+
+
+class StoredDataset(NamedTuple):
+    """What a summary reads of a data set, without the second that xarray takes.
+
+    Attributes:
+        data_vars: variables by name, coordinates left out.
+        attrs: of the whole.
+    """
+
+    data_vars: dict[str, Stored]
+    attrs: dict[str, Any]
+
+
+def stored_dataset(path: Path | str) -> StoredDataset:
+    """A data set just written, for its summary.
+
+    Args:
+        path: of a NetCDF file of ours.
+
+    Returns:
+        All of its variables but the coordinates.
+    """
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        attrs = dict(file.attrs)
+        beside = {*file.dimensions, *attrs.get("coordinates", "").split()}
+        return StoredDataset(
+            {
+                name: Stored(one.dimensions, one[...], dict(one.attrs))
+                for name, one in file.variables.items()
+                if name not in beside
+            },
+            attrs,
+        )
 
 
 def forgive_damaged_files() -> None:

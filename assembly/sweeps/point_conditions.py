@@ -10,17 +10,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_postures import Energies
 from assembly.effects import apply_known
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import virtual_joints
-from assembly.linear.energy import Assembly, CannotAssemble
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.assembled import Assembly
+from assembly.linear.assemblies import Assemblies, solve_each
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot
-from assembly.report.results import failure_status
-from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.quantities import Question
 
 
@@ -63,51 +59,22 @@ def is_loaded(conditions: Conditions) -> bool:
     return bool(loaded or conditions.laws or conditions.yields)
 
 
-def assemble_rows(conditions: Conditions) -> tuple[Energies, NDArray]:
+def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray]:
     """Least energies of all rows, one by one.
 
     Args:
         conditions: k rows of a robot of n frames.
 
     Returns:
-        Energies, screws and certificates in the order given; and the (k, n, 6)
+        Assemblies, screws and certificates in the order given; and the (k, n, 6)
         [N m, N] wrenches through the bodies.
     """
-    k, n = len(conditions), len(conditions.robot.frames)
-    joints = virtual_joints(conditions.robot)
+    wrenches = np.full((len(conditions), len(conditions.robot.frames), 6), np.nan)
 
-    def unknown(*shape: int) -> NDArray:
-        return np.full((k, *shape), np.nan)
-
-    energies = Energies(
-        energy=unknown(),
-        bound=unknown(),
-        energy_without_clearance=unknown(),
-        platform_screw=unknown(6),
-        closure_residual=unknown(),
-        clearance_excess=unknown(),
-        clearances=unknown(joints.cones.shape[1]),
-        motions=unknown(joints.free.shape[1]),
-        multipliers=unknown(6 * len(conditions.robot.closures)),
-        outcome=np.zeros(k, dtype=int),
-        status=np.full(k, "ok", dtype=object),
-        reason=np.full(k, "", dtype=object),
-        joints=joints,
-    )
-    wrenches = unknown(n, 6)
-    for i in range(k):
-        try:
-            assembly = assemble_row(conditions, i)
-        except (CannotAssemble, FreeMotion, SolverFailed) as error:
-            energies.status[i], energies.reason[i] = failure_status(error), str(error)
-            continue
+    def one(i: int) -> Assembly:
+        assembly = assemble_row(conditions, i)
         assert isinstance(assembly, Assembly)
-        energies.energy[i] = assembly.energy
-        energies.bound[i] = assembly.energy - assembly.duality_gap()
-        energies.energy_without_clearance[i] = assembly.energy_without_clearance
-        energies.platform_screw[i] = assembly.platform_screw
-        energies.closure_residual[i] = assembly.closure_residual()
-        energies.clearance_excess[i] = assembly.clearance_excess()
-        energies.multipliers[i] = assembly.multipliers
         wrenches[i] = assembly.wrenches
-    return energies, wrenches
+        return assembly
+
+    return solve_each(conditions.robot, len(conditions), one), wrenches

@@ -11,16 +11,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_pose_errors import PoseErrors, bound_pose_errors
-from assembly.batch.many_postures import Energies, minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.linear.closure import closure_signs
-from assembly.linear.energy import CannotAssemble
+from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
+from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.singularity import KINDS, find_singularities
-from assembly.linear.zone import MARGIN_READINGS
+from assembly.linear.zone import MARGIN_READINGS, zone_margins
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
@@ -241,7 +239,7 @@ def _solve_reached(
 
 
 def _solved_rows(
-    energies: Energies, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
+    energies: Assemblies, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
     """Which points have a solution; of the others status and reason are kept."""
     ok = []
@@ -328,7 +326,7 @@ def _record_frequencies(
         solved.records["frequency"][rows[run], : len(found)] = found
 
 
-def _wrenches(robot: Robot, T: NDArray, energies: Energies) -> NDArray:
+def _wrenches(robot: Robot, T: NDArray, energies: Assemblies) -> NDArray:
     """(k, n, 6) [N m, N] wrench through every frame without loads, in its axes."""
     size = size_of(robot)
     closures = energies.multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
     from assembly.model.error_distributions import ErrorSources
+    from assembly.sweeps.netcdf import Stored, StoredDataset
 
 _MODES = 100  # natural frequencies at most
 
@@ -247,7 +248,7 @@ def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
-def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
+def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
     """Summary of a sweep as plain values.
 
     Args:
@@ -257,11 +258,13 @@ def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
         Axes, the number of points of each status, and of each quantity the least,
         median and largest finite value with its unit; None where no value is finite.
     """
-    names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
-    axes = {str(d): data.sizes[d] for d in data["status"].dims}
+    status = data.data_vars["status"]
+    names, counts = np.unique(status.values.astype(str), return_counts=True)
+    sizes = zip(status.dims, status.values.shape, strict=True)
+    axes = {str(name): size for name, size in sizes}
     table = {}
     for name, variable in data.data_vars.items():
-        if variable.dtype.kind == "f":
+        if variable.values.dtype.kind == "f":
             table[str(name)] = _spread(variable)
     return {
         **{str(k): v for k, v in data.attrs.items() if k != "coordinates"},
@@ -272,7 +275,7 @@ def summary_of(data: "xarray.Dataset") -> dict[str, Any]:
     }
 
 
-def _spread(variable: "xarray.DataArray") -> dict[str, Any] | None:
+def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
     """Least, median and largest finite value; None where no value is finite."""
     values = variable.values[np.isfinite(variable.values)]
     if not values.size:
@@ -283,12 +286,13 @@ def _spread(variable: "xarray.DataArray") -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def summary_text(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
+def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
     """The same for people: statuses, and the first reason of each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
-    status = data["status"].values.astype(str).ravel()
+    status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:
-        if name not in {"ok", "out of reach"} and "reason" in data:
+        if name not in {"ok", "out of reach"} and "reason" in data.data_vars:
             first = int(np.flatnonzero(status == name)[0])
-            lines.append(f"{name}, for one: {data['reason'].values.ravel()[first]}")
+            reasons = data.data_vars["reason"]
+            lines.append(f"{name}, for one: {reasons.values.ravel()[first]}")
     return "\n".join(lines)

@@ -116,7 +116,7 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
         q[:, robot.index(name)] = 0.5 * joints[:, 0] + offset
     q[:, [robot.index(name) for name in ARM]] = joints[:, 1:]
     home = home_posture(robot).coordinates
-    T = follow(robot, home, Target(coordinates=q), steps=1).transforms[:, -1]
+    T = follow(robot, home, Target(coordinates=q), guess=True).transforms[:, -1]
     measured = transform([row["prism_position"] for row in rows], T[:, :3, :3])
     columns = {f"q.{n}": q[:, robot.index(n)] for n in (*SEGMENTS, *ARM)}
     columns |= deviation_columns(T, measured, turn=False)

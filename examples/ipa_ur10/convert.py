@@ -119,7 +119,7 @@ def _platform(robot: Robot, table: dict[str, NDArray]) -> NDArray:
     for name in JOINTS:
         q[:, robot.index(name)] = table[name]
     home = home_posture(robot).coordinates
-    return follow(robot, home, Target(coordinates=q), steps=1).transforms[:, -1]
+    return follow(robot, home, Target(coordinates=q), guess=True).transforms[:, -1]
 
 
 def _covariates(table: dict[str, NDArray]) -> dict[str, NDArray]:

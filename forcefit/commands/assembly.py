@@ -199,12 +199,13 @@ def show(
     ] = None,
 ) -> None:
     """Plot the nominal and the forced robot, and its errors."""
+    from assembly.linear.assemblies import failure_status
     from assembly.linear.energy import CannotAssemble, solve_assembly
     from assembly.linear.error_body import PARTS
     from assembly.linear.reach import READINGS
     from assembly.linear.reduction import FreeMotion
     from assembly.report.plot import plot_assembly
-    from assembly.report.results import failure_status, remark_lines
+    from assembly.report.results import remark_lines
     from assembly.solvers.conic import SolverFailed
 
     if output is not None:

@@ -100,6 +100,7 @@ def sweep(
     """
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
+    from assembly.sweeps.netcdf import stored_dataset
     from assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,
@@ -149,9 +150,9 @@ def sweep(
             file=sys.stderr,
         )
         raise typer.Exit(130) from None
-    data = open_dataset(output)
+    data = stored_dataset(output)
     if figure is not None:
-        save_figure(figure_of(data), figure)
+        save_figure(figure_of(open_dataset(output)), figure)
     summary = {"output": str(output)} | summary_of(data)
     write_json(summary, json)
     held.close()

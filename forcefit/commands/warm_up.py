@@ -6,13 +6,12 @@ import numpy as np
 
 from assembly.batch.many_draws import prepare_energies
 from assembly.batch.many_margins import prepare_margins
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.zone import zone_margin
+from assembly.linear.energy import minimise_energies
+from assembly.linear.fallback import reference_assembly, reference_margin
+from assembly.linear.moving_clearances import Asked
+from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
+from assembly.linear.zone import zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import position_clearances
@@ -35,8 +34,9 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
     perfect = prepared.solve(np.zeros((1, *errors.shape)))  # clearances undetermined
     rngs = [np.random.default_rng(1)]
     computations: tuple[Callable[[], object], ...] = (
-        lambda: zone_margin(posture),
-        lambda: bound_pose_error(solve_assembly(posture)),
+        # what the fallback calls
+        lambda: reference_margin(posture, "rigid"),
+        lambda: reference_pose_error(reference_assembly(posture), Asked()),
         lambda: minimise_energies(robot, T),
         lambda: zone_margins(robot, T),
         lambda: platform_stiffnesses(robot, T),

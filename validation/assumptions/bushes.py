@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
-from assembly.linear.energy import Assembly, solve_with
+from assembly.linear.fallback import solve_with
 from assembly.linear.load import loads_on_frames
 
 

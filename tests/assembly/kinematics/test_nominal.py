@@ -5,13 +5,16 @@ import math
 import numpy as np
 import pytest
 
+from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import (
     home_posture,
     place_many,
     place_many_joints,
     place_robot,
+    pose_components,
 )
 from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
@@ -306,6 +309,29 @@ def test_many_poses_are_those_placed_one_by_one():
         np.testing.assert_allclose(
             postures[i].platform[:3, 3], one.platform[:3, 3], rtol=0, atol=EXACT
         )
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
+def test_a_long_way_ends_where_many_short_ones_do(name):
+    """Home's assembly mode: through 40 targets on the line, each from the last."""
+    robot = load_robot(name)
+    home = home_posture(robot)
+    given = (0, 2) if name == "irsbot2" else (0, 1, 2)
+    signs = np.array(np.meshgrid(*[[-1, 1]] * len(given))).reshape(len(given), -1).T
+    ends = pose_components(home.platform)[list(given)] + 0.12 * signs
+    goals = np.full((len(ends), 6), np.nan)
+    goals[:, given] = ends
+    postures, _ = place_many(robot, goals)
+    assert sum(posture is not None for posture in postures) > 1
+    for goal, posture in zip(goals, postures, strict=True):
+        if posture is None:
+            continue
+        at, pose = home.coordinates, np.full((1, 6), np.nan)
+        begin = pose_components(home.platform)
+        for share in np.linspace(0, 1, 41)[1:]:
+            pose[0] = begin + share * (goal - begin)
+            at = follow(robot, at, Target(pose=pose)).coordinates[0]
+        np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
 
 
 def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from assembly.batch.many_postures import minimise_energies
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import _farthest, bound_pose_error
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.robots.irsbot2 import irsbot2
 from assembly.solvers.conic import cone_sizes
@@ -82,7 +82,7 @@ def small_reach(rng, cones, rows, flat):
 def test_branch_and_bound_meets_outer_approximation(seed, rows):
     reach = small_reach(np.random.default_rng(seed), 5, rows, flat=False)
     for part in (slice(0, 3), slice(3, 6)):
-        (low, high), screw, _ = _farthest(reach, part.start, 1e-6)
+        (low, high), screw, _ = reach.farthest(part.start, 1e-6)
         other = by_branching(reach, part, 1e-5)
         assert high - low <= 1e-6
         assert low <= other[1]
@@ -110,7 +110,7 @@ def test_vertices_of_intervals_meet_outer_approximation(seed, rows):
                 vertices.append(reach.centre + reach.map @ (v - reach.start))
     for part in (slice(0, 3), slice(3, 6)):
         farthest = np.linalg.norm(np.array(vertices)[:, part], axis=1).max()
-        (low, high), *_ = _farthest(reach, part.start, 1e-9)
+        (low, high), *_ = reach.farthest(part.start, 1e-9)
         assert low <= farthest * (1 + 1e-9)
         assert high >= farthest * (1 - 1e-9)
         assert high - low <= 1e-9

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.pose_error import bound_pose_errors
+from assembly.linear.zone import zone_margins
 from assembly.sweeps.quantities import Question, variables
 from stiffness.screws import SCREW, WRENCH
 from tests.robots_for_tests import NUMBERS, irsbot2_with

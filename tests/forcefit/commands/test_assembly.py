@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_postures import minimise_energies
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import solve_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.robots import load_robot

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.compiled_reduction import (
+from assembly.linear.compiled_reduction import (
     Structure,
     free_columns,
     least_motions,
@@ -19,7 +19,7 @@ from assembly.batch.compiled_reduction import (
     paths_of,
     small_problem,
 )
-from assembly.batch.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.linear.compiled_zone import largest_clearance, orthonormal_rows
 from assembly.linear.thresholds import MISMATCH_FACTOR, RANK, UNBOUNDED
 from assembly.solvers.compiled import (
     Indices,

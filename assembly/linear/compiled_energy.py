@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.compiled_reduction import (
+from assembly.linear.compiled_reduction import (
     Structure,
     eliminate_springs,
     free_columns,
@@ -20,6 +20,7 @@ from assembly.batch.compiled_reduction import (
     misfit_of,
     moved_by,
     orthogonal_rows,
+    own_springs,
     paths_of,
     rigid_rows,
     small_problem,
@@ -49,7 +50,7 @@ from assembly.solvers.vectors import (
 )
 
 NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED = range(6)
-_STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
+_STOP = 3e-3  # the solvers stop at this fraction of the accepted gap
 # gap from which Newton's method finishes: of the energy, of that without clearance
 _NEAR, _NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
@@ -69,6 +70,8 @@ class Solutions(NamedTuple):
         motions: (k, nq) [rad, m].
         multipliers: (k, 6 closures) of the scaled closures.
         residual: (k,) [rad, reference lengths] largest of the closures.
+        elastic: (k, ny) [sqrt(2 J)] scaled deformation of the springs; no rows where
+            nobody asks.
     """
 
     outcome: Indices
@@ -80,6 +83,7 @@ class Solutions(NamedTuple):
     motions: Matrix
     multipliers: Matrix
     residual: Vector
+    elastic: Matrix
 
 
 @kernel
@@ -131,22 +135,41 @@ def assemble_all(
         u, v, y = vector(len(Gt)), vector(rank), vector(rank)
         outcome = _minimise(s, Gt, h, u, v, y)
         # back to the full problem
-        multipliers = out.multipliers[point]
-        for a in range(m):
-            multipliers[a] = 0.0
-            for i in range(rank):
-                multipliers[a] += Z[i, a] * y[i]
+        _least_multipliers(Z, rank, y, out.multipliers[point])
         for c in range(len(u)):
             out.clearances[point, c] = u[c]
         spring = vector(Y.shape[1])
         copy(v, spring)
         turn(Y, y_turns, rank, spring)
+        if len(out.elastic):
+            own_springs(s, P, spring, out.elastic[point])
         out.energy[point] = 0.5 * inner(v, v)
         out.without_clearance[point] = 0.5 * inner(h, h)
         moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
         motions = out.motions[point]
         least_motions(F, turns, diagonal, order, free, moved, motions)
         out.outcome[point] = _certify(point, s, P, own, moved, outcome, out)
+
+
+@part
+def _least_multipliers(Z: Matrix, rank: int, y: Vector, multipliers: Vector) -> None:
+    """Multipliers of the closures, the least ones where they are not unique."""
+    m = len(multipliers)
+    for a in range(m):
+        multipliers[a] = 0.0
+        for i in range(rank):
+            multipliers[a] += Z[i, a] * y[i]
+    # nothing feels those along Z's other rows, made orthonormal here
+    for i in range(rank, len(Z)):
+        for l in range(rank, i):
+            along = inner(Z[l], Z[i])
+            for a in range(m):
+                Z[i, a] -= along * Z[l, a]
+        size = np.sqrt(inner(Z[i], Z[i]))
+        along = inner(Z[i], multipliers) / (size * size)
+        for a in range(m):
+            multipliers[a] -= along * Z[i, a]
+            Z[i, a] /= size
 
 
 @part

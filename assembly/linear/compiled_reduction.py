@@ -134,15 +134,7 @@ def grouped_springs(s: Structure, P: Matrices) -> Matrices:
     turns, diagonal = vector(6), vector(6)
     order = indices(6)
     for g in range(count):
-        a, b = s.groups[g], s.groups[g + 1]
-        rows = matrix(6, max(b - a, 6))
-        for c in range(a, b):
-            j = s.spring_frame[c]
-            for axis in range(6):
-                weight = s.springs[c, axis]
-                if weight != 0.0:
-                    for i in range(6):
-                        rows[i, c - a] += weight * P[j, axis, i]
+        rows = spring_group(s, P, g)
         rank = triangulate(rows, turns, diagonal, order, 0.0, 0.0, -1.0)
         for i in range(6):
             for l in range(min(i, rank)):
@@ -150,6 +142,38 @@ def grouped_springs(s: Structure, P: Matrices) -> Matrices:
             if i < rank:
                 L[g, order[i], i] = diagonal[i]
     return L
+
+
+@part
+def spring_group(s: Structure, P: Matrices, g: int) -> Matrix:
+    """(6, springs, or 6 if they are fewer) columns of a group's springs."""
+    a, b = s.groups[g], s.groups[g + 1]
+    rows = matrix(6, max(b - a, 6))
+    for c in range(a, b):
+        j = s.spring_frame[c]
+        for axis in range(6):
+            weight = s.springs[c, axis]
+            if weight != 0.0:
+                for i in range(6):
+                    rows[i, c - a] += weight * P[j, axis, i]
+    return rows
+
+
+@part
+def own_springs(s: Structure, P: Matrices, grouped: Vector, elastic: Vector) -> None:
+    """Deformation of every spring, from that of the groups' six."""
+    turns, diagonal = vector(6), vector(6)
+    order = indices(6)
+    for g in range(len(s.groups) - 1):
+        a, b = s.groups[g], s.groups[g + 1]
+        rows = spring_group(s, P, g)
+        rank = triangulate(rows, turns, diagonal, order, 0.0, 0.0, -1.0)
+        own = vector(rows.shape[1])
+        for i in range(rank):
+            own[i] = grouped[6 * g + i]
+        turn(rows, turns, rank, own)
+        for c in range(a, b):
+            elastic[s.spring_order[c]] = own[c - a]
 
 
 @part

@@ -1,5 +1,6 @@
 """A robot as the compiled methods read it: virtual joints as arrays."""
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from assembly.model.clearance import Compliant, clearance_bounds, component_boun
 from assembly.model.robot import Robot
 
 if TYPE_CHECKING:
-    from assembly.batch.compiled_reduction import Structure
+    from assembly.linear.compiled_reduction import Structure
 
 
 @lru_cache(maxsize=32)
@@ -28,10 +29,28 @@ def structure_of(
     Returns:
         The columns; the same as arrays.
     """
-    from assembly.batch.compiled_reduction import Structure
-
     joints = virtual_joints(robot, compliant)
-    on_path = robot.on_path[robot.index(robot.platform)]
+    rows = tuple((robot.index(a), robot.index(b)) for a, b in robot.closures)
+    tree = _Tree(robot.index(robot.platform), rows, robot)
+    return joints, _structure(joints, tree, compliant)
+
+
+@dataclass(frozen=True)
+class _Tree:
+    """What of a robot, beside its virtual joints, a structure depends on."""
+
+    platform: int
+    closures: tuple[tuple[int, int], ...]
+    robot: Robot = field(compare=False)
+
+
+@lru_cache(maxsize=32)
+def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> "Structure":
+    """The arrays, once for all robots that differ in their errors alone."""
+    from assembly.linear.compiled_reduction import Structure
+
+    robot = tree.robot
+    on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
     # springs that enter the same closures, and the platform's path, act as one
@@ -48,9 +67,9 @@ def structure_of(
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     cone_count = int(joints.group.max(initial=-1)) + 1
     cone_starts = np.searchsorted(joints.group, np.arange(cone_count + 1))
-    structure = Structure(
+    return Structure(
         size=size_of(robot),
-        platform=robot.index(robot.platform),
+        platform=tree.platform,
         on_path=on_path.astype(float),
         patterns=patterns,
         pattern_of=pattern_of.astype(np.int64),
@@ -68,7 +87,6 @@ def structure_of(
         free_axis=free_axis,
         free_bound=bounds[free_frame, free_axis],
     )
-    return joints, structure
 
 
 def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:

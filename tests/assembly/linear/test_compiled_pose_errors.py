@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_pose_errors import bound_pose_errors
-from assembly.batch.many_postures import minimise_energies
 from assembly.kinematics.posture import home_posture, place_many
-from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.fallback import reference_assembly
+from assembly.linear.moving_clearances import Asked
+from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
 from tests.assembly.linear.test_pose_error import hinged_frame
@@ -54,8 +54,8 @@ def test_batch_brackets_what_one_at_a_time_brackets(grid, reading, kappa):
     assert set(batch.status) == {"ok"}
     assert batch.fallback.sum() <= 1
     for i in range(0, len(T), 4):
-        one = bound_pose_error(
-            solve_assembly(replace(postures[i], robot=scaled)), reading
+        one = reference_pose_error(
+            reference_assembly(replace(postures[i], robot=scaled)), Asked(reading)
         )
         assert_overlap(batch, i, one)
 
@@ -81,8 +81,8 @@ def test_errors_of_their_own_another_point_and_tighter_tolerances(grid, rng):
     batch = bound_pose_errors(robot, T[:3], "free", errors, off[:3], **options)
     for i in range(3):
         own = robot.with_errors(errors[i])
-        answer = solve_assembly(replace(postures[i], robot=own))
-        assert_overlap(batch, i, bound_pose_error(answer, "free", **options))
+        answer = reference_assembly(replace(postures[i], robot=own))
+        assert_overlap(batch, i, reference_pose_error(answer, Asked("free", **options)))
     assert np.diff(batch.rotation_error).max() <= 1e-8
     assert np.diff(batch.translation_error).max() <= 1e-9
 
@@ -91,21 +91,21 @@ def test_errors_of_their_own_another_point_and_tighter_tolerances(grid, rng):
 def test_every_built_in_robot(name):
     robot = load_robot(name)
     posture = home_posture(robot)
-    answer = solve_assembly(posture)
+    answer = reference_assembly(posture)
     for reading in ("frozen", "free"):
         batch = bound_pose_errors(
             robot, posture.transforms[None], reading, mismatch=posture.mismatch
         )
-        assert_overlap(batch, 0, bound_pose_error(answer, reading))
+        assert_overlap(batch, 0, reference_pose_error(answer, Asked(reading)))
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_robots(seed):
     robot = random_robot(np.random.default_rng(seed))
     posture = home_posture(robot)
-    answer = solve_assembly(posture)
+    answer = reference_assembly(posture)
     for reading in ("frozen", "free"):
-        one = bound_pose_error(answer, reading)
+        one = reference_pose_error(answer, Asked(reading))
         batch = bound_pose_errors(
             robot, posture.transforms[None], reading, mismatch=posture.mismatch
         )
@@ -122,7 +122,7 @@ def test_random_robots(seed):
 def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
     """Compiled where no clearance comes near them, else by the fallback."""
     posture = home_posture(hinged_frame(spin))
-    one = bound_pose_error(solve_assembly(posture), reading)
+    one = reference_pose_error(reference_assembly(posture), Asked(reading))
     batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
     assert_overlap(batch, 0, one)
     assert batch.fallback[0] == (0.0 < spin < 1e-3)
@@ -138,7 +138,7 @@ def test_the_budget_goes_one_at_a_time():
     batch = bound_pose_errors(
         robot, posture.transforms[None], "budget", energy_budget=0.5
     )
-    one = bound_pose_error(solve_assembly(posture), "budget", energy_budget=0.5)
+    one = reference_pose_error(solve_assembly(posture), Asked("budget", 0.5))
     assert batch.fallback[0]
     assert tuple(batch.translation_error[0]) == one.translation_error
 

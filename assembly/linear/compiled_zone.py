@@ -11,7 +11,7 @@ interior-point method.  Its multipliers n bound the margin from below,
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.compiled_reduction import (
+from assembly.linear.compiled_reduction import (
     Structure,
     free_columns,
     least_motions,
@@ -48,7 +48,7 @@ def all_margins(
     Args:
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
-        errors: (n, 6) [rad, m].
+        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         margin: (k,) to fill.
         bound: (k,) to fill.
@@ -58,6 +58,11 @@ def all_margins(
         margin[i], bound[i], outcome[i] = np.nan, np.nan, FALLBACK
         tolerance = RANK + MISMATCH_FACTOR * mismatch[i]
         P = paths_of(T[i], s)
+        known = misfit_of(s, P, errors[i if len(errors) > 1 else 0])
+        if inner(known, known) == 0.0:
+            # nothing to close: no clearance is needed
+            margin[i], bound[i], outcome[i] = 0.0, 0.0, SOLVED
+            continue
         m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
         F = free_columns(s, P, m)
         turns, diagonal, order = vector(nq), vector(nq), indices(nq)
@@ -65,7 +70,6 @@ def all_margins(
         if free < 0:
             continue
         Z = orthogonal_rows(F, turns, free, m)
-        known = misfit_of(s, P, errors)
         columns, right = small_problem(s, P, Z, len(Z), known)
         rows = np.ascontiguousarray(columns.T)
         misfit = divide(right, -1.0)

@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_postures import minimise_energies
-from assembly.batch.zone_margins import zone_margins
 from assembly.kinematics.posture import Posture, home_posture, place_many
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.zone import zone_margin
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.fallback import (
+    CannotAssemble,
+    reference_assembly,
+    reference_margin,
+)
+from assembly.linear.zone import Zone, zone_margin, zone_margins
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
@@ -63,7 +66,7 @@ def test_batch_equals_one_at_a_time_and_proves_every_point(grid, kappa):
     assert batch.clearance_excess.max() < 1e-14
     scaled = robot.with_errors(kappa * robot.errors)
     for i in range(0, len(postures), 6):
-        one = solve_assembly(replace(postures[i], robot=scaled))
+        one = reference_assembly(replace(postures[i], robot=scaled))
         assert_same(batch, i, one)
         if kappa < 0.5:
             continue  # play is left, and the platform's screw with it
@@ -81,7 +84,7 @@ def test_all_play_used_up_leaves_no_choice_of_screw(grid):
     newton = np.flatnonzero(batch.outcome == 0)
     assert len(newton) > 5
     for i in newton[:5]:
-        one = solve_assembly(postures[i])
+        one = reference_assembly(postures[i])
         size = np.abs(one.platform_screw).reshape(2, 3).max(axis=1).repeat(3)
         off = np.abs(batch.platform_screw[i] - one.platform_screw)
         assert np.all(off < 1e-6 * size)
@@ -92,7 +95,7 @@ def test_multipliers_are_the_closure_wrenches_of_the_single_answer(grid):
     T, mismatch = stack(postures)
     batch = minimise_energies(robot, T, mismatch=mismatch)
     for i in (0, 20):
-        one = solve_assembly(postures[i])
+        one = reference_assembly(postures[i])
         proved = replace(one, multipliers=batch.multipliers[i]).bound
         assert proved == pytest.approx(batch.bound[i], rel=1e-9)
         assert proved >= one.energy * (1 - 2e-8)
@@ -118,7 +121,7 @@ def test_errors_of_their_own_for_every_point(grid, rng):
     assert batch.certified.all()
     for i in range(4):
         own = robot.with_errors(errors[i])
-        assert_same(batch, i, solve_assembly(replace(postures[3], robot=own)))
+        assert_same(batch, i, reference_assembly(replace(postures[3], robot=own)))
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
@@ -134,7 +137,7 @@ def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
     assert batch.certified.all()
     assert batch.fallbacks() == {}
     for i in range(3):
-        one = solve_assembly(replace(home, robot=robot.with_errors(errors[i])))
+        one = reference_assembly(replace(home, robot=robot.with_errors(errors[i])))
         assert_same(batch, i, one)
         if not len(batch.joints.group):
             assert batch.platform_screw[i] == pytest.approx(one.platform_screw)
@@ -151,12 +154,12 @@ def test_random_robots_give_the_single_answer_or_go_the_slower_road():
         if batch.status[0] != "ok":
             assert batch.status[0] == "cannot assemble"
             with pytest.raises(CannotAssemble) as error:
-                solve_assembly(home)
+                reference_assembly(home)
             assert batch.reason[0] == str(error.value)
             assert np.isnan(batch.energy[0])
             assert not batch.certified[0]
             continue
-        one = solve_assembly(home)
+        one = reference_assembly(home)
         assert_same(batch, 0, one)
         if batch.outcome[0] < 2:
             assert batch.certified[0]
@@ -181,7 +184,7 @@ def test_free_motions_that_are_not_unique_are_the_least():
     robot = Robot("pins", "mid", frames, (("end", "wall"),))
     home = home_posture(robot)
     batch = minimise_energies(robot, home.transforms[None])
-    one = solve_assembly(home)
+    one = reference_assembly(home)
     assert batch.outcome[0] < 2
     assert batch.platform_screw[0] == pytest.approx(one.platform_screw, abs=1e-14)
     # the pin below the platform turns half the 2e-3 rad about their common axis
@@ -270,7 +273,7 @@ def test_the_certificate_refuses_a_spoilt_point(grid):
 def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
     """The kernel's own certificate: asked for more than is possible, it refuses."""
     robot, postures = grid
-    from assembly.batch import compiled_energy as compiled_assembly
+    from assembly.linear import compiled_energy as compiled_assembly
 
     assemble_all = compiled_assembly.assemble_all
 
@@ -288,7 +291,7 @@ def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
     batch = minimise_energies(robot, T)
     assert batch.fallbacks() == {"uncertified": 2}
     assert batch.certified.all()
-    one = solve_assembly(postures[0])
+    one = reference_assembly(postures[0])
     assert batch.energy[0] == one.energy
 
 
@@ -326,7 +329,7 @@ def test_postures_are_made_for_the_slower_road_only(grid):
     """The batch needs frames, not coordinates: none are asked for."""
     robot, postures = grid
     bare = Posture(robot, np.full(42, np.nan), postures[0].transforms, 0.0)
-    assert solve_assembly(bare).energy == solve_assembly(postures[0]).energy
+    assert reference_assembly(bare).energy == reference_assembly(postures[0]).energy
 
 
 def assert_same_margin(batch, i, zone):
@@ -344,7 +347,7 @@ def test_margins_equal_one_at_a_time(grid, compliant):
     batch = zone_margins(robot, T, compliant, mismatch)
     assert not batch.fallback.any()
     for i in range(0, len(postures), 5):
-        assert_same_margin(batch, i, zone_margin(postures[i], compliant))
+        assert_same_margin(batch, i, Zone(*reference_margin(postures[i], compliant)))
     assert np.all(batch.bound >= batch.margin * (1 - 1e-8))
 
 
@@ -360,7 +363,9 @@ def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rn
         robot = home.robot.with_errors(errors)
         batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
         compiled += not batch.fallback[0]
-        assert_same_margin(batch, 0, zone_margin(replace(home, robot=robot), compliant))
+        assert_same_margin(
+            batch, 0, Zone(*reference_margin(replace(home, robot=robot), compliant))
+        )
     assert compiled > 15
 
 
@@ -377,3 +382,57 @@ def test_a_margin_has_two_readings():
     robot = coaxial_beams(np.zeros(6))
     with pytest.raises(ValueError, match="compliant is 'soft'"):
         zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")
+
+
+def test_many_answers_are_indexed_and_each_is_the_single_one(grid):
+    robot, postures = grid
+    many = solve_assembly(postures[:3])
+    assert len(many) == 3
+    for one, posture in zip(many, postures, strict=False):
+        assert one.energy == solve_assembly(posture).energy
+    assert many[-1].energy == many.energy[2] == solve_assembly(postures[2]).energy
+    with pytest.raises(IndexError):
+        many[3]
+    errors = np.array([0.5, 1.0])[:, None, None] * robot.errors
+    halved = solve_assembly(postures[0], errors=errors)
+    assert halved.energy[1] == many.energy[0]
+    half = replace(postures[0], robot=robot.with_errors(errors[0]))
+    assert halved[0].energy == solve_assembly(half).energy
+    margins = zone_margin(postures[:3], "free")
+    assert [zone.margin for zone in margins] == margins.margin.tolist()
+    assert margins[1] == zone_margin(postures[1], "free")
+
+
+def test_many_answers_under_a_load_are_those_one_by_one(grid):
+    _, postures = grid
+    load = [0.0, 0, 0, 10, 0, -50]
+    many = solve_assembly(postures[:2], load)
+    assert many.fallbacks() == {"loads": 2}
+    for i in range(2):
+        one = solve_assembly(postures[i], load)
+        assert many.energy[i] == one.energy
+        assert np.array_equal(many[i].load, load)
+
+
+def test_a_single_answer_closes_and_has_the_least_wrenches(grid):
+    """Springs of a compiled answer close to rounding; wrenches are the reference's."""
+    _, postures = grid
+    for posture in postures[::9]:
+        answer, reference = solve_assembly(posture), reference_assembly(posture)
+        assert answer.closure_residual() < 1e-14
+        assert answer.stored == pytest.approx(reference.stored, rel=1e-8)
+        size = np.linalg.norm(reference.closure_wrenches, axis=0)
+        off = np.abs(answer.closure_wrenches - reference.closure_wrenches)
+        # known to the root of the gap, 1e-4 of the springs
+        assert np.all(off < 2e-3 * size)
+        assert answer.ranks == reference.ranks
+
+
+def test_margins_of_a_perfect_robot_are_zero_and_none_goes_to_the_fallback(grid):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for compliant in ("rigid", "free"):
+        margins = zone_margins(robot, T, compliant, mismatch, 0.0 * robot.errors)
+        assert not margins.fallback.any()
+        assert np.array_equal(margins.margin, np.zeros(len(T)))
+        assert np.array_equal(margins.bound, margins.margin)
