@@ -1,11 +1,11 @@
-"""K_C of random robots by several roads.
+"""K_C of random robots by several methods.
 
 ``python -m benchmarks.stiffness_random_robots``
 
 100 robots of one to three legs, with play, errors and loads, at three sizes of their
 errors: the exact tangent against differences of the exact equilibrium by the load; the
 classical matrix against the least energy (22) without play; the compiled against the
-plain road.  Every robot has an answer or a reason; differences are entries over
+one posture at a time.  Every robot has a matrix or a reason; differences are entries over
 sqrt(C_ii C_jj).  Differences by the load are extrapolated from several steps, each by
 itself, and of them that is taken which differs least from its neighbours (Ridders):
 small steps leave the solver's noise, large ones meet other contacts.  The compared

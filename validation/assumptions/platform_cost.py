@@ -81,15 +81,14 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
         FreeMotion: at every posture a motion of the platform is resisted by nothing.
         NoSolids: no link has a shape.
     """
-    robot = postures[0].robot
-    solids = solid_links(robot)
-    if not solids:
-        raise NoSolids("no link has a shape that could be meshed")
-    declared = _compliances(postures, {})
+    robot, declared = postures[0].robot, _compliances(postures, {})
     known = np.isfinite(declared).all(axis=(1, 2))
     if not known.any():
         screw = numbers(without_clearance(postures[0]).free[:, 0])
         raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
+    solids = solid_links(robot)
+    if not solids:
+        raise NoSolids("no link has a shape that could be meshed")
     meshed = {name: solid.condensed for name, solid in solids.items()}
     true = np.full_like(declared, np.nan)
     for i in np.flatnonzero(known).tolist():

@@ -8,11 +8,10 @@ from validation.assumptions import solid_links
 
 @pytest.fixture(scope="module")
 def coarse_solids():
-    """Bars good to two per cent."""
+    """Bars good to one per cent."""
     with pytest.MonkeyPatch.context() as patch:
         solid_links._bar.cache_clear()
-        patch.setattr(
-            solid_links, "_OPTIONS", FemOptions(0.02, budget=Budget(levels=1))
-        )
+        options = FemOptions(0.01, budget=Budget(unknowns=60_000))
+        patch.setattr(solid_links, "_OPTIONS", options)
         yield
         solid_links._bar.cache_clear()

@@ -109,6 +109,7 @@ def test_what_cannot_be_compared_is_refused():
         platform_costs([home_posture(free)])
 
 
+@pytest.mark.slow
 def test_the_command_names_the_link_that_costs_most(run, tmp_path):
     path, picture = tmp_path / "triangle.toml", tmp_path / "cost.svg"
     write_robot(triangle(), path)

@@ -215,7 +215,7 @@ def test_disc_and_cone_cost_what_bushes_need_more(posture):
 def test_a_thick_bar_is_stiffer_than_its_beam_because_its_ends_are_held(posture):
     """Bending by 1 + c r / L, c about 0.2 (an end held flat cannot warp); torsion not.
 
-    At L / r = 5 that is 4 per cent; a mesh good to 2 per cent lets it be seen.
+    At L / r = 5 that is 4 per cent; a mesh good to 1 per cent lets it be seen.
     """
     thick = with_bars(posture.robot, 5.0).frame("leg1.link_a")
     assert isinstance(thick.link, BeamLink)
