@@ -25,7 +25,7 @@ from stiffness.fem.two_ends import two_ends
 _KEPT = 32  # shapes
 _OPTIONS = FemOptions(
     accuracy=1e-3,  # of every entry of K_E, over sqrt(K_ii K_jj)
-    budget=Budget(seconds=20.0, unknowns=250_000),
+    budget=Budget(seconds=40.0, unknowns=250_000),
 )
 
 
