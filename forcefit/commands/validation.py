@@ -241,9 +241,10 @@ def validity(
         typer.Option(help="Also plot the stiffness's errors, as PNG, SVG or PDF."),
     ] = None,
 ) -> None:
-    """What the model's assumptions cost a robot at a pose, or over many.
+    """What the model's assumptions cost a robot.
 
-    In position, rotation and energy: linear closures, beams instead of solids, weight
+    At a pose or over many, in position, rotation and energy: linear closures, beams
+    instead of solids, weight
     at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
     or 1 % is marked.  With --solids also in the platform's stiffness.  Exit status 1
     when there is nothing to compare: a robot without errors and load.
