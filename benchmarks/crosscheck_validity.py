@@ -2,8 +2,7 @@
 
 Run ``python benchmarks/crosscheck_validity.py``: five minutes.  It prints the tables of
 ``docs/validity.md`` and writes its figures and ``validity.json`` to ``docs/``, or to a
-folder that is given.  The bars' finite elements, ten minutes more, are kept beside this
-file in ``validity_bars.json`` and done again where that is missing.
+folder that is given.
 
 Errors are drawn up to a size in rad about, and a hundredth of it in m along, each axis,
 over 5 poses x 4 draws a robot.  Joints are tight but for disc and cone.
@@ -26,7 +25,7 @@ from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.solvers.conic import SolverFailed
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness
+from validation.assumptions.solid_links import solid_links
 from validation.assumptions.validity import (
     Cost,
     bush_cost,
@@ -39,7 +38,6 @@ from validation.multibody.simulation import without_clearance
 FORKS = Path(__file__).parents[1] / "meshes" / "distal_forks.stl"
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
 BORES = ("bore=0,0,0/0,1,0/0.011", "bore=0,0,0.452/0,1,0/0.011")
-KEPT = Path(__file__).parent / "validity_bars.json"
 PAPER = 0.02  # [rad] the paper's errors
 SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.04)  # [rad]
 BARS = (3.0, 5.0, 8.0, 11.3, 16.0, 24.0)  # [-] length over radius
@@ -105,20 +103,12 @@ def row(
             costs.append(cost(posture, *arguments))
         except SolverFailed as error:
             print(*head, error, file=sys.stderr)
-    columns = {k: [getattr(c, k) for c in costs] for k in vars(costs[0])}
+    names = ("rotation", "position", "energy")
+    columns = {k: [getattr(c, k) for c in costs] for k in names}
     spread = {k: [float(np.median(v)), float(max(v))] for k, v in columns.items()}
     beyond = float(np.mean([c.matters for c in costs]))
     named = dict(zip(("robot", "assumption", "case", "x"), head, strict=True))
     return named | spread | {"beyond": beyond, "cases": len(costs)}
-
-
-def bar_compliances() -> dict[float, np.ndarray]:
-    """Unit compliance of round bars by slenderness, good to 0.2 per cent."""
-    if not KEPT.is_file():
-        costs = {ratio: bar_compliance(ratio, 0.3, 0.002).tolist() for ratio in BARS}
-        KEPT.write_text(json.dumps(costs, indent=0) + "\n")
-    kept = json.loads(KEPT.read_text())
-    return {float(ratio): np.array(C) for ratio, C in kept.items()}
 
 
 def closures(name: str) -> Iterable[dict]:
@@ -131,16 +121,13 @@ def closures(name: str) -> Iterable[dict]:
             yield row((name, "closures", case, size), erred, closure_cost, load)
 
 
-def beams(name: str, bars: dict[float, np.ndarray]) -> Iterable[dict]:
+def beams(name: str) -> Iterable[dict]:
     """(b) over slenderness, for the paper's errors and for 1 kN without any."""
-    for slenderness, compliance in bars.items():
+    for slenderness in BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
-        solids = {
-            frame.name: bar_stiffness(frame, compliance)
-            for frame in cases[0].robot.frames
-            if isinstance(frame.link, BeamLink)
-        }
+        bars = solid_links(cases[0].robot)
+        solids = {frame: bar.condensed for frame, bar in bars.items()}
         for case, load, several in (("errors", None, cases), ("1 kN", DOWN, none)):
             head = (name, "beams", case, slenderness)
             yield row(head, several, link_cost, solids, load)
@@ -277,9 +264,8 @@ def main() -> None:
         sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs"
     )
     rows: list[dict] = []
-    bars = bar_compliances()
     for name in POSES:
-        for part in (closures(name), beams(name, bars), weights(name), discs(name)):
+        for part in (closures(name), beams(name), weights(name), discs(name)):
             costs = list(part)
             print(f"\n{name}: {costs[0]['assumption']}\n")
             print_table(costs)

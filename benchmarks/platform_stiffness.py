@@ -1,7 +1,7 @@
 """K_C of the paper's robot over its half workspace: time beside that of (22).
 
 ``python -m benchmarks.platform_stiffness`` prints microseconds a posture, the least of
-several runs in turn, and how far K_C is from the road for one posture.
+several runs in turn, and how far K_C is from that of one posture at a time.
 """
 
 import time
@@ -64,7 +64,7 @@ def main() -> None:
         C = without_clearance(postures[i]).compliance
         size = np.sqrt(np.diag(C))
         worst = max(worst, np.abs((batched[i] - C) / np.outer(size, size)).max())
-    print(f"largest difference from the road for one posture: {worst:.1e}")
+    print(f"largest difference from one posture at a time: {worst:.1e}")
 
 
 def everything(robot, transforms) -> None:  # type: ignore[no-untyped-def]

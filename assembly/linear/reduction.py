@@ -238,7 +238,9 @@ def _rigid_rows(
     )
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    allowed = 1e-12 + 10 * tolerance * errors
+    # rows count as rigid by a tolerance: of what loads bend that much is left in them
+    bent = np.abs(right).max(initial=0.0)
+    allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]
     return (
         independent.T @ rows,

@@ -7,16 +7,15 @@ leaves out points nearer than an interface's radius to a clamped, singular edge.
 stress of a link given by its stiffness alone is not known.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.mesh_link import mesh_turn
+from assembly.model.mesh_link import mesh_turn, solved_mesh
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
-from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 
@@ -99,38 +98,6 @@ def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:
     return peaks.reshape(*w.shape[:-2], len(links))
 
 
-def safety_factors(
-    robot: Robot, peaks: ArrayLike, strength: Mapping[str, float] | float
-) -> NDArray:
-    """Yield strength over peak stress.
-
-    Args:
-        robot: whose links these are.
-        peaks: (..., links) [Pa] of :func:`peak_stresses`.
-        strength: [Pa] yield strength of all links, or by frame.
-
-    Returns:
-        (..., links): below 1 the link yields; inf without stress, NaN for links whose
-        strength is not given.
-
-    Raises:
-        BadInput: a name is not a frame of known stress, or a strength is not > 0.
-    """
-    links = stressed_links(robot)
-    if not isinstance(strength, Mapping):
-        strength = {link.frame: float(strength) for link in links}
-    known = {link.frame for link in links}
-    for name, value in strength.items():
-        robot.index(name)
-        if name not in known:
-            raise BadInput(f"yield strength: the stress in {name!r} is not known")
-        if not 0 < value < np.inf:
-            raise BadInput(f"yield strength: found {value}, expected a number > 0")
-    limits = np.array([strength.get(link.frame, np.nan) for link in links])
-    with np.errstate(divide="ignore"):
-        return limits / np.asarray(peaks, dtype=float)
-
-
 def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
     """Peak stress of a beam."""
     assert isinstance(frame.link, BeamLink)
@@ -146,22 +113,11 @@ def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
     """Peak stress of a link given by its surface."""
-    from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.material import Material
     from stiffness.fem.stress import stress_influence, von_mises
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
 
     link = frame.link
     assert isinstance(link, MeshLink)
-    place = f'frame "{frame.name}".link.mesh'
-    solved = solve_link(
-        read_surface(link.surface, link.unit),
-        parse_interface(link.base, f"{place}.base"),
-        parse_interface(link.tip, f"{place}.tip"),
-        (Material(link.young, link.poisson),),
-        options=FemOptions(interface=link.interface),
-    )  # fmt: skip
+    solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
     influence = stress_influence(solved)
     R = mesh_turn(frame, solved.link.tip - solved.link.base)
 

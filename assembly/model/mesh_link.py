@@ -1,4 +1,6 @@
-"""K_E of a mesh link, rotated from the mesh's axes to the frame's."""
+"""A mesh link's finite elements, solved once, rotated to its frame's axes."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,9 @@ from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.beam import section_axes
 from stiffness.link import LinkStiffness, turn_link
 from stiffness.screws import rotation_matrix
+
+if TYPE_CHECKING:
+    from stiffness.fem.fea import MeshedLink
 
 
 def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
@@ -29,7 +34,7 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
     if not isinstance(link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     place = f'frame "{frame.name}".link.mesh'
-    solved = _solved(link, accuracy, place)
+    solved = solved_mesh(link, place, accuracy).link
     span = solved.tip - solved.base
     turn = mesh_turn(frame, span)
     if link.axis is None:
@@ -42,14 +47,32 @@ def mesh_compliance(frame: Frame) -> NDArray:
     return mesh_link_stiffness(frame).compliance
 
 
-_SOLVED: dict[tuple, LinkStiffness] = {}  # by this process
+_SOLVED: "dict[tuple[object, ...], MeshedLink]" = {}  # by this process
 
 
-def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
-    """Stiffness in the mesh's axes; links of one shape and material are solved once."""
-    from stiffness.fem.fea import FemOptions, mesh_link
+def solved_mesh(
+    link: MeshLink, place: str = "mesh", accuracy: float = 0.005
+) -> "MeshedLink":
+    """The finite elements of a mesh link, in the mesh's axes.
+
+    Stiffness, mass, stress and the solid itself are all read from the same solution;
+    links of one shape and material are solved once.
+
+    Args:
+        link: whose surface is meshed.
+        place: of the link, for messages.
+        accuracy: asked of every entry of K_E, relative to sqrt(K_ii K_jj).
+
+    Returns:
+        The link on its finest mesh.
+
+    Raises:
+        BadInput: the surface or an interface is not usable.
+    """
+    from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
 
     try:
         stamp = link.surface.stat().st_mtime_ns
@@ -58,19 +81,17 @@ def _solved(link: MeshLink, accuracy: float, place: str) -> LinkStiffness:
             f"{place}: surface {link.surface} cannot be read: {error.strerror}"
         ) from None
     shape = (link.surface, stamp, link.unit, repr(link.base), repr(link.tip))
-    key = (*shape, link.young, link.poisson, link.interface, accuracy)
+    density = link.density or 0.0
+    key = (*shape, link.young, link.poisson, density, link.interface, accuracy)
     if key not in _SOLVED:
-        _SOLVED[key] = mesh_link(
-            link.surface,
+        _SOLVED[key] = solve_link(
+            read_surface(link.surface, link.unit),
             parse_interface(link.base, f"{place}.base"),
             parse_interface(link.tip, f"{place}.tip"),
-            Material(link.young, link.poisson),
-            unit=link.unit, options=FemOptions(accuracy, link.interface),
-        )  # fmt: skip
+            (Material(link.young, link.poisson, density),),
+            options=FemOptions(accuracy, link.interface),
+        )
     return _SOLVED[key]
-
-
-_MASSES: dict[tuple, tuple[NDArray, NDArray]] = {}  # by this process
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
@@ -87,29 +108,16 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
         BadInput: the surface or an interface is not usable.
         ValueError: the frame has no mesh link.
     """
-    from stiffness.fem.fea import solve_link
-    from stiffness.fem.material import Material
     from stiffness.fem.two_ends import two_ends
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
 
     link = frame.link
     if not isinstance(link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
-    key = (link.surface, link.surface.stat().st_mtime_ns, link.unit, repr(link.base),
-           repr(link.tip), link.young, link.poisson, link.density)  # fmt: skip
-    if key not in _MASSES:
-        material = Material(link.young, link.poisson, link.density or 0.0)
-        solved = solve_link(
-            read_surface(link.surface, link.unit), parse_interface(link.base),
-            parse_interface(link.tip), [material],
-        )  # fmt: skip
-        span = solved.centers[1] - solved.centers[0]
-        _MASSES[key] = two_ends(solved).mass, span
-    mass, span = _MASSES[key]
+    solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
+    span = solved.centers[1] - solved.centers[0]
     turn = mesh_turn(frame, span)
     R = np.kron(np.eye(4), turn)
-    return R @ mass @ R.T, turn @ span
+    return R @ two_ends(solved).mass @ R.T, turn @ span
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:

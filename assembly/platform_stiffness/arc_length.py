@@ -100,7 +100,7 @@ class _Path:
         loads = dead_loads(self.posture, wrench, gravity=self.gravity)
         return expand(placement, loads, np.zeros(len(placement.residual)))
 
-    def pull(self, local: Expansion) -> NDArray:
+    def reference_load(self, local: Expansion) -> NDArray:
         """(N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
         return work_gradient(local.placement, unit)
@@ -173,7 +173,7 @@ def _begin(
 ) -> tuple[_Place, _Path]:
     """The first equilibrium, its tangent, and the weight that balances both lengths."""
     local = start.expansion
-    B, q = local.basis, path.pull(local)
+    B, q = local.basis, path.reference_load(local)
     motion = B @ np.linalg.solve(B.T @ local.hessian @ B, B.T @ q)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
     weight = 1.0 / (size or 1.0) ** 2  # nothing gives way along a rigid bar
@@ -230,7 +230,7 @@ def _solve(
     B = local.basis
     M = np.zeros((B.shape[1] + 1, B.shape[1] + 1))
     M[:-1, :-1] = B.T @ local.hessian @ B
-    M[:-1, -1] = -(B.T @ path.pull(local))
+    M[:-1, -1] = -(B.T @ path.reference_load(local))
     M[-1, :-1], M[-1, -1] = normal_to @ B, rise
     try:
         return np.linalg.solve(M, -left)

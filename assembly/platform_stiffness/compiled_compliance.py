@@ -10,6 +10,8 @@ C = sum of y y' (Castigliano).  Built from :mod:`assembly.linear.compiled_reduct
 problem (22) is, and as exact: no compliances are added before anything is eliminated.
 """
 
+from typing import NamedTuple
+
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
@@ -31,14 +33,32 @@ _NOISE = 1e-12
 _STILL = 1e-9  # [-] of a unit wrench's work on a free motion that counts as none
 
 
+class Triangle(NamedTuple):
+    """Columns brought to a triangle by reflections, as ``triangulate`` leaves them.
+
+    Attributes:
+        columns: (n, m) reflectors and the triangle, a column in each row.
+        turns: (n,) sizes of the reflectors.
+        diagonal: (n,) of the triangle.
+        order: (n,) in which columns were taken.
+        rank: how many are independent.
+    """
+
+    columns: NDArray
+    turns: NDArray
+    diagonal: NDArray
+    order: NDArray
+    rank: int
+
+
 @kernel(fastmath={"contract", "reassoc"})
-def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
+def springs_of(s: Structure, P: NDArray, wrenches: NDArray, out: NDArray) -> None:
     """Scaled deformation of every spring under a unit wrench.
 
     Args:
         s: the robot.
         P: unit screws of all frames.
-        pull: (np + 1, 6) the closures' wrench on each pattern, and the platform's.
+        wrenches: (np + 1, 6) the closures' wrench on each pattern, and the platform's.
         out: (ny,) to fill.
     """
     wrench = vector(6)
@@ -50,8 +70,8 @@ def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
             for axis in range(6):
                 work = 0.0
                 for a in range(6):
-                    through = pull[s.pattern_of[j], a]
-                    through += s.on_path[j] * pull[len(pull) - 1, a]
+                    through = wrenches[s.pattern_of[j], a]
+                    through += s.on_path[j] * wrenches[len(wrenches) - 1, a]
                     work += P[j, axis, a] * through
                 wrench[axis] = work
             last = j
@@ -62,44 +82,50 @@ def springs_of(s: Structure, P: NDArray, pull: NDArray, out: NDArray) -> None:
 
 
 @kernel(fastmath={"contract", "reassoc"})
-def pulls(s: Structure, closing: NDArray, pull: NDArray) -> None:
+def closure_wrenches(s: Structure, closing: NDArray, wrenches: NDArray) -> None:
     """The closures' wrench on frames of each pattern, into all rows but the last."""
     for g in range(len(s.patterns)):
-        fill(pull[g], 0.0)
+        fill(wrenches[g], 0.0)
         for k in range(s.patterns.shape[1]):
             sign = s.patterns[g, k]
             if sign != 0.0:
                 for a in range(6):
-                    pull[g, a] += sign * closing[6 * k + a]
+                    wrenches[g, a] += sign * closing[6 * k + a]
 
 
 @kernel(fastmath={"contract", "reassoc"})
 def hold_free_motions(
-    s: Structure, P: NDArray, F: NDArray, turns: NDArray, diagonal: NDArray,
-    order: NDArray, rank: int, row: int, closing: NDArray,
-) -> bool:  # fmt: skip
+    s: Structure, P: NDArray, free: Triangle, row: int, closing: NDArray
+) -> bool:
     """Closures' wrenches of least size with which a unit wrench moves nothing free.
+
+    Args:
+        s: the robot.
+        P: unit screws of all frames.
+        free: the free motions' columns.
+        row: of the unit wrench.
+        closing: (m,) to fill.
 
     Returns:
         Whether there are any.
     """
     fill(closing, 0.0)
-    for i in range(len(F)):
-        j = s.free_frame[order[i]]
-        left = -s.on_path[j] * P[j, s.free_axis[order[i]], row]
-        for l in range(min(i, rank)):
-            left -= F[i, l] * closing[l]
-        if i < rank:
-            closing[i] = left / diagonal[i]
+    for i in range(len(free.columns)):
+        j = s.free_frame[free.order[i]]
+        left = -s.on_path[j] * P[j, s.free_axis[free.order[i]], row]
+        for l in range(min(i, free.rank)):
+            left -= free.columns[i, l] * closing[l]
+        if i < free.rank:
+            closing[i] = left / free.diagonal[i]
         elif abs(left) > _STILL:
             return False
-    turn(F, turns, rank, closing)
+    turn(free.columns, free.turns, free.rank, closing)
     return True
 
 
 @kernel(fastmath={"contract", "reassoc"})
 def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
-    """One posture: every spring under six unit wrenches, or why there is no answer.
+    """One posture: every spring under six unit wrenches, or why there is none.
 
     Args:
         s: the robot.
@@ -115,10 +141,11 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     m, nq, groups = 6 * s.patterns.shape[1], len(s.free_frame), len(s.groups) - 1
     F = free_columns(s, P, m)
     turns, diagonal, order = vector(nq), vector(nq), indices(nq)
-    free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    if free < 0:
+    kept = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+    if kept < 0:
         return RANK
-    Z = orthogonal_rows(F, turns, free, m)
+    free = Triangle(F, turns, diagonal, order, kept)
+    Z = orthogonal_rows(F, turns, kept, m)
     L = grouped_springs(s, P)
     Y = spring_rows(s, Z, L)
     count = len(Z)
@@ -129,19 +156,19 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
     if rank < 0:
         return RANK
     closing, bent, mu = vector(m), vector(6 * groups), vector(count)
-    pull = matrix(len(s.patterns) + 1, 6)
+    wrenches = matrix(len(s.patterns) + 1, 6)
     for row in range(6):
-        if not hold_free_motions(s, P, F, turns, diagonal, order, free, row, closing):
+        if not hold_free_motions(s, P, free, row, closing):
             return FREE
-        fill(pull[len(pull) - 1], 0.0)
-        pull[len(pull) - 1, row] = 1.0
-        pulls(s, closing, pull)
+        fill(wrenches[len(wrenches) - 1], 0.0)
+        wrenches[len(wrenches) - 1, row] = 1.0
+        closure_wrenches(s, closing, wrenches)
         for g in range(groups):
             for b in range(6):
                 total = 0.0
                 for a in range(6):
-                    through = pull[s.group_pattern[g], a]
-                    through += s.group_on_path[g] * pull[len(pull) - 1, a]
+                    through = wrenches[s.group_pattern[g], a]
+                    through += s.group_on_path[g] * wrenches[len(wrenches) - 1, a]
                     total += L[g, a, b] * through
                 bent[6 * g + b] = total
         # least squares by the triangle of Y: its rows are those of Z, reordered
@@ -154,14 +181,14 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
         for i in range(rank):
             for a in range(m):
                 closing[a] += mu[i] * Z[y_order[i], a]
-        pulls(s, closing, pull)
-        springs_of(s, P, pull, out[row])
+        closure_wrenches(s, closing, wrenches)
+        springs_of(s, P, wrenches, out[row])
     return SOLVED
 
 
 @kernel(fastmath={"contract", "reassoc"})
 def comply_all(
-    s: Structure, T: NDArray, mismatch: NDArray, out: NDArray, road: NDArray
+    s: Structure, T: NDArray, mismatch: NDArray, out: NDArray, status: NDArray
 ) -> None:
     """Many postures; see :func:`comply`.
 
@@ -170,7 +197,7 @@ def comply_all(
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m].
         out: (k, 6, ny) to fill.
-        road: (k,) to fill.
+        status: (k,) to fill.
     """
     for point in range(len(T)):
-        road[point] = comply(s, T[point], mismatch[point], out[point])
+        status[point] = comply(s, T[point], mismatch[point], out[point])

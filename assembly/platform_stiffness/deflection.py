@@ -91,7 +91,7 @@ class _Point:
     """An equilibrium on the curve."""
 
     load: float
-    answer: Assembly | ExactAssembly
+    equilibrium: Assembly | ExactAssembly
     tangent: PlatformStiffness
     pressed: frozenset[str]
 
@@ -147,7 +147,7 @@ def load_deflection(
     axis = np.eye(6)[component]
     return DeflectionCurve(
         posture, component, np.array([p.load for p in points]), np.array(screws),
-        np.array([p.answer.energy for p in points]),
+        np.array([p.equilibrium.energy for p in points]),
         np.array([p.tangent.along(axis)[0] for p in points]),
         tuple(p.pressed for p in points), np.array(open_), tuple(events),
     )  # fmt: skip
@@ -162,28 +162,32 @@ def _solve(
         linear = solve_assembly(posture, wrench, gravity=gravity)
         names = clearance_names(linear.joints, contacts(linear)[0])
         return _Point(value, linear, in_contact(linear, "letting go"), names)
-    start = near.answer if near and isinstance(near.answer, ExactAssembly) else None
+    start = (
+        near.equilibrium
+        if near and isinstance(near.equilibrium, ExactAssembly)
+        else None
+    )
     try:
-        answer = solve_exact(posture, wrench, gravity=gravity, near=start)
+        equilibrium = solve_exact(posture, wrench, gravity=gravity, near=start)
     except SolverFailed:
         if start is None:
             raise
-        answer = solve_exact(posture, wrench, gravity=gravity)
-    active, _ = active_clearances(answer.expansion)
-    names = clearance_names(answer.expansion.placement.model.joints, active)
-    return _Point(value, answer, exact_tangent(answer, "letting go"), names)
+        equilibrium = solve_exact(posture, wrench, gravity=gravity)
+    active, _ = active_clearances(equilibrium.expansion)
+    names = clearance_names(equilibrium.expansion.placement.model.joints, active)
+    return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
 
 
 def _settled(
     point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None
 ) -> tuple[NDArray, bool]:
     """Platform screw, where play leaves it open the one nearest to nominal."""
-    answer = point.answer
+    equilibrium = point.equilibrium
     idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
-    if idle and isinstance(answer, Assembly):
-        nearest, open_ = nearest_pose(answer, np.zeros(3))
+    if idle and isinstance(equilibrium, Assembly):
+        nearest, open_ = nearest_pose(equilibrium, np.zeros(3))
         return nearest.platform_screw, open_
-    return answer.platform_screw, bool(point.tangent.free.shape[1])
+    return equilibrium.platform_screw, bool(point.tangent.free.shape[1])
 
 
 def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
@@ -230,14 +234,16 @@ def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[
             before, after, at, lambda p: _apart(before, p) < _apart(p, after)
         )
         if _jumps(low, high, component):  # else it was but soft on the way
-            way = numbers(high.answer.platform_screw - low.answer.platform_screw)
+            way = numbers(
+                high.equilibrium.platform_screw - low.equilibrium.platform_screw
+            )
             events.append(_event(high, "jump", f"by {way} rad, m", component))
     return events
 
 
 def _event(point: _Point, kind: str, what: str, component: int) -> Event:
     """What happens at a point."""
-    moved = float(point.answer.platform_screw[component])
+    moved = float(point.equilibrium.platform_screw[component])
     return Event(point.load, kind, what, moved)
 
 
@@ -256,7 +262,7 @@ def _bracket(
 
 def _apart(one: _Point, other: _Point) -> float:
     """[m] between the platforms of two equilibria, rotations times the length."""
-    change = other.answer.platform_screw - one.answer.platform_screw
+    change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
 

@@ -35,18 +35,20 @@ from assembly.platform_stiffness.matrices import (
 _FLAT = 1e-12  # of the largest curvature: what less counts as none
 
 
-def exact_tangent(answer: ExactAssembly, side: Side = "holding") -> PlatformStiffness:
+def exact_tangent(
+    equilibrium: ExactAssembly, side: Side = "holding"
+) -> PlatformStiffness:
     """How stiff the platform is at an exact equilibrium.
 
     Args:
-        answer: the manipulator assembled with finite motions, under its loads.
+        equilibrium: the manipulator assembled with finite motions, under its loads.
         side: what clearances do that just touch their bound without a force.
 
     Returns:
         The stiffness at the platform's origin where it stands there, base axes; modes
         of negative curvature have the sign -1.
     """
-    local = answer.expansion
+    local = equilibrium.expansion
     model, at = local.placement.model, local.placement
     D, H = tangent_space(local, hold_touching=side == "holding")
     Q, R = np.linalg.qr(D / model.units[:, None])
@@ -57,16 +59,16 @@ def exact_tangent(answer: ExactAssembly, side: Side = "holding") -> PlatformStif
     bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))
     moves, length = platform_moves(local), model.size
     return PlatformStiffness(
-        answer.posture, "exact", at.platform[:3, 3].copy(), length, moves @ bent,
-        np.sign(curvature[~flat]), bent[model.springs], part_owners(answer),
+        equilibrium.posture, "exact", at.platform[:3, 3].copy(), length, moves @ bent,
+        np.sign(curvature[~flat]), bent[model.springs], part_owners(equilibrium),
         unit_screws(moves @ modes[:, flat], length),
     )  # fmt: skip
 
 
-def part_owners(answer: ExactAssembly) -> tuple[Part, ...]:
+def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
     """Whose springs they are; pieces belong to their beam."""
-    cut, frames = answer.cut, answer.posture.robot.frames
-    parts = owners(answer.expansion.placement.model.joints)
+    cut, frames = equilibrium.cut, equilibrium.posture.robot.frames
+    parts = owners(equilibrium.expansion.placement.model.joints)
     rows = [cut.owner[cut.robot.index(part.frame)] for part in parts]
     return tuple(
         Part(frames[row].name, part.kind) for row, part in zip(rows, parts, strict=True)

@@ -56,21 +56,21 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
                       joints.free)  # fmt: skip
 
 
-def in_contact(answer: Assembly, side: Side = "holding") -> PlatformStiffness:
+def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
     """The tangent of problem (22): clearances are free, or pressed, as they are there.
 
     Args:
-        answer: the manipulator at least energy under its loads.
+        assembly: the manipulator at least energy under its loads.
         side: what clearances do that just touch their bound without a force.
 
     Returns:
         The stiffness at the platform's origin, second derivative of the least
         potential.
     """
-    joints, u = answer.joints, answer.clearances
-    pressed, touching = contacts(answer)
+    joints, u = assembly.joints, assembly.clearances
+    pressed, touching = contacts(assembly)
     held = pressed | (touching & (side == "holding"))
-    force = _forces(answer)
+    force = _forces(assembly)
     springs, names, free = [joints.elastic], owners(joints), [joints.free]
     for k, is_held in enumerate(held):
         rows = np.flatnonzero(joints.group == k)
@@ -84,33 +84,33 @@ def in_contact(answer: Assembly, side: Side = "holding") -> PlatformStiffness:
                 names.append(Part(_frame(joints, rows[0]), "clearance"))
             else:
                 free.append(along[:, None] / np.linalg.norm(along))
-    return _stiffness(answer.linearisation, "in contact", np.hstack(springs), names,
+    return _stiffness(assembly.linearisation, "in contact", np.hstack(springs), names,
                       np.hstack(free))  # fmt: skip
 
 
-def contacts(answer: Assembly) -> tuple[NDArray, NDArray]:
+def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
     """Clearances that carry a force, and those that touch their bound without one.
 
     Args:
-        answer: the manipulator at least energy.
+        assembly: the manipulator at least energy.
 
     Returns:
         (cones,) bool each.
     """
-    force = _forces(answer)
-    size = cone_sizes(answer.clearances, answer.joints.group)
+    force = _forces(assembly)
+    size = cone_sizes(assembly.clearances, assembly.joints.group)
     at_bound = size >= 1.0 - _AT_BOUND
     least = max(
-        _PRESSED * force.max(initial=0.0), _ROUNDING * answer.energy_without_clearance
+        _PRESSED * force.max(initial=0.0), _ROUNDING * assembly.energy_without_clearance
     )
     pressed = at_bound & (force > least)
     return pressed, at_bound & ~pressed
 
 
-def _forces(answer: Assembly) -> NDArray:
+def _forces(assembly: Assembly) -> NDArray:
     """(cones,) [J] force on each clearance times its bound."""
-    pull = answer.joints.cones.T @ answer.joint_wrenches.ravel()
-    return cone_sizes(pull, answer.joints.group)
+    forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
+    return cone_sizes(forces, assembly.joints.group)
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:

@@ -121,7 +121,7 @@ def platform_stiffnesses(
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
 
     Returns:
-        Compliances and shares in the order given; those that the compiled road does
+        Compliances and shares in the order given; those that the compiled one does
         not cover are found one by one.
     """
     from assembly.platform_stiffness.compiled_compliance import SOLVED, comply_all
@@ -130,8 +130,8 @@ def platform_stiffnesses(
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     joints, structure = structure_of(robot)
     inner = np.zeros((len(T), 6, len(structure.springs)))
-    road = np.zeros(len(T), dtype=np.int64)
-    comply_all(structure, T, off, inner, road)
+    status = np.zeros(len(T), dtype=np.int64)
+    comply_all(structure, T, off, inner, status)
     size = size_of(robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths
@@ -140,11 +140,11 @@ def platform_stiffnesses(
     alone = np.setdiff1d(np.arange(springs.shape[1]), structure.spring_order)
     if alone.size:
         springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
-    for i in np.flatnonzero(road != SOLVED).tolist():
+    for i in np.flatnonzero(status != SOLVED).tolist():
         q = np.full(len(robot.frames), np.nan)
         one = without_clearance(Posture(robot, q, T[i], float(off[i])))
         springs[i] = np.nan if one.free.size else one.springs @ one.root.T
-    return Stiffnesses(robot, size, springs, tuple(owners(joints)), road != SOLVED)
+    return Stiffnesses(robot, size, springs, tuple(owners(joints)), status != SOLVED)
 
 
 def _outside_closures(robot: Robot, T: NDArray, columns: NDArray) -> NDArray:

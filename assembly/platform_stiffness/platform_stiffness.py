@@ -53,14 +53,14 @@ def platform_stiffness(
         ValueError: no such state.
     """
     if state == "without clearance":
-        answer, platform = without_clearance(posture), posture.platform
+        tangent, platform = without_clearance(posture), posture.platform
     elif state == "in contact":
         linear = solve_assembly(posture, load, gravity=gravity)
-        answer, platform = in_contact(linear, side), posture.platform
+        tangent, platform = in_contact(linear, side), posture.platform
     elif state == "exact":
         exact = solve_exact(posture, load, gravity=gravity)
-        answer, platform = exact_tangent(exact, side), exact.placement.platform
+        tangent, platform = exact_tangent(exact, side), exact.placement.platform
     else:
         raise ValueError(f"platform_stiffness: no state {state!r}")
     offset = np.asarray(at, dtype=float)
-    return answer.at(platform[:3, 3] + platform[:3, :3] @ offset)
+    return tangent.at(platform[:3, 3] + platform[:3, :3] @ offset)

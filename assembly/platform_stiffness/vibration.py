@@ -92,22 +92,22 @@ def natural_modes(
         tight = replace(posture.robot, frames=tuple(frames))
         posture = replace(posture, robot=tight.with_errors(0 * tight.errors))
         load = gravity = None
-    answer = solve_exact(posture, load, gravity=gravity)
-    D, H = tangent_space(answer.expansion)
-    M = D.T @ mass_matrix(answer) @ D
+    equilibrium = solve_exact(posture, load, gravity=gravity)
+    D, H = tangent_space(equilibrium.expansion)
+    M = D.T @ mass_matrix(equilibrium) @ D
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M)
     squares, modes, idle = _without_idle(
-        squares, modes, platform_moves(answer.expansion) @ D
+        squares, modes, platform_moves(equilibrium.expansion) @ D
     )
     squares, x = squares[:count], D @ modes[:, :count]
     with np.errstate(invalid="ignore"):
         frequencies = np.sqrt(squares) / (2 * np.pi)
-    bent = x[answer.expansion.placement.model.springs] * (squares != 0.0)
+    bent = x[equilibrium.expansion.placement.model.springs] * (squares != 0.0)
     return NaturalModes(
-        posture, frequencies, platform_moves(answer.expansion) @ x,
-        tuple(_shares(part_owners(answer), y) for y in bent.T), idle,
+        posture, frequencies, platform_moves(equilibrium.expansion) @ x,
+        tuple(_shares(part_owners(equilibrium), y) for y in bent.T), idle,
     )  # fmt: skip
 
 
@@ -172,53 +172,53 @@ def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
     return {part: energies[part] / whole for part in order}
 
 
-def mass_matrix(answer: ExactAssembly) -> NDArray:
+def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
     """(N, N) [kg m^2 per squared unit] mass of all bodies in the unknowns there.
 
     Args:
-        answer: an equilibrium.
+        equilibrium: an equilibrium.
 
     Returns:
         Symmetric, positive semidefinite.
     """
-    here, robot = answer.placement, answer.cut.robot
-    M = np.zeros((len(here.x), len(here.x)))
+    placement, robot = equilibrium.placement, equilibrium.cut.robot
+    M = np.zeros((len(placement.x), len(placement.x)))
     for i, frame in enumerate(robot.frames):
-        T = here.body_ends[i]
-        tip = _body_motion(answer, i)
+        T = placement.body_ends[i]
+        tip = _body_motion(equilibrium, i)
         if frame.mass:
             centre = T[:3, 3] + T[:3, :3] @ frame.centre_of_mass
-            moved = (screw_map(answer.posture.platform[:3, 3] - centre) @ tip)[3:]
+            moved = (screw_map(equilibrium.posture.platform[:3, 3] - centre) @ tip)[3:]
             M += frame.mass * moved.T @ moved
         link = frame.link
         if isinstance(link, BeamLink) and link.density is not None:
             length, axis = beam_axis(frame)
             axes = section_axes(axis, link.up)
-            B = _ends(answer, i, tip, length * axis, axes)
+            B = _ends(equilibrium, i, tip, length * axis, axes)
             M += B.T @ _beam_mass(frame) @ B
         elif isinstance(link, MeshLink) and link.density is not None:
             inertia, span = mesh_link_mass(frame)
-            B = _ends(answer, i, tip, span, np.eye(3))
+            B = _ends(equilibrium, i, tip, span, np.eye(3))
             M += B.T @ inertia @ B
     return M
 
 
-def _body_motion(answer: ExactAssembly, i: int) -> NDArray:
+def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
     """(6, N) small motion of the body of frame i, at the platform's nominal origin."""
-    model = answer.placement.model
-    above = answer.cut.robot.on_path[i].copy()
+    model = equilibrium.placement.model
+    above = equilibrium.cut.robot.on_path[i].copy()
     above[i] = False
     own = (model.frame == i) & (model.motion == LINK)
-    return answer.placement.moves * (above[model.frame] | own)
+    return equilibrium.placement.moves * (above[model.frame] | own)
 
 
 def _ends(
-    answer: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
+    equilibrium: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
 ) -> NDArray:
     """(12, N) motion of a link's base and tip, each at its place.
 
     Args:
-        answer: an equilibrium.
+        equilibrium: an equilibrium.
         i: the link's frame.
         tip: (6, N) of the body's end, at the platform's nominal origin.
         span: (3,) [m] from base to tip, in the frame's axes.
@@ -227,13 +227,13 @@ def _ends(
     Returns:
         Turns and shifts of the base, then of the tip.
     """
-    here, robot = answer.placement, answer.cut.robot
+    placement, robot = equilibrium.placement, equilibrium.cut.robot
     above = robot.on_path[i].copy()
     above[i] = False
-    base = here.moves * above[here.model.frame]
-    T = here.body_ends[i]
+    base = placement.moves * above[placement.model.frame]
+    T = placement.body_ends[i]
     turned = T[:3, :3] @ axes
-    origin = answer.posture.platform[:3, 3]
+    origin = equilibrium.posture.platform[:3, 3]
     start = T[:3, 3] - T[:3, :3] @ span
     ends = []
     for place, motion in ((start, base), (T[:3, 3], tip)):

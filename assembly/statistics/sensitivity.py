@@ -1,8 +1,7 @@
 """Sensitivity to every geometric error, from multipliers and active clearances.
 
 The least energy (22) is the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w: its slope with delta l is minus the wrench through the body.  The margin
-(21) is the maximum of ``q.K dl``: its slope is ``K^T q`` of the optimal multipliers.
+wrenches w: its slope with delta l is minus the wrench through the body.
 
 Wrenches and the platform's screw are part of the solution.  While the active clearances
 stay the same, its slopes follow from the optimality conditions, differentiated:
@@ -17,34 +16,16 @@ with P the projector on these directions.  One solution of the transposed equati
 gives the slopes with any number of errors (adjoint method).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
-from assembly.batch.many_margins import prepare_margins
-from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.model.clearance import Compliant
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 
 _ACTIVE = 1e-7  # of the largest force on any cone: less is none
 _RANK = 1e-10  # of the equations: directions left undetermined do not move
-
-
-@dataclass(frozen=True, eq=False)
-class MarginSlopes:
-    """A margin and its slopes with each error.
-
-    Attributes:
-        margin: factor on all clearances at which the robot just assembles.
-        slopes: (n, 6) [1/rad, 1/m]; one of several where the margin has a kink.
-    """
-
-    margin: float
-    slopes: NDArray
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
@@ -60,27 +41,6 @@ def energy_slopes(assembly: Assembly) -> NDArray:
         of least size among many.
     """
     return -assembly.wrenches
-
-
-def margin_slopes(posture: Posture, compliant: Compliant = "free") -> MarginSlopes:
-    """Slopes of the zone's margin with every geometric error.
-
-    Args:
-        posture: of the robot with its errors.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
-
-    Returns:
-        The margin and its slopes.
-
-    Raises:
-        ValueError: ``compliant`` is something else, or the margin has no slopes: no
-            clearance helps, or the range of a passive joint's motion decides.
-    """
-    margins = prepare_margins(posture, compliant).solve(posture.robot.errors[None])
-    margin, slopes = float(margins.margin[0]), margins.slopes[0]
-    if not (np.isfinite(margin) and np.isfinite(slopes).all()):
-        raise ValueError("the margin has no slopes: no clearance limits it")
-    return MarginSlopes(margin, slopes)
 
 
 def solution_slopes(

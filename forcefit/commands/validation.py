@@ -225,34 +225,71 @@ def validity(
     solids: Annotated[
         bool,
         typer.Option(
-            "--solids", help="Also mesh round beams as solids; minutes for each shape."
+            "--solids", help="Also mesh links as solids; some seconds for each shape."
         ),
     ] = False,
+    grid: Annotated[
+        str | None,
+        typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
+    ] = None,
+    poses: Annotated[
+        Path | None, typer.Option(help="At every pose of a CSV: pose.tx .. or q.*.")
+    ] = None,
     json: JsonOption = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Also plot the stiffness's errors, as PNG, SVG or PDF."),
+    ] = None,
 ) -> None:
-    """What the model's assumptions cost a robot at a pose.
+    """What the model's assumptions cost a robot.
 
-    In position, rotation and energy: linear closures, beams instead of solids, weight
+    At a pose or over many, in position, rotation and energy: linear closures, beams
+    instead of solids, weight
     at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
-    or 1 % is marked.  Exit status 1 when there is nothing to compare: a robot without
-    errors and load.
+    or 1 % is marked.  With --solids also in the platform's stiffness.  Exit status 1
+    when there is nothing to compare: a robot without errors and load.
     """
-    from validation.assumptions.assumptions import (
-        assumption_costs,
+    from assembly.sweeps.targets import grid_targets, parse_grid, read_targets
+    from validation.assumptions.over_poses import costs_at, costs_over_poses
+    from validation.assumptions.platform_cost import PlatformCosts
+    from validation.assumptions.plot import platform_cost_figure
+    from validation.assumptions.report import (
         costs_table,
         costs_text,
-        stiffness_cost,
+        over_poses_table,
+        over_poses_text,
     )
-    from validation.assumptions.platform_cost import PlatformCost
-    from validation.assumptions.validity import Cost
 
-    posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
+    given = [bool(pose or joint), grid is not None, poses is not None]
+    if sum(given) > 1:
+        raise BadInput("expected one of --pose or --joint, --grid, --poses")
+    if figure is not None:
+        if not solids:
+            raise BadInput("--figure: expected --solids too; nothing else is drawn")
+        check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)
-    costs = assumption_costs(posture, wrench, g, solids)
-    platform = stiffness_cost(posture, solids)
-    write_json(costs_table(posture, costs, platform), json)
+    posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
+    if grid is None and poses is None:
+        costs = costs_at(posture, wrench, g, solids)
+        table, text = costs_table(costs), costs_text(costs)
+    else:
+        machine = posture.robot
+        targets = (
+            grid_targets(parse_grid(grid, machine))
+            if grid is not None
+            else read_targets(poses or "", machine)
+        )
+        with progress_bars() as update:
+            costs = costs_over_poses(
+                machine, targets, wrench, g, solids,
+                lambda done, total: update("poses", done, total),
+            )  # fmt: skip
+        table, text = over_poses_table(costs), over_poses_text(costs)
+    write_json(table, json)
     if json != "-":
-        print(costs_text(posture, costs, platform))
-    known = any(isinstance(cost, Cost) for cost in costs.values())
-    if not known and not isinstance(platform, PlatformCost):
+        print(text)
+    if figure is not None and isinstance(costs.platform, PlatformCosts):
+        name = posture.robot.name
+        save_figure(platform_cost_figure(costs.platform, costs.reached, name), figure)
+    if not costs.known:
         raise typer.Exit(1)

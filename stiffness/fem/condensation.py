@@ -8,7 +8,7 @@ over the area.  ``distributing-both`` does the same at the base, so that the sti
 does not depend on which end is called the tip.  Each is softer than the one before.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,13 @@ class Condensed:
         stiffness: (6, 6) at the tip's centre, base held.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
         unknowns: size of the system that was solved.
+        kind: of the interfaces, one of ``KINDS``.
     """
 
     stiffness: NDArray
     fields: NDArray
     unknowns: int
+    kind: str = "rigid"
 
 
 def condense(
@@ -60,8 +62,8 @@ def condense(
     if kind == "rigid":
         return _rigid(mesh, upper, centers[1])
     if kind == "distributing":
-        return _distributing_tip(mesh, upper, centers[1])
-    return _distributing_both(mesh, upper, centers)
+        return replace(_distributing_tip(mesh, upper, centers[1]), kind=kind)
+    return replace(_distributing_both(mesh, upper, centers), kind=kind)
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:

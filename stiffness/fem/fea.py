@@ -8,7 +8,7 @@ the asked accuracy is reached or the budget is used.
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
 from stiffness.mesh.mesh import MeshFailed, Solid, mesh_solid
+from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import Interface
 from stiffness.surface.patches import triangles_on
 from stiffness.surface.surface import Surface, read_surface
@@ -160,18 +161,63 @@ def solve_link(
     Raises:
         BadInput: an interface is not proper.
     """
-    accuracy, interface, budget = options.accuracy, options.interface, options.budget
     start = time.monotonic()
     centers = np.array([
         interface_center(surface, side, name)
         for side, name in ((base, "base"), (tip, "tip"))
     ])
-    level = solve_level(
-        first_mesh(surface, base, tip, budget, options.cache),
-        materials,
-        centers,
-        interface,
-    )
+    first = first_mesh(surface, base, tip, options.budget, options.cache)
+    level, error, report = _refined(first, materials, centers, options, start)
+    report |= {
+        "surface_volume": surface.volume,
+        "surface_area": surface.area,
+        "repairs": list(surface.repairs),
+    }
+    return _meshed(level, centers, error, report, options, point_masses)
+
+
+def solve_bar(
+    section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
+) -> MeshedLink:
+    """Solve a straight bar of unit length along z to an asked accuracy.
+
+    Args:
+        section: its lengths over the bar's, see
+            :func:`stiffness.mesh.straight_bar.straight_bar`.
+        material: of the bar.
+        options: how it is solved; no mesher runs.
+
+    Returns:
+        The bar and its finest mesh; base at z = 0, tip at z = 1, its section's y and z
+        along x and y.
+    """
+    centers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    first, start = straight_bar(section), time.monotonic()
+    level, error, report = _refined(first, (material,), centers, options, start)
+    return _meshed(level, centers, error, report, options, ())
+
+
+def _refined(
+    first: Solid,
+    materials: Sequence[Material],
+    centers: NDArray,
+    options: FemOptions,
+    start: float,
+) -> tuple[Level, NDArray, dict[str, Any]]:
+    """Solve on ever finer meshes until the error is small enough, or the budget used.
+
+    Args:
+        first: the mesh to begin with.
+        materials: the first fills the link, later ones where they say.
+        centers: (2, 3) [m] of the base and the tip interface.
+        options: how it is solved.
+        start: [s] since when the budget's seconds count.
+
+    Returns:
+        The finest mesh, the (6, 6) estimate of its stiffness's error, and what it took.
+    """
+    accuracy, interface, budget = options.accuracy, options.interface, options.budget
+    level = solve_level(first, materials, centers, interface)
     history, sizes = [level.totals()], [len(level.solid.cells)]
     while True:
         error, factor = estimated_error(history)
@@ -186,14 +232,16 @@ def solve_link(
         level = solve_level(solid, materials, centers, interface)
         history.append(level.totals())
         sizes.append(len(level.solid.cells))
-    report = _report(level, surface, len(history), start) | {
+    report = mesh_report(level.solid, level.mesh) | {
+        "unknowns": level.solution.unknowns,
+        "meshes": len(history),
+        "solver": solver_name(),
+        "seconds": time.monotonic() - start,
         "accuracy": accuracy,
         "reached": worst <= accuracy,
         "estimate_over_indicator": factor,
     }
-    method = f"finite elements, {interface} interfaces"
-    stiffness = _link(method, level, centers, error, report, point_masses)
-    return MeshedLink(stiffness, level, centers)
+    return level, error, report
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
@@ -305,34 +353,19 @@ def _affordable_mesh(
     return None
 
 
-def _report(
-    level: Level, surface: Surface, meshes: int, start: float
-) -> dict[str, Any]:
-    """The finest mesh, the surface it stands for, and what it took."""
-    return mesh_report(level.solid, level.mesh) | {
-        "unknowns": level.solution.unknowns,
-        "meshes": meshes,
-        "surface_volume": surface.volume,
-        "surface_area": surface.area,
-        "repairs": list(surface.repairs),
-        "solver": solver_name(),
-        "seconds": time.monotonic() - start,
-    }
-
-
-def _link(
-    method: str,
+def _meshed(
     level: Level,
     centers: NDArray,
     error: NDArray,
-    report: dict[str, Any],
+    report: Mapping[str, Any],
+    options: FemOptions,
     point_masses: Sequence[PointMass],
-) -> LinkStiffness:
-    """Everything known of the link, as a table."""
+) -> MeshedLink:
+    """Everything known of the link, with its finest mesh."""
     density = level.material[:, 2]
     mass, center, inertia = mass_properties(level.mesh, density, point_masses)
-    return LinkStiffness(
-        method=method,
+    link = LinkStiffness(
+        method=f"finite elements, {options.interface} interfaces",
         compliance=inverted(level.solution.stiffness),
         tip=centers[1],
         base=centers[0],
@@ -342,3 +375,4 @@ def _link(
         center_of_mass=center,
         inertia=inertia,
     )
+    return MeshedLink(link, level, centers)

@@ -2,7 +2,8 @@
 
 Held at neither end, rigid at both: between them the solid follows without inertia of
 its own (Guyan), so that the mass is exact for motions as a whole and as good as a
-beam's cubic for bending.
+beam's cubic for bending.  A motion of the base is one of the whole link less what that
+does to the tip, so that the fields of the held base tell everything.
 """
 
 from dataclasses import dataclass
@@ -10,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.fem.condensation import rigid_motions
-from stiffness.fem.elements import assemble, integration
+from stiffness.fem.condensation import condense, rigid_motions
+from stiffness.fem.elements import integration
 from stiffness.fem.fea import MeshedLink
-from stiffness.fem.sparse_solver import solve
+from stiffness.screws import screw_map
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +43,15 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
         Guyan (1965), Reduction of stiffness and mass matrices.
     """
     mesh, constants = solved.level.mesh, solved.level.material
-    upper = assemble(mesh, constants[:, 0], constants[:, 1])
-    fields = np.zeros((len(mesh.nodes), 3, 12))
-    free = np.ones(len(mesh.nodes), dtype=bool)
-    for side, center in enumerate(solved.centers):
-        nodes = np.unique(mesh.faces[mesh.patch == side])
-        columns = slice(6 * side, 6 * side + 6)
-        fields[nodes, :, columns] = rigid_motions(mesh.nodes[nodes], center)
-        free[nodes] = False
-    free = np.repeat(free, 3)
-    flat = fields.reshape(-1, 12)
-    full = upper + upper.T
-    full.setdiag(upper.diagonal())
-    flat[free] = solve(upper[free][:, free], -(full @ flat)[free])
-    K = flat.T @ (full @ flat)
+    held = solved.level.solution
+    if held.kind != "rigid":
+        held = condense(mesh, constants[:, 0], constants[:, 1], solved.centers)
+    base, tip = solved.centers
+    # motion of the tip against where the base takes it
+    against = np.hstack([-screw_map(base - tip), np.eye(6)])
+    K = against.T @ held.stiffness @ against
+    fields = np.einsum("nik,kj->nij", held.fields, against)
+    fields[:, :, :6] += rigid_motions(mesh.nodes, base)
     M = np.zeros((12, 12))
     for chunk in integration(mesh):
         at = np.einsum("qm,cmxk->cqxk", chunk.N, fields[mesh.cells[chunk.part]])

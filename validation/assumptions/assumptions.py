@@ -1,29 +1,23 @@
-"""All assumptions of ``validity.py`` at one posture, as a table."""
+"""All assumptions of ``validity.py`` at one posture."""
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
-from assembly.model.robot import BeamLink, beam_axis
+from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
 from stiffness.mesh.mesh import MeshFailed
 from validation.assumptions.platform_cost import (
     NoSolids,
-    PlatformCost,
-    platform_cost,
-    platform_cost_table,
-    platform_cost_text,
+    PlatformCosts,
+    platform_costs,
 )
-from validation.assumptions.round_bars import bar_compliance, bar_stiffness
+from validation.assumptions.solid_links import solid_link
 from validation.assumptions.validity import (
-    ENERGY_LIMIT,
-    POSITION_LIMIT,
     Cost,
     bush_cost,
     closure_cost,
@@ -34,7 +28,7 @@ from validation.assumptions.validity import (
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.multibody.simulation import without_clearance
 
-_NOT_MESHED = "not meshed; --solids does, in minutes"
+_NOT_MESHED = "not meshed; --solids does"
 NOTHING = "nothing to compare: without errors and load neither model moves"
 
 
@@ -52,7 +46,7 @@ def assumption_costs(
         posture: where the robot stands.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
-        solids: whether beams of full round section are meshed, which takes minutes.
+        solids: whether beams are meshed, some seconds a shape.
 
     Returns:
         By assumption its cost, or why it is not known.
@@ -100,34 +94,28 @@ def _weight_cost(
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Of round beams against solids."""
-    compliances: dict[tuple[float, float], NDArray] = {}
-    stiffness = {}
-    for frame in posture.robot.frames:
-        link = frame.link
-        if not isinstance(link, BeamLink) or set(link.section) != {"radius"}:
-            continue
-        if not solids:
-            raise _NotApplicable(_NOT_MESHED)
-        key = (beam_axis(frame)[0] / link.section["radius"], link.poisson)
-        key = (round(key[0], 6), key[1])
-        if key not in compliances:
-            compliances[key] = bar_compliance(*key)
-        stiffness[frame.name] = bar_stiffness(frame, compliances[key])
+    """Of beams against solids."""
+    beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
+    if beams and not solids:
+        raise _NotApplicable(_NOT_MESHED)
+    meshed = {frame.name: solid_link(frame) for frame in beams}
+    stiffness = {name: s.condensed for name, s in meshed.items() if s is not None}
     if not stiffness:
-        raise _NotApplicable("no beam of full round section")
+        raise _NotApplicable("no beam of a known shape")
     return link_cost(posture, stiffness, load)
 
 
-def stiffness_cost(posture: Posture, solids: bool = False) -> PlatformCost | str:
+def stiffness_costs(
+    postures: Sequence[Posture], solids: bool = False
+) -> PlatformCosts | str:
     """What links as beams, acting at their ends, cost the platform's stiffness.
 
     Args:
-        posture: where the robot stands.
+        postures: of one robot, at least one.
         solids: whether links are meshed.
 
     Returns:
-        The cost, or why it is not known.
+        The costs, or why they are not known.
 
     Raises:
         BadInput: a surface or an interface is not usable.
@@ -135,57 +123,6 @@ def stiffness_cost(posture: Posture, solids: bool = False) -> PlatformCost | str
     if not solids:
         return _NOT_MESHED
     try:
-        return platform_cost(posture)
+        return platform_costs(postures)
     except (FreeMotion, MeshFailed, NoSolids) as error:
         return str(error)
-
-
-def costs_table(
-    posture: Posture, costs: Mapping[str, Cost | str], platform: PlatformCost | str
-) -> dict[str, Any]:
-    """Costs for machines: [rad], [m], [-]; where not known, the reason."""
-    rows: dict[str, dict[str, Any]] = {}
-    for name, cost in costs.items():
-        if isinstance(cost, Cost):
-            values = {k: v for k, v in vars(cost).items() if v is not None}
-            rows[name] = {**values, "matters": cost.matters}
-        else:
-            rows[name] = {"reason": cost}
-    limits = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
-    robot = posture.robot.name
-    stiffness: dict[str, Any] = {"reason": platform}
-    if isinstance(platform, PlatformCost):
-        stiffness = platform_cost_table(platform)
-    return {
-        "robot": robot, "pose": posture.pose(), "limits": limits, "costs": rows,
-        "platform": stiffness,
-    }  # fmt: skip
-
-
-def costs_text(
-    posture: Posture, costs: Mapping[str, Cost | str], platform: PlatformCost | str
-) -> str:
-    """Costs for people, one line each."""
-    lines = [f"{posture.robot.name}: what assumptions cost"]
-    for name, cost in costs.items():
-        if isinstance(cost, str):
-            lines.append(f"{name:>30}: {cost}")
-            continue
-        mark = "  beyond 20 um or 1 %" if cost.matters else ""
-        lines.append(
-            f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
-            f"urad  {_energy_text(cost.energy)}{mark}"
-            + (f"; {cost.pieces} pieces leave less" if mark and cost.pieces else "")
-        )
-    if isinstance(platform, PlatformCost):
-        lines.append(platform_cost_text(platform))
-    else:
-        lines.append(f"{'stiffness by solids':>30}: {platform}")
-    return "\n".join(lines)
-
-
-def _energy_text(share: float) -> str:
-    """A relative difference of energies; without any there is none."""
-    if math.isnan(share):
-        return "no energy is stored"
-    return f"{100 * share:8.3g} % of the energy"

@@ -1,6 +1,6 @@
 r"""What links as beams, and links that act at ends, cost the platform's stiffness.
 
-Four models of one robot, clearances at zero, without errors:
+Four models of one robot at many postures, clearances at zero, without errors:
 
 ==============  ==================================================================
 model           its links
@@ -15,12 +15,12 @@ spread          virtual joints with K_E of the same mesh, wrenches spread over e
 Meshed and solids must agree to rounding: condensation leaves nothing out where joints
 are rigid at their ends.  Spread against meshed is what that assumption is worth: real
 seats lie between the two.  A difference is the largest relative one of the compliance
-along any wrench, which depends on no choice of point or length.
+along any wrench, which depends on no choice of point or length.  Links do not change
+with the pose: they are meshed once, and a posture costs milliseconds.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,11 @@ from assembly.linear.closure import virtual_joints
 from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from forcefit.inputs.display import numbers
 from stiffness.screws import screw_map
-from validation.assumptions.solid_links import SolidLink, solid_link
+from validation.assumptions.solid_links import SolidLink, solid_links
 
-_NAMED = 3  # links that people are told
 _RANK = 1e-9  # of the largest singular value: less counts as zero
 
 
@@ -43,71 +43,93 @@ class NoSolids(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class PlatformCost:
-    """Relative errors of the platform's compliance.
+class PlatformCosts:
+    """Relative errors of the platform's compliance at k postures.
+
+    Rows are NaN where a motion of the platform is free.
 
     Attributes:
-        beams: [-] of beams against solids.
-        meshed: [-] of meshed K_E against solids: rounding.
-        ends: [-] of rigid ends against wrenches spread over them.
-        by_link: [-] of each link alone a beam, against all as solids, largest first.
+        beams: (k,) [-] of beams against solids.
+        meshed: (k,) [-] of meshed K_E against solids: rounding.
+        ends: (k,) [-] of rigid ends against wrenches spread over them.
+        by_link: (k,) [-] of each link alone a beam, against all as solids, the link of
+            the largest first.
         left: links without a shape, the same in all models.
+        mesh_error: [-] estimate of the largest error of a solid's K_E, entries over
+            sqrt(K_ii K_jj): differences below it are the mesh's.
     """
 
-    beams: float
-    meshed: float
-    ends: float
-    by_link: Mapping[str, float]
+    beams: NDArray
+    meshed: NDArray
+    ends: NDArray
+    by_link: Mapping[str, NDArray]
     left: tuple[str, ...]
+    mesh_error: float
 
 
-def platform_cost(posture: Posture) -> PlatformCost:
+def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
     """Compare the platform's stiffness by beams and by solids.
 
     Args:
-        posture: where the robot stands.
+        postures: of one robot, at least one.
 
     Returns:
-        The differences.
+        The differences at each.
 
     Raises:
         BadInput: a link cannot be meshed.
-        FreeMotion: a motion of the platform is resisted by nothing.
+        FreeMotion: at every posture a motion of the platform is resisted by nothing.
         NoSolids: no link has a shape.
     """
-    robot = posture.robot
-    solids = {f.name: solid_link(f) for f in robot.frames if f.link is not None}
-    known = {name: solid for name, solid in solids.items() if solid is not None}
-    if not known:
-        raise NoSolids("no link has a shape that could be meshed")
-    answer = without_clearance(posture)
-    if answer.free.shape[1]:
-        screw = numbers(answer.free[:, 0])
+    robot, declared = postures[0].robot, _compliances(postures, {})
+    known = np.isfinite(declared).all(axis=(1, 2))
+    if not known.any():
+        screw = numbers(without_clearance(postures[0]).free[:, 0])
         raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
-    meshed = {name: solid.condensed for name, solid in known.items()}
-    true = solid_compliance(posture, known)
+    solids = solid_links(robot)
+    if not solids:
+        raise NoSolids("no link has a shape that could be meshed")
+    meshed = {name: solid.condensed for name, solid in solids.items()}
+    true = np.full_like(declared, np.nan)
+    for i in np.flatnonzero(known).tolist():
+        true[i] = solid_compliance(postures[i], solids)
     by_link = {
-        name: difference(
-            _compliance(posture, {k: K for k, K in meshed.items() if k != name}), true
+        name: _differences(
+            _compliances(postures, {k: K for k, K in meshed.items() if k != name}), true
         )
-        for name in known
-        if isinstance(robot.frames[robot.index(name)].link, BeamLink)
+        for name in solids
+        if isinstance(robot.frame(name).link, BeamLink)
     }
-    condensed = _compliance(posture, meshed)
-    spread = _compliance(posture, {name: s.spread for name, s in known.items()})
-    return PlatformCost(
-        difference(answer.compliance, true), difference(condensed, true),
-        difference(condensed, spread),
-        dict(sorted(by_link.items(), key=lambda item: -item[1])),
-        tuple(name for name in solids if name not in known),
+    condensed = _compliances(postures, meshed)
+    spread = _compliances(postures, {name: s.spread for name, s in solids.items()})
+    return PlatformCosts(
+        _differences(declared, true), _differences(condensed, true),
+        _differences(condensed, spread),
+        dict(sorted(by_link.items(), key=lambda item: -np.nanmax(item[1]))),
+        tuple(f.name for f in robot.frames if f.link and f.name not in solids),
+        max(solid.error for solid in solids.values()),
     )  # fmt: skip
 
 
-def _compliance(posture: Posture, stiffness: Mapping[str, NDArray]) -> NDArray:
-    """(6, 6) by virtual joints, some links with another K_E."""
+def _compliances(
+    postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
+) -> NDArray:
+    """(k, 6, 6) by virtual joints, some links with another K_E."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
-    other = replace(posture, robot=posture.robot.with_links({**links}))
-    return without_clearance(other).compliance
+    return platform_stiffnesses(
+        postures[0].robot.with_links({**links}),
+        np.array([posture.transforms for posture in postures]),
+        np.array([posture.mismatch for posture in postures]),
+    ).compliance
+
+
+def _differences(C: NDArray, other: NDArray) -> NDArray:
+    """(k,) largest relative differences; NaN where either is not known."""
+    known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
+    values = np.full(len(C), np.nan)
+    for i in np.flatnonzero(known):
+        values[i] = difference(C[i], other[i])
+    return values
 
 
 def difference(C: NDArray, other: NDArray) -> float:
@@ -206,28 +228,3 @@ def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
     kept = values > 1e-13 * values.max()
     root = (moved / size) @ vectors[:, kept] / np.sqrt(values[kept])
     return root @ root.T
-
-
-def platform_cost_table(cost: PlatformCost) -> dict[str, Any]:
-    """For machines: [-], largest along any wrench."""
-    return {
-        "compliance": {
-            "beams": cost.beams, "meshed": cost.meshed, "ends": cost.ends,
-        },
-        "by_link": dict(cost.by_link), "without_shape": list(cost.left),
-    }  # fmt: skip
-
-
-def platform_cost_text(cost: PlatformCost) -> str:
-    """For people."""
-    lines = [
-        "compliance of the platform, largest difference along any wrench:",
-        f"{'beams, not solids':>30}: {100 * cost.beams:8.3g} %",
-        f"{'meshed K_E, not solids':>30}: {100 * cost.meshed:8.3g} %",
-        f"{'rigid ends, not spread':>30}: {100 * cost.ends:8.3g} %",
-    ]
-    for name, share in list(cost.by_link.items())[:_NAMED]:
-        lines.append(f"{name + ' alone a beam':>30}: {100 * share:8.3g} %")
-    if cost.left:
-        lines.append(f"without a shape, as declared: {', '.join(cost.left)}")
-    return "\n".join(lines)

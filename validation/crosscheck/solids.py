@@ -3,9 +3,10 @@
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from assembly.model.mesh_link import mesh_turn
+from assembly.model.mesh_link import mesh_turn, solved_mesh
 from assembly.model.robot import MeshLink, Robot
 from forcefit.inputs.table import BadInput
+from stiffness.fem.fea import MeshedLink
 from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
@@ -23,7 +24,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
         BadInput: a surface or an interface is not usable, or an interface is not
             rigid, the only kind a floating frame has here.
     """
-    known: dict[tuple[object, ...], MeshedSolid] = {}
+    known: dict[MeshedLink, MeshedSolid] = {}
     bodies = {}
     for frame in robot.frames:
         link = frame.link
@@ -34,27 +35,19 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
                 f'frame "{frame.name}".link.mesh.interface: found "{link.interface}", '
                 'expected "rigid" for a simulation with solids'
             )
-        key = (link.surface, link.unit, repr(link.base), repr(link.tip),
-               link.young, link.poisson)  # fmt: skip
-        if key not in known:
-            known[key] = _solid(link)
-        solid = known[key]
+        solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
+        if solved not in known:
+            known[solved] = _solid(solved)
+        solid = known[solved]
         span = solid.centers[1] - solid.centers[0]
         bodies[frame.name] = MeshBody(solid, mesh_turn(frame, span))
     return bodies
 
 
-def _solid(link: MeshLink) -> MeshedSolid:
+def _solid(solved: MeshedLink) -> MeshedSolid:
     """The finest mesh of a link, with its stiffness matrix."""
     from stiffness.fem.elements import assemble
-    from stiffness.fem.fea import solve_link
-    from stiffness.fem.material import Material
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
 
-    base, tip = parse_interface(link.base), parse_interface(link.tip)
-    material = (Material(link.young, link.poisson, link.density or 0.0),)
-    solved = solve_link(read_surface(link.surface, link.unit), base, tip, material)
     mesh, constants = solved.level.mesh, solved.level.material
     upper = assemble(mesh, constants[:, 0], constants[:, 1])
     return MeshedSolid(

@@ -7,6 +7,8 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
 from tests.robots_for_tests import planar_four_bar
 
 L, RADIUS, E, RHO, G = 0.8, 0.02, 70e9, 2700.0, 9.81
@@ -120,3 +122,15 @@ def test_reactions_of_a_closed_loop_carry_its_weight():
     T = answer.posture.transforms
     total = sum(T[i, :3, :3] @ answer.wrenches[i, 3:] for i in roots)
     assert np.allclose(total, [0, 0, -4.5 * G], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e6, 1e8])
+def test_a_load_however_large_moves_what_is_pressed_by_the_compliance(size):
+    """Rows that springs enter but by rounding stay open by as much of the load."""
+    posture = home_posture(load_robot("irsbot2"))
+    once, twice = (
+        solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]
+        for k in (1, 2)
+    )
+    compliance = platform_stiffness(posture).compliance[5, 5]
+    assert twice - once == pytest.approx(compliance * size, rel=1e-6)

@@ -8,14 +8,13 @@ import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.model.link_stress import peak_stresses, safety_factors, stressed_links
+from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import load_robot
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import sweep_in_memory
 from assembly.sweeps.targets import grid_targets, parse_grid
-from forcefit.inputs.table import BadInput
 
 PLAIN = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
 
@@ -39,7 +38,6 @@ def test_bars_forced_together_carry_youngs_modulus_times_strain():
     # strain 1e-4 / 1 m over both bars
     stress = peak_stresses(robot, answer.wrenches)
     np.testing.assert_allclose(stress, 70e9 * 1e-4, rtol=1e-9)
-    np.testing.assert_allclose(safety_factors(robot, stress, 140e6), 20.0, rtol=1e-9)
 
 
 def test_a_bars_own_axes_and_length_are_used():
@@ -62,15 +60,6 @@ def test_links_without_a_shape_are_left_out():
     assert known == [f.name for f in robot.frames if isinstance(f.link, BeamLink)]
     matrix = robot.with_links({known[0]: MatrixLink(np.eye(6))})
     assert [link.frame for link in stressed_links(matrix)] == known[1:]
-
-
-def test_the_strength_of_an_unknown_link_is_refused():
-    robot = two_bars(np.zeros(6))
-    with pytest.raises(BadInput, match="the stress in 'mount' is not known"):
-        safety_factors(robot, np.ones(2), {"mount": 1e8})
-    with pytest.raises(BadInput, match="no frame"):
-        safety_factors(robot, np.ones(2), {"mouth": 1e8})
-    assert np.isnan(safety_factors(robot, np.ones(2), {"one": 1e8})[1])
 
 
 @pytest.mark.slow

@@ -74,9 +74,9 @@ def test_a_chain_is_the_sum_of_its_parts():
     for k, K in enumerate(springs):
         X = screw_map(-steps[k + 1 :].sum(axis=0))
         expected += X @ np.linalg.inv(K) @ X.T
-    answer = platform_stiffness(serial(*frames))
-    assert_same_matrix(answer.compliance, expected, 1e-12)
-    assert_same_matrix(answer.stiffness, np.linalg.inv(expected), 1e-9)
+    tangent = platform_stiffness(serial(*frames))
+    assert_same_matrix(tangent.compliance, expected, 1e-12)
+    assert_same_matrix(tangent.stiffness, np.linalg.inv(expected), 1e-9)
 
 
 @pytest.mark.parametrize("pose", [{}, {"tx": 0.03, "tz": 0.5, "ry": 0.2}])
@@ -173,14 +173,14 @@ def test_the_tangent_of_random_robots_is_the_difference_of_their_equilibria(seed
     posture = home_posture(robot.with_errors(0.3 * robot.errors))
     load = rng.normal(size=6) * [1, 1, 1, 20, 20, 20]
     exact = solve_exact(posture, load)
-    answer = platform_stiffness(posture, "exact", load)
+    tangent = platform_stiffness(posture, "exact", load)
     step = 1e-4 * np.array([1, 1, 1, 20, 20, 20])
     by_load = differences(solve_exact, posture, load, step)
     by_load = as_small_motion(by_load, exact.platform_screw)
-    finite = np.isfinite(answer.compliance).all(axis=0)
+    finite = np.isfinite(tangent.compliance).all(axis=0)
     assert finite.any()
     part = np.ix_(finite, finite)
-    assert_same_matrix(answer.compliance[part], by_load[part], 1e-4)
+    assert_same_matrix(tangent.compliance[part], by_load[part], 1e-4)
 
 
 @pytest.mark.parametrize("seed", [12, 42, 65])
@@ -197,13 +197,13 @@ def test_the_tangent_holds_where_moments_act_on_a_platform_turned_by_a_radian(se
 def test_read_at_another_point_power_is_the_same():
     """w . s does not depend on where both are read: C moves by X C X'."""
     posture = home_posture(load_robot("irsbot2"))
-    here, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
-    there = platform_stiffness(posture, at=r)
+    at_origin, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
+    at_point = platform_stiffness(posture, at=r)
     X = screw_map(-r)  # the platform's axes are the base's here
-    assert_same_matrix(there.compliance, X @ here.compliance @ X.T, 1e-12)
-    K = np.linalg.inv(X).T @ here.stiffness @ np.linalg.inv(X)
-    assert_same_matrix(there.stiffness, K, 1e-9)
-    np.testing.assert_allclose(there.centre, here.centre, atol=1e-9)
+    assert_same_matrix(at_point.compliance, X @ at_origin.compliance @ X.T, 1e-12)
+    K = np.linalg.inv(X).T @ at_origin.stiffness @ np.linalg.inv(X)
+    assert_same_matrix(at_point.stiffness, K, 1e-9)
+    np.testing.assert_allclose(at_point.centre, at_origin.centre, atol=1e-9)
 
 
 def test_the_centre_of_a_spring_is_where_it_sits():
@@ -227,11 +227,11 @@ def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_own():
 
 
 def test_shares_are_of_the_whole_and_a_lone_link_has_all_of_it():
-    answer = platform_stiffness(home_posture(load_robot("irsbot2")))
+    tangent = platform_stiffness(home_posture(load_robot("irsbot2")))
     for row in range(6):
-        assert sum(answer.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
-    whole = sum(answer.contributions().values())
-    assert_same_matrix(whole, answer.compliance, 1e-12)
+        assert sum(tangent.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
+    whole = sum(tangent.contributions().values())
+    assert_same_matrix(whole, tangent.compliance, 1e-12)
     beam = Frame("beam", translation=[1, 0, 0], link=MatrixLink(UNIT))
     alone = platform_stiffness(serial(beam))
     assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
@@ -247,8 +247,8 @@ def test_a_stiffer_material_lowers_the_compliance_by_the_link_s_share():
     for factor in (1 + by, 1 - by):
         link = robot.frame(name).link
         other = robot.with_links({name: replace(link, young=factor * link.young)})
-        there = place_robot(other, {"tx": 0.03, "ty": -0.02})
-        scaled.append(platform_stiffness(there).compliance)
+        at_point = place_robot(other, {"tx": 0.03, "ty": -0.02})
+        scaled.append(platform_stiffness(at_point).compliance)
     slope = (scaled[0] - scaled[1]) / (2 * by)
     size = np.sqrt(np.diag(platform_stiffness(posture).compliance))
     size = np.outer(size, size)
@@ -262,29 +262,29 @@ def test_a_motion_that_nothing_resists_is_named_and_has_no_number():
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
                    link=MatrixLink(K))  # fmt: skip
-    answer = platform_stiffness(serial(spring, Frame("tip")))
-    np.testing.assert_allclose(np.abs(answer.free), UNIT[:, [3]], atol=1e-12)
-    touched = np.isnan(answer.compliance)
+    tangent = platform_stiffness(serial(spring, Frame("tip")))
+    np.testing.assert_allclose(np.abs(tangent.free), UNIT[:, [3]], atol=1e-12)
+    touched = np.isnan(tangent.compliance)
     assert touched[3].all()
     assert touched[:, 3].all()
     assert not np.delete(np.delete(touched, 3, 0), 3, 1).any()
-    np.testing.assert_allclose(answer.stiffness[3], 0.0, atol=1e-6)
-    assert answer.eigen.values[0] == 0.0
-    assert answer.along(UNIT[3])[0] == 0.0
-    assert np.isnan([*answer.shares(UNIT[3]).values()]).all()
+    np.testing.assert_allclose(tangent.stiffness[3], 0.0, atol=1e-6)
+    assert tangent.eigen.values[0] == 0.0
+    assert tangent.along(UNIT[3])[0] == 0.0
+    assert np.isnan([*tangent.shares(UNIT[3]).values()]).all()
 
 
 def test_a_rigid_direction_has_no_compliance_and_no_finite_stiffness():
     """A hinge with a torsion spring, a rigid arm along x: RZ and TY move together."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
-    answer = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
+    tangent = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
     screw = np.array([0, 0, 1, 0, 0.4, 0])
-    np.testing.assert_allclose(answer.compliance, np.outer(screw, screw) / 50.0)
-    K = answer.stiffness
+    np.testing.assert_allclose(tangent.compliance, np.outer(screw, screw) / 50.0)
+    K = tangent.stiffness
     assert np.isnan(K[2]).all()
     assert np.isnan(K[4]).all()
-    assert answer.along(UNIT[4]) == (pytest.approx(50.0 / 0.4**2), np.inf)
-    assert answer.eigen.condition == np.inf
+    assert tangent.along(UNIT[4]) == (pytest.approx(50.0 / 0.4**2), np.inf)
+    assert tangent.eigen.condition == np.inf
 
 
 def test_a_column_on_a_torsion_spring_buckles_at_its_critical_load():
@@ -294,11 +294,11 @@ def test_a_column_on_a_torsion_spring_buckles_at_its_critical_load():
     posture = serial(hinge, Frame("arm", translation=[L, 0, 0]))
     for share in (0.5, 0.99, 1.5, -1.0):
         load = [0, 0, 0, -share * k / L, 0, 0]
-        answer = platform_stiffness(posture, "exact", load)
+        tangent = platform_stiffness(posture, "exact", load)
         expected = k / L**2 * (1 - share)
-        assert answer.along(UNIT[4])[0] == pytest.approx(expected, rel=1e-9)
-        assert answer.stable == (share < 1)
-        shares = answer.shares(UNIT[4])
+        assert tangent.along(UNIT[4])[0] == pytest.approx(expected, rel=1e-9)
+        assert tangent.stable == (share < 1)
+        shares = tangent.shares(UNIT[4])
         assert sum(shares.values()) == pytest.approx(1.0)
         assert shares["", "forces"] == pytest.approx(-share / (1 - share))
 
@@ -312,11 +312,11 @@ def test_a_pin_in_a_hole_holds_across_and_rolls_along_its_rim(state):
     spring = Frame("spring", link=MatrixLink(K), clearance=clearance)
     posture = serial(spring, Frame("tip"))
     load = [0, 0, 0, force, 0, 0]
-    answer = platform_stiffness(posture, state, load)
-    across, along = (answer.along(UNIT[row])[0] for row in (3, 4))
+    tangent = platform_stiffness(posture, state, load)
+    across, along = (tangent.along(UNIT[row])[0] for row in (3, 4))
     assert across == pytest.approx(k, rel=1e-6)
     assert along == pytest.approx(1 / (1 / k + c / force), rel=1e-6)
-    assert answer.along(UNIT[5])[0] == pytest.approx(k, rel=1e-9)
+    assert tangent.along(UNIT[5])[0] == pytest.approx(k, rel=1e-9)
 
 
 @pytest.mark.parametrize("state", ["in contact", "exact"])
@@ -324,10 +324,10 @@ def test_within_its_clearance_nothing_holds_the_platform(state):
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     spring = Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=1e-4))
     posture = serial(spring, Frame("tip"))
-    answer = platform_stiffness(posture, state)
-    assert answer.along(UNIT[5])[0] == 0.0
-    assert answer.along(UNIT[3])[0] == pytest.approx(1e5)
-    np.testing.assert_allclose(np.abs(answer.free), UNIT[:, [5]], atol=1e-12)
+    tangent = platform_stiffness(posture, state)
+    assert tangent.along(UNIT[5])[0] == 0.0
+    assert tangent.along(UNIT[3])[0] == pytest.approx(1e5)
+    np.testing.assert_allclose(np.abs(tangent.free), UNIT[:, [5]], atol=1e-12)
 
 
 @pytest.mark.parametrize("state", ["in contact", "exact"])

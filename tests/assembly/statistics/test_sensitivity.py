@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
 from assembly.statistics.responses import respond
-from assembly.statistics.sensitivity import (
-    energy_slopes,
-    margin_slopes,
-    solution_slopes,
-)
+from assembly.statistics.sensitivity import energy_slopes, solution_slopes
 from tests.robots_for_tests import random_robot
 
 POSES = [{"tx": 0.1, "tz": -0.5}, {"tx": -0.23, "tz": -0.41}, {"tx": 0.3, "tz": -0.55}]
@@ -59,14 +56,14 @@ def test_margin_slopes_of_the_papers_robot(pose, compliant, rng):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     errors = some_errors(robot, rng)
-    found = margin_slopes(with_errors(posture, errors), compliant)
+    slopes = prepare_margins(posture, compliant).solve(errors[None]).slopes[0]
     for _ in range(8):
         step = 1e-4 * some_errors(robot, rng)
         above, below = (
             zone_margin(with_errors(posture, errors + s), compliant).margin
             for s in (step, -step)
         )
-        along = float((found.slopes * step).sum())
+        along = float((slopes * step).sum())
         assert (above - below) / 2 == pytest.approx(along, rel=2e-3, abs=1e-8)
 
 
@@ -93,9 +90,9 @@ def test_slopes_of_random_robots(seed):
 
 def test_errors_that_nothing_decides_have_no_slopes():
     robot = load_robot("hexapod")  # mobile in every direction: margin 0, slopes 0
-    found = margin_slopes(place_robot(robot))
-    assert found.margin == 0.0
-    assert not found.slopes.any()
+    margins = prepare_margins(place_robot(robot), "free").solve(robot.errors[None])
+    assert margins.margin == 0.0
+    assert not margins.slopes.any()
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -1,7 +1,7 @@
-"""K_C of three robots by every road, side by side.
+"""K_C of three robots by every method, side by side.
 
-``python -m benchmarks.stiffness_roads`` prints 1 / C_ii at the platform's origin along
-each axis, and how far each road's compliance is from the first, entries over
+``python -m benchmarks.stiffness_methods`` prints 1 / C_ii at the platform's origin
+along each axis, and how far each method's compliance is from the first, entries over
 sqrt(C_ii C_jj): virtual joints, the same compiled, the displacement method over all
 bodies, the tangent of the exact equilibrium, differences of the least energy (22), load
 steps in Exudyn with links as springs and as beams.
@@ -24,8 +24,8 @@ from validation.crosscheck.stiffness_check import check_stiffness
 POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None}
 
 
-def roads(posture: Posture) -> dict[str, NDArray]:
-    """(6, 6) [rad/(N m) .. m/N] compliance by road."""
+def methods(posture: Posture) -> dict[str, NDArray]:
+    """(6, 6) [rad/(N m) .. m/N] compliance by method."""
     robot = posture.robot
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(0 * robot.errors)
@@ -50,12 +50,12 @@ def main() -> None:
         posture = place_robot(robot, pose) if pose else home_posture(robot)
         print(f"{name}: mx my mz [N m/rad], fx fy fz [N/m], difference")
         first = None
-        for road, C in roads(posture).items():
+        for method, C in methods(posture).items():
             first = C if first is None else first
             size = np.sqrt(np.diag(first))
             off = np.abs((C - first) / np.outer(size, size)).max()
             values = "".join(f"{1 / c:13.6g}" for c in np.diag(C))
-            print(f"  {road:20s}{values}{off:10.1e}", flush=True)
+            print(f"  {method:20s}{values}{off:10.1e}", flush=True)
 
 
 if __name__ == "__main__":

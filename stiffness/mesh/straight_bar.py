@@ -1,0 +1,146 @@
+"""Tetrahedra of straight bars from their sections, without a mesher.
+
+A section of triangles is drawn out along z in layers, thin at both ends, where they are
+held, and longer between, where the field is a beam's.  The prism of a triangle and a
+layer is three tetrahedra, the diagonal of each side from its smaller number, so that
+neighbours cut their common side alike (Dompierre et al. 1999).  One element goes
+through a wall however thin it is; elements that are long along the bar and around a
+tube number thousands where a mesher of equal edges needs millions.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.surface.primitives import Cone, Plane, Shape
+
+_AROUND = 8  # elements around a full circle at least
+_OFF = 0.008  # of an arc from its chord, in lengths: refinement moves no corner further
+_IN_WALL = 1.0  # angle of an element squared, over wall by radius: chords stay inside
+_FLAT = 4.0  # width of an element over its height, in a section
+_GROWTH = 2.0  # from one layer to the next
+_LONGEST = 2.0  # of a layer, in widths of the section
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def straight_bar(section: Mapping[str, float]) -> Solid:
+    """A bar of unit length along z, its section's y and z along x and y.
+
+    Args:
+        section: lengths of :func:`stiffness.beam.sections.declared_section`, per length
+            of the bar.
+
+    Returns:
+        A mesh to refine from: patch 0 at z = 0, patch 1 at z = 1.
+    """
+    flat, triangles = _round(section) if "radius" in section else _angular(section)
+    heights = _heights(_thinnest(section), _LONGEST * float(np.ptp(flat[:, 0])))
+    points = np.concatenate([np.insert(flat, 2, z, axis=1) for z in heights])
+    a, b, c = np.sort(triangles, axis=1).T
+    up = len(flat)
+    prism = np.concatenate([
+        np.column_stack(corners)
+        for corners in ((a, b, c, c + up), (a, b, b + up, c + up),
+                        (a, a + up, b + up, c + up))
+    ])  # fmt: skip
+    layers = up * np.arange(len(heights) - 1)
+    cells = (layers[:, None, None] + prism).reshape(-1, 4)
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    turned = np.linalg.det(edges) < 0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    faces = boundary_faces(cells)
+    side, shapes = _sides(section, points[faces])
+    middle = points[faces, 2].mean(axis=1)
+    patch = np.select([middle < 1e-9, middle > 1.0 - 1e-9], [0, 1], 2 + side)
+    ends = (Plane(0.0 * _UP, _UP), Plane(_UP, _UP))
+    return Solid(points, cells, faces, patch, (*ends, *shapes))
+
+
+def _thinnest(section: Mapping[str, float]) -> float:
+    """The smallest thickness of a section."""
+    if "radius" in section:
+        return section["radius"] - section.get("inner_radius", 0.0)
+    return min(section.values())
+
+
+def _heights(first: float, longest: float) -> NDArray:
+    """From 0 to 1, layers growing from both ends to the middle."""
+    steps = [min(first, 0.25)]
+    while sum(steps) < 0.5:
+        steps.append(min(_GROWTH * steps[-1], longest))
+    half = np.cumsum([0.0, *steps]) / (2 * sum(steps))
+    return np.concatenate([half, 1.0 - half[-2::-1]])
+
+
+def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
+    """Triangles of a disc or a ring: points and corners."""
+    radius, inner = section["radius"], section.get("inner_radius", 0.0)
+    angle = min(
+        2 * np.pi / _AROUND, math.sqrt(_IN_WALL * (radius - inner) / radius),
+        math.sqrt(8 * _OFF / radius),
+    )  # fmt: skip
+    count = math.ceil(2 * np.pi / angle)
+    radii = [inner, radius] if inner else [0.5 * radius, radius]
+    angles = 2 * np.pi * np.arange(count) / count
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    points = [r * circle for r in radii]
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    triangles = [(i, j, i + count), (j, i + count, j + count)]
+    if not inner:
+        points.append(np.zeros((1, 2)))
+        triangles.append((i, j, np.full(count, 2 * count)))
+    corners = np.concatenate([np.column_stack(three) for three in triangles])
+    return np.concatenate(points), corners
+
+
+def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
+    """Triangles of a rectangle, a box or an I: points and corners."""
+    width, height = section["width"], section["height"]
+    x_cuts, y_cuts = [width / 2], [height / 2]
+    if "wall" in section:
+        x_cuts.append(width / 2 - section["wall"])
+        y_cuts.append(height / 2 - section["wall"])
+    if "web" in section:
+        x_cuts.append(section["web"] / 2)
+        y_cuts.append(height / 2 - section["flange"])
+    longest = _FLAT * _thinnest(section)
+    x, y = (_divided(np.sort([*cuts, *(-c for c in cuts)]), longest)
+            for cuts in (x_cuts, y_cuts))  # fmt: skip
+    X, Y = ((v[1:] + v[:-1]) / 2 for v in (x, y))
+    far_x, far_y = np.abs(X)[:, None] > x_cuts[-1], np.abs(Y) > y_cuts[-1]
+    solid = np.ones((len(X), len(Y)), dtype=bool)
+    if "wall" in section:
+        solid = far_x | far_y
+    if "web" in section:
+        solid = ~far_x | far_y
+    number = np.arange(len(x) * len(y)).reshape(len(x), len(y))
+    a, b = number[:-1, :-1][solid], number[1:, :-1][solid]
+    c, d = number[:-1, 1:][solid], number[1:, 1:][solid]
+    corners = np.concatenate([np.column_stack([a, b, d]), np.column_stack([a, c, d])])
+    used, corners = np.unique(corners, return_inverse=True)
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return grid[used], corners.reshape(-1, 3)
+
+
+def _divided(cuts: NDArray, longest: float) -> NDArray:
+    """The same cuts with others between, none further apart than that."""
+    parts = [
+        np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
+        for low, high in zip(cuts, cuts[1:], strict=False)
+    ]
+    return np.append(np.concatenate(parts), cuts[-1])
+
+
+def _sides(
+    section: Mapping[str, float], corners: NDArray
+) -> tuple[NDArray, tuple[Shape | None, ...]]:
+    """Which side (f,) faces (f, 3, 3) lie on, and the sides' shapes."""
+    if "radius" in section:
+        radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
+        off = np.linalg.norm(corners[:, 0, :2], axis=1)[:, None] - radii
+        return np.abs(off).argmin(axis=1), tuple(Cone(0 * _UP, _UP, r) for r in radii)
+    # those across x and those across y: flat, and where they meet there is an edge
+    return np.ptp(corners[:, :, :2], axis=1).argmin(axis=1), (None, None)

@@ -1,0 +1,43 @@
+"""A link between two ends, against its whole stiffness matrix condensed at once."""
+
+import numpy as np
+import pytest
+
+from stiffness.fem.condensation import rigid_motions
+from stiffness.fem.elements import assemble
+from stiffness.fem.fea import Budget, FemOptions, solve_bar
+from stiffness.fem.material import Material
+from stiffness.fem.two_ends import two_ends
+
+
+@pytest.mark.parametrize("interface", ["rigid", "distributing"])
+def test_both_ends_are_the_schur_complement_of_the_whole_matrix(interface):
+    """Twelve motions of both ends at once, by dense elimination of all other nodes."""
+    options = FemOptions(0.5, interface, Budget(levels=1))
+    solved = solve_bar({"width": 0.3, "height": 0.4}, Material(1.0, 0.3, 2.0), options)
+    mesh, constants = solved.level.mesh, solved.level.material
+    upper = assemble(mesh, constants[:, 0], constants[:, 1]).toarray()
+    K = upper + np.triu(upper, 1).T
+    held = np.zeros((len(mesh.nodes), 3, 12))
+    ends = np.zeros(len(mesh.nodes), dtype=bool)
+    for side, center in enumerate(solved.centers):
+        nodes = np.unique(mesh.faces[mesh.patch == side])
+        motions = rigid_motions(mesh.nodes[nodes], center)
+        held[nodes, :, 6 * side : 6 * side + 6] = motions
+        ends[nodes] = True
+    ends, flat = np.repeat(ends, 3), held.reshape(-1, 12)
+    flat[~ends] = np.linalg.solve(
+        K[np.ix_(~ends, ~ends)], -K[np.ix_(~ends, ends)] @ flat[ends]
+    )
+    expected = flat.T @ K @ flat
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    both = two_ends(solved)
+    np.testing.assert_allclose(both.stiffness / size, expected / size, atol=1e-9)
+    # moved as a whole: the mass of the bar, and no stiffness
+    whole = np.vstack([np.eye(6), np.eye(6)])
+    whole[9:12, :3] = [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]  # w x L
+    np.testing.assert_allclose(both.stiffness @ whole / size[:, :6], 0.0, atol=1e-9)
+    shifts = whole[:, 3:]
+    np.testing.assert_allclose(
+        shifts.T @ both.mass @ shifts, 2.0 * 0.3 * 0.4 * np.eye(3), atol=1e-9
+    )

@@ -1,0 +1,109 @@
+"""What the model's assumptions cost a robot over many poses."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.model.robot import Robot
+from assembly.sweeps.targets import Targets, goals_of, of_joints
+from forcefit.inputs.display import html_table, short_repr
+from validation.assumptions.assumptions import assumption_costs, stiffness_costs
+from validation.assumptions.platform_cost import PlatformCosts
+from validation.assumptions.validity import Cost
+
+
+@dataclass(frozen=True, eq=False)
+class CostsOverPoses:
+    """Costs of all assumptions at the poses that are reached.
+
+    Attributes:
+        robot: with its errors.
+        asked: of all k poses, the components given [m or rad].
+        unreached: (k,) why there is no posture, empty where there is one.
+        costs: of the r postures reached, by assumption its cost or why it is not known.
+        platform: of its stiffness at these, or why it is not known.
+    """
+
+    robot: Robot
+    asked: tuple[Mapping[str, float], ...]
+    unreached: tuple[str, ...]
+    costs: tuple[Mapping[str, Cost | str], ...]
+    platform: PlatformCosts | str
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    @property
+    def reached(self) -> tuple[Mapping[str, float], ...]:
+        """(r,) what was asked of the postures that are."""
+        return tuple(
+            asked
+            for asked, why in zip(self.asked, self.unreached, strict=True)
+            if not why
+        )
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.costs[0]) if self.costs else ()
+
+    @property
+    def known(self) -> bool:
+        """Whether anything could be compared anywhere."""
+        return isinstance(self.platform, PlatformCosts) or any(
+            isinstance(cost, Cost) for at in self.costs for cost in at.values()
+        )
+
+
+def costs_over_poses(
+    robot: Robot,
+    targets: Targets,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    solids: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> CostsOverPoses:
+    """Costs of all assumptions at many poses.
+
+    Args:
+        robot: with its errors.
+        targets: its poses or joint coordinates.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes; none if absent.
+        solids: whether links are meshed, once for all poses.
+        progress: called after each pose with the number done and the total.
+
+    Returns:
+        The costs.
+
+    Raises:
+        BadInput: the closures do not hold in the home pose, or a surface is not usable.
+    """
+    rows = targets.at(np.arange(int(np.prod(targets.shape))))
+    place = place_many_joints if of_joints(targets.names) else place_many
+    postures, reasons = place(robot, goals_of(targets.names, robot, rows))
+    asked = tuple(dict(zip(targets.names, map(float, r), strict=True)) for r in rows)
+    reached = [posture for posture in postures if posture is not None]
+    platform: PlatformCosts | str = "no pose is reached"
+    if reached:
+        platform = stiffness_costs(reached, solids)
+    costs = []
+    for done, posture in enumerate(reached, 1):
+        costs.append(assumption_costs(posture, load, gravity, solids))
+        progress(done, len(reached))
+    return CostsOverPoses(robot, asked, tuple(reasons), tuple(costs), platform)
+
+
+def costs_at(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    solids: bool = False,
+) -> CostsOverPoses:
+    """Costs of all assumptions at one posture; see :func:`costs_over_poses`."""
+    costs = assumption_costs(posture, load, gravity, solids)
+    platform = stiffness_costs([posture], solids)
+    asked = (posture.pose(),)
+    return CostsOverPoses(posture.robot, asked, ("",), (costs,), platform)

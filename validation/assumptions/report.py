@@ -1,0 +1,186 @@
+"""What assumptions cost, for machines and for people."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.assumptions.over_poses import CostsOverPoses
+from validation.assumptions.platform_cost import PlatformCosts
+from validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
+
+# what each figure of the platform's compliance compares
+COMPARED = {
+    "beams": "beams, not solids",
+    "meshed": "meshed K_E, not solids",
+    "ends": "rigid ends, not spread",
+}
+_LIMITS = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
+_NAMED = 3  # links that people are told
+_Pose = Mapping[str, float]
+
+
+def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
+    """Costs at one pose: [rad], [m], [-]; where not known, the reason."""
+    return {
+        "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
+        **_at(costs, 0),
+    }  # fmt: skip
+
+
+def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
+    """Costs at every pose, and over all of them median and largest."""
+    poses: list[dict[str, Any]] = []
+    for asked, why in zip(costs.asked, costs.unreached, strict=True):
+        row: dict[str, Any] = {"asked": asked, "status": "ok"}
+        if why:
+            row |= {"status": "out of reach", "reason": why}
+        else:
+            row |= _at(costs, sum(earlier["status"] == "ok" for earlier in poses))
+        poses.append(row)
+    platform: dict[str, Any] = {"reason": costs.platform}
+    if isinstance(costs.platform, PlatformCosts):
+        platform = _platform(
+            costs.platform, lambda values: _spread(values, costs.reached)
+        )
+    return {
+        "robot": costs.robot.name, "reached": len(costs.reached), "limits": _LIMITS,
+        "costs": {name: _summary(costs, name) for name in costs.assumptions},
+        "platform": platform, "poses": poses,
+    }  # fmt: skip
+
+
+def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
+    """Costs at the i-th pose reached."""
+    platform: dict[str, Any] = {"reason": costs.platform}
+    if isinstance(costs.platform, PlatformCosts):
+        platform = _platform(costs.platform, lambda values: values[i])
+    rows = {name: _values(cost) for name, cost in costs.costs[i].items()}
+    return {"costs": rows, "platform": platform}
+
+
+def _values(cost: Cost | str) -> dict[str, Any]:
+    """One cost, or the reason why there is none."""
+    if isinstance(cost, str):
+        return {"reason": cost}
+    values = {k: v for k, v in vars(cost).items() if v is not None}
+    return {**values, "matters": cost.matters}
+
+
+def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
+    """The platform's compliance: [-], largest along any wrench."""
+    return {
+        "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
+        "by_link": {name: shown(values) for name, values in costs.by_link.items()},
+        "without_shape": list(costs.left), "mesh_error": costs.mesh_error,
+    }  # fmt: skip
+
+
+def _spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
+    """Median and largest of what is known, and where that is."""
+    known = np.isfinite(values)
+    if not known.any():
+        return {"median": np.nan, "largest": np.nan, "at": None}
+    return {
+        "median": float(np.median(values[known])),
+        "largest": float(values[known].max()), "at": where[int(np.nanargmax(values))],
+    }  # fmt: skip
+
+
+def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
+    """One assumption over the poses: its costs, and why others are not known."""
+    pairs = [
+        (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
+    ]
+    known = [(asked, cost) for asked, cost in pairs if isinstance(cost, Cost)]
+    where = [asked for asked, _ in known]
+    return {
+        "known": len(known), "matters": sum(cost.matters for _, cost in known),
+        **{key: _spread(np.array([getattr(cost, key) for _, cost in known]), where)
+           for key in ("position", "rotation", "energy")},
+        "reasons": dict(Counter(cost for _, cost in pairs if isinstance(cost, str))),
+    }  # fmt: skip
+
+
+def costs_text(costs: CostsOverPoses) -> str:
+    """Costs at one pose, a line each."""
+    lines = [f"{costs.robot.name}: what assumptions cost"]
+    for name, cost in costs.costs[0].items():
+        if isinstance(cost, str):
+            lines.append(f"{name:>30}: {cost}")
+            continue
+        mark = "  beyond 20 um or 1 %" if cost.matters else ""
+        lines.append(
+            f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
+            f"urad  {_energy_text(cost.energy)}{mark}"
+            + (f"; {cost.pieces} pieces leave less" if mark and cost.pieces else "")
+        )
+    return "\n".join([*lines, *_platform_lines(costs)])
+
+
+def over_poses_text(costs: CostsOverPoses) -> str:
+    """Costs over all poses: a line each, median, largest, and where it is."""
+    count = len(costs.reached)
+    lines = [
+        f"{costs.robot.name}: what assumptions cost over {count} of "
+        f"{len(costs.asked)} poses, median and largest"
+    ]
+    for name in costs.assumptions:
+        row = _summary(costs, name)
+        for reason, times in row["reasons"].items():
+            where = "" if times == count else f" ({times} of {count})"
+            lines.append(f"{name:>30}: {reason}{where}")
+        if row["known"]:
+            position, energy = row["position"], row["energy"]
+            lines.append(
+                f"{name:>30}: {1e6 * position['median']:8.3g} "
+                f"{1e6 * position['largest']:8.3g} um  {100 * energy['median']:8.3g} "
+                f"{_energy_text(energy['largest'])}; beyond 20 um or 1 % at "
+                f"{row['matters']} of {row['known']}, most at "
+                f"{_pose_text(position['at'])}"
+            )
+    return "\n".join([*lines, *_platform_lines(costs)])
+
+
+def _energy_text(share: float) -> str:
+    """A relative difference of energies; without any there is none."""
+    if math.isnan(share):
+        return "no energy is stored"
+    return f"{100 * share:8.3g} % of the energy"
+
+
+def _platform_lines(over: CostsOverPoses) -> list[str]:
+    """The platform's compliance; of many poses the median and the largest."""
+    costs = over.platform
+    if isinstance(costs, str):
+        return [f"{'stiffness by solids':>30}: {costs}"]
+    many = len(costs.beams) > 1
+    lines = [
+        "compliance of the platform, largest difference along any wrench"
+        + (": median and largest" if many else ":")
+    ]
+    rows = {text: getattr(costs, name) for name, text in COMPARED.items()}
+    for name in list(costs.by_link)[:_NAMED]:
+        rows[f"{name} alone a beam"] = costs.by_link[name]
+    for text, values in rows.items():
+        row = _spread(values, over.reached)
+        middle = f"{100 * row['median']:8.3g} " if many else ""
+        place = f" at {_pose_text(row['at'])}" if many else ""
+        lines.append(f"{text:>30}: {middle}{100 * row['largest']:8.3g} %{place}")
+    lines.append(f"{'the meshes themselves':>30}: {100 * costs.mesh_error:8.3g} %")
+    free = int(np.isnan(costs.beams).sum())
+    if free:
+        lines.append(f"at {free} poses a motion of the platform is free: not compared")
+    if costs.left:
+        lines.append(f"without a shape, as declared: {', '.join(costs.left)}")
+    return lines
+
+
+def _pose_text(asked: _Pose | None) -> str:
+    """Such as ``tx=0.1, tz=-0.5``; nowhere without a number."""
+    if asked is None:
+        return "-"
+    return ", ".join(f"{name}={value:.6g}" for name, value in asked.items())
