@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr, solve_triangular
 from scipy.stats import chi2
 
 from validation.campaign.campaign import Campaign
@@ -37,7 +38,8 @@ from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
 MOST = 4  # functions that are learned
-_LOOKED = 400  # rows that a first look takes
+_LOOKED = 1200  # readings that a first look takes
+_JUDGED = 12000  # readings by which forms are compared
 _REFINED = 16  # places and variables for which every form is tried
 _SURE = 3.0  # in score: what a function must be worth
 _SPLINE = 3.0  # in score: by which a form without a name must be better
@@ -130,12 +132,13 @@ class _School:
             self.freedom = max(1, round(freedom))
             self.noise = max(1.0, np.sqrt(self.left / self.freedom))
 
-    def part(self) -> "_School":
-        """The same of fewer rows, for a first look."""
-        rows = np.flatnonzero(self.used)
-        if len(rows) <= _LOOKED:
+    def part(self, most: int) -> "_School":
+        """The same of fewer rows, with about so many readings at most."""
+        rows, cells = np.flatnonzero(self.used), len(self.residual)
+        if cells <= most:
             return self
-        kept = rows[np.linspace(0, len(rows) - 1, _LOOKED).astype(int)]
+        count = len(rows) * most // cells
+        kept = rows[np.linspace(0, len(rows) - 1, count).astype(int)]
         used = np.isin(np.arange(len(self.used)), kept)
         cells = used[rows[np.nonzero(self.fitting.cells)[0]]]
         terms = [t.take(np.ones(len(t), bool), cells) for t in self.terms]
@@ -185,8 +188,9 @@ def learn(
         update("functions learned", turn, MOST)
         if school.done:
             break
-        function = _best(school, every)
-        if function is None or not _foretells(school, function):
+        judged = school.part(_JUDGED)
+        function = _best(judged, every)
+        if function is None or not _foretells(judged, function):
             break
         school.learned.append(function)
         school.terms.append(_term(school, function, len(school.learned)))
@@ -218,7 +222,7 @@ def _best(
 ) -> Learned | None:
     """The likeliest function, of those worth it."""
     robot = school.campaign.robot
-    looked, few = [], school.part()
+    looked, few = [], school.part(_LOOKED)
     for kind, parts in every:
         for shape in first_shapes(robot, parts[0].variable):
             looked.append(Candidate(parts, kind, shape))
@@ -299,6 +303,8 @@ def _foretells(school: _School, one: Learned) -> bool:
 def _foretold(X: NDArray, z: NDArray, kept: NDArray) -> NDArray:
     """Squared errors of the cells kept out of a fit with unknowns of size one."""
     # the prior as rows: products of columns would lose what nearly equal ones tell
-    A = np.vstack([X[~kept], np.eye(X.shape[1])])
-    x = np.linalg.lstsq(A, np.append(z[~kept], np.zeros(X.shape[1])))[0]
+    count = X.shape[1]
+    A = np.vstack([X[~kept], np.eye(count)])
+    R = qr(np.column_stack([A, np.append(z[~kept], np.zeros(count))]), mode="r")[0]
+    x = solve_triangular(R[:count, :count], R[:count, count])
     return (z[kept] - X[kept] @ x) ** 2

@@ -15,8 +15,10 @@ from scipy.optimize import least_squares
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
+from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_rest_positions
+from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import NOTHING, Background
@@ -230,8 +232,9 @@ def refit(
     for _ in range(_MOST_DEFECTS):
         fit = _refit(campaign, conditions, linear, start, defect, behind)
         exact = replace(fit.conditions, exact=True)
+        together = replace(_with_clearance_at_rest(fit.conditions), exact=True)
         read = [
-            whiten(campaign, predict(at).deviation) for at in (fit.conditions, exact)
+            whiten(campaign, predict(at).deviation) for at in (fit.conditions, together)
         ]
         last, defect = defect, np.nan_to_num(read[1] - read[0])
         start = fit.values
@@ -240,6 +243,21 @@ def refit(
     left = whiten(campaign, campaign.measured) - read[1]
     left = behind.whitened(np.where(np.isfinite(left), left, _LOST))
     return replace(fit, hypotheses=tuple(members), residual=left, conditions=exact)
+
+
+def _with_clearance_at_rest(conditions: Conditions) -> Conditions:
+    """Conditions with an open chain's clearances where the linear model has them.
+
+    Finite motions of all rows are then found together; where a clearance rests, they
+    change to second order.
+
+    Returns:
+        The same where there is no such clearance.
+    """
+    loose = bool(virtual_joints(conditions.robot).cones.shape[1])
+    if not loose or conditions.robot.closures or conditions.rest is not None:
+        return conditions
+    return with_clearances_taken_up(conditions)[0]
 
 
 def _refit(
