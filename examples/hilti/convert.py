@@ -124,12 +124,13 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
     columns["cov.time"] = time - time[0]
     for name in ("stationing", "height", "space"):
         columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
-    for place in ("base", "column"):
-        up = _up(rows, place)
-        for k, axis in enumerate("xyz"):
-            columns[f"cov.up_{place}_{axis}"] = up[:, k]
-    # the total station's z is vertical; the accelerometer follows it from row to row
+    # how the column leans against the base, and the base against its own mean: what
+    # both lean to is the floor's, another one on another day
     rocking = _up(rows, "base") - _up(rows, "base").mean(axis=0)
+    lean = _up(rows, "column") - _up(rows, "base")
+    for name, up in (("column", lean), ("base", rocking)):
+        columns[f"cov.{name}_rx"], columns[f"cov.{name}_ry"] = up[:, 1], -up[:, 0]
+    # the total station's z is vertical; the accelerometer follows it from row to row
     vertical = base_pose(T, measured)[2, :3] + rocking
     for k, axis in enumerate("xyz"):
         columns[f"cov.gravity.{axis}"] = -G * vertical[:, k]

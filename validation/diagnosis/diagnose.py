@@ -29,6 +29,7 @@ from validation.diagnosis.lack_of_fit import (
     lack_of_fit,
     outlying,
 )
+from validation.diagnosis.learning import Learned
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
 from validation.diagnosis.selection import Selection, Update, select
@@ -73,6 +74,7 @@ def diagnose(
     impossible = impossible_rows(campaign)
     outliers = impossible.copy()
     factor, inflation, bends = np.ones(6), 1.0, 0
+    learned: tuple[Learned, ...] = ()
     for _ in range(_PASSES):
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
@@ -90,7 +92,10 @@ def diagnose(
             if bent is not conditions:
                 conditions, bends = bent, bends + 1
                 continue
-        selection, learned = taught(campaign, conditions, used, selection, update)
+        known = learned if inflation > 1.0 else None
+        selection, learned = taught(
+            campaign, conditions, used, selection, update, known
+        )
         left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
         lack = lack_of_fit(

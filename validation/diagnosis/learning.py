@@ -95,19 +95,34 @@ class Lesson:
         return n * np.log(max(self.left / n, 1.0)) + self.unknowns * np.log(n)
 
 
+@dataclass(frozen=True, eq=False)
+class Unexplained:
+    """What a set of effects leaves in the N cells fitted.
+
+    Attributes:
+        terms: small terms, with all their unknowns.
+        residual: (N,) whitened readings minus the set of effects.
+        effects: (N, k) whitened change per unknown of that set and the device's frame.
+    """
+
+    terms: Sequence[SmallTerm]
+    residual: NDArray
+    effects: NDArray
+
+
 class _School:
     """What is known while functions are looked for."""
 
     def __init__(
         self, campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
-        terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
+        left: Unexplained,
     ) -> None:  # fmt: skip
         self.campaign, self.used, self.sensitivities = campaign, used, sensitivities
         self.fitting = campaign.take(used)
-        self.residual, self.effects = residual, effects
-        self.terms = list(terms)
+        self.residual, self.effects = left.residual, left.effects
+        self.terms = list(left.terms)
         self.learned: list[Learned] = []
-        self._Q = np.linalg.qr(effects)[0] if effects.shape[1] else effects
+        self._Q = np.linalg.qr(left.effects)[0]
         self.noise = 1.0
         self.update()
 
@@ -132,20 +147,24 @@ class _School:
             self.freedom = max(1, round(freedom))
             self.noise = max(1.0, np.sqrt(self.left / self.freedom))
 
+    def believe(self, one: Learned) -> None:
+        """A function is one of the small terms from now on."""
+        self.learned.append(one)
+        self.terms.append(_term(self, one, len(self.learned)))
+        self.update()
+
     def part(self, most: int) -> "_School":
         """The same of fewer rows, with about so many readings at most."""
-        rows, cells = np.flatnonzero(self.used), len(self.residual)
-        if cells <= most:
+        rows, total = np.flatnonzero(self.used), len(self.residual)
+        if total <= most:
             return self
-        count = len(rows) * most // cells
+        count = len(rows) * most // total
         kept = rows[np.linspace(0, len(rows) - 1, count).astype(int)]
         used = np.isin(np.arange(len(self.used)), kept)
         cells = used[rows[np.nonzero(self.fitting.cells)[0]]]
         terms = [t.take(np.ones(len(t), bool), cells) for t in self.terms]
-        return _School(
-            self.campaign, used, self.sensitivities, terms, self.residual[cells],
-            self.effects[cells],
-        )  # fmt: skip
+        left = Unexplained(terms, self.residual[cells], self.effects[cells])
+        return _School(self.campaign, used, self.sensitivities, left)
 
     @property
     def done(self) -> bool:
@@ -164,8 +183,8 @@ class _School:
 
 def learn(
     campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
-    terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
-    update: Callable[[str, int, int], None],
+    left: Unexplained, update: Callable[[str, int, int], None],
+    known: Sequence[Learned] | None = None,
 ) -> Lesson:  # fmt: skip
     """Learn what the library leaves.
 
@@ -173,18 +192,20 @@ def learn(
         campaign: of R rows.
         used: mask (R,) of the rows fitted.
         sensitivities: of all rows, and their conditions.
-        terms: small terms of the rows fitted, N cells.
-        residual: (N,) whitened readings minus the best set of effects.
-        effects: (N, k) whitened change per unknown of that set and the device's frame.
+        left: by the best set of effects, in the rows fitted.
         update: told how many functions were looked for.
+        known: functions found before, beside which none is looked for; absent if none
+            was looked for before.
 
     Returns:
         The lesson; no function where nothing can be shown.
     """
-    school = _School(campaign, used, sensitivities, terms, residual, effects)
+    school = _School(campaign, used, sensitivities, left)
     names = variables_of(sensitivities.conditions.take(used))
     every = list(places_of(campaign.robot, names))
-    for turn in range(MOST):
+    for one in known or ():
+        school.believe(one)
+    for turn in range(MOST if known is None else 0):
         update("functions learned", turn, MOST)
         if school.done:
             break
@@ -192,9 +213,7 @@ def learn(
         function = _best(judged, every)
         if function is None or not _foretells(judged, function):
             break
-        school.learned.append(function)
-        school.terms.append(_term(school, function, len(school.learned)))
-        school.update()
+        school.believe(function)
     update("functions learned", MOST, MOST)
     unknowns = school.effects.shape[1] + school.behind.unknowns
     return Lesson(
