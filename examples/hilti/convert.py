@@ -18,6 +18,7 @@ from examples.campaign_folder import (
     base_pose,
     data_folder,
     deviation_columns,
+    from_command_line,
     write_campaign,
 )
 from forcefit.inputs.table import BadInput
@@ -153,3 +154,7 @@ def _rows(content: dict) -> list[dict]:
                 marks["stationing"] = kind == STATIONING[0]
                 found += [row | marks for row in station[kind]]
     return found
+
+
+if __name__ == "__main__":
+    from_command_line(convert, __doc__)
