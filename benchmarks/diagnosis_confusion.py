@@ -68,7 +68,7 @@ def finite_part(campaign: Synthetic) -> NDArray:
     return readings(1.0) - (readings(SMALL) - readings(-SMALL)) / (2 * SMALL)
 
 
-def draw_case(seed: int) -> tuple[str, Synthetic]:
+def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
     """Kind and campaign of a case; draws again what a robot cannot have."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
@@ -187,7 +187,7 @@ def make(folder: Path, seed: int, only: str | None = None) -> None:
     name = f"c{seed:04d}"
     if (folder / "truths" / f"{name}.json").exists():
         return
-    kind, campaign = draw_case(seed)
+    kind, campaign = draw_case(seed, only)
     shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
     write_campaign(campaign, folder / "campaigns" / name)
     truth = plain(truth_with_rivals(kind, campaign))
