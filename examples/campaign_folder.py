@@ -6,6 +6,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +40,11 @@ def data_folder(name: str, data: Path | None = None) -> Path:
     if folder.is_dir():
         return folder
     wanted = f"{folder}: no such folder; expected the measured data there"
-    if given:
+    sources = tomllib.loads(SOURCES.read_text())
+    if given or name not in sources:
         raise BadInput(wanted)
     try:
-        return _fetched(name)
+        return _fetched(name, sources[name])
     except ImportError as error:
         raise BadInput(
             f"{wanted}, FORCEFIT_DATA naming the folder that holds it, or pooch to "
@@ -52,11 +54,10 @@ def data_folder(name: str, data: Path | None = None) -> Path:
         raise BadInput(f"{wanted}, or a network: {error}") from error
 
 
-def _fetched(name: str) -> Path:
+def _fetched(name: str, source: dict[str, Any]) -> Path:
     """Folder of a set in the cache, all of its files there with their checksums."""
     import pooch
 
-    source = tomllib.loads(SOURCES.read_text())[name]
     folder = Path(pooch.os_cache("forcefit")) / name
     for local, (path, checksum) in source["files"].items():
         pooch.retrieve(
