@@ -68,11 +68,12 @@ def finite_part(campaign: Synthetic) -> NDArray:
     return readings(1.0) - (readings(SMALL) - readings(-SMALL)) / (2 * SMALL)
 
 
-def draw_case(seed: int) -> tuple[str, Synthetic]:
+def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
     """Kind and campaign of a case; draws again what a robot cannot have."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         kind = str(rng.choice(list(MIX), p=list(MIX.values())))
+        kind = only or kind
         try:
             campaign = _measure(kind, rng)
         except (NotApplicable, SimulationFailed, BadInput):
@@ -181,12 +182,12 @@ def _plain(one: Alternative) -> list[str]:
     return [name.partition("(")[0] for name in one.names]
 
 
-def make(folder: Path, seed: int) -> None:
+def make(folder: Path, seed: int, only: str | None = None) -> None:
     """Write a case's campaign and truth, unless it is there."""
     name = f"c{seed:04d}"
     if (folder / "truths" / f"{name}.json").exists():
         return
-    kind, campaign = draw_case(seed)
+    kind, campaign = draw_case(seed, only)
     shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
     write_campaign(campaign, folder / "campaigns" / name)
     truth = plain(truth_with_rivals(kind, campaign))
@@ -342,6 +343,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kind", choices=MIX, help="campaigns of one kind alone")
     parser.add_argument("--step", type=int, default=1, help="for several at a time")
     parser.add_argument("--make", action="store_true", help="make campaigns only")
     parser.add_argument("--answer", action="store_true", help="of those made already")
@@ -354,7 +356,7 @@ def main() -> None:
             started = time.perf_counter()
             try:
                 if not asked.answer:
-                    make(asked.folder, seed)
+                    make(asked.folder, seed, asked.kind)
             except SimulationFailed as error:
                 print(f"case {seed}: left out, {error}", flush=True)
             made = (asked.folder / "truths" / f"c{seed:04d}.json").exists()

@@ -1,8 +1,12 @@
 """Campaign folders written from other people's data, and where those data lie."""
 
+import argparse
 import os
-from collections.abc import Mapping
+import sys
+import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,29 +18,70 @@ from stiffness.screws import rotation_vector
 from validation.campaign.campaign import READING
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
+SOURCES = Path(__file__).parent / "data.toml"
 
 
 def data_folder(name: str, data: Path | None = None) -> Path:
-    """Folder of a set of measured data.
+    """Folder of a set of measured data, fetched from its source where it is nowhere.
 
     Args:
         name: of the set.
         data: where all sets lie; the variable ``FORCEFIT_DATA`` if absent, else
-            ``../shared/data`` beside the repository.
+            ``../shared/data`` beside the repository, else the cache of ``pooch``.
 
     Returns:
         The folder.
 
     Raises:
-        BadInput: there is none.
+        BadInput: there is none, and it cannot be fetched.
     """
-    folder = (data or Path(os.environ.get("FORCEFIT_DATA", DATA))) / name
-    if not folder.is_dir():
+    given = data or os.environ.get("FORCEFIT_DATA")
+    folder = Path(given or DATA) / name
+    if folder.is_dir():
+        return folder
+    wanted = f"{folder}: no such folder; expected the measured data there"
+    sources = tomllib.loads(SOURCES.read_text())
+    if given or name not in sources:
+        raise BadInput(wanted)
+    try:
+        return _fetched(name, sources[name])
+    except ImportError as error:
         raise BadInput(
-            f"{folder}: no such folder; expected the measured data there, or set "
-            "FORCEFIT_DATA to the folder that holds it (docs/measured_data.md)"
-        )
+            f"{wanted}, FORCEFIT_DATA naming the folder that holds it, or pooch to "
+            "fetch it (pip install 'forcefit[examples]'; docs/measured_data.md)"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{wanted}, or a network: {error}") from error
+
+
+def _fetched(name: str, source: dict[str, Any]) -> Path:
+    """Folder of a set in the cache, all of its files there with their checksums."""
+    import pooch
+
+    folder = Path(pooch.os_cache("forcefit")) / name
+    for local, (path, checksum) in source["files"].items():
+        pooch.retrieve(
+            f"{source['source']}/{path}", f"sha256:{checksum}",
+            fname=Path(local).name, path=(folder / local).parent,
+        )  # fmt: skip
     return folder
+
+
+def from_command_line(
+    convert: Callable[[Path, Path | None], object], about: str | None
+) -> None:
+    """A converter as a program: folders written are printed, bad input is one line."""
+    parser = argparse.ArgumentParser(description=(about or "").split("\n")[0])
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--data", type=Path, help="folder that holds the data sets")
+    given = parser.parse_args()
+    try:
+        written = convert(given.out, given.data)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    folders = written.values() if isinstance(written, dict) else [written]
+    print(*folders, sep="\n")
 
 
 def write_campaign(

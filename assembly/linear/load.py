@@ -14,14 +14,16 @@ Sources:
     load: end moments q L^2 / 12).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BeamLink, beam_axis
+from assembly.model.robot import BeamLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map
@@ -112,25 +114,34 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     robot, T = posture.robot, posture.transforms
     g = np.broadcast_to(np.asarray(gravity, dtype=float), (*T.shape[:-3], 3))
     bodies, carried = np.zeros((2, *T.shape[:-2], 6))
-    for i, frame in enumerate(robot.frames):
+    for i, (mass, *centre, beam_mass, x, y, z) in enumerate(_masses(robot).tolist()):
         R = T[..., i, :3, :3]
-        if frame.mass:
-            bodies[..., i, :] += _at(R @ frame.centre_of_mass, frame.mass * g)
-        link = frame.link
-        if isinstance(link, BeamLink) and link.density is not None:
-            length, axis = beam_axis(frame)
-            section = declared_section(link.section, link.poisson)
-            W = link.density * section.area * length * g
+        if mass:
+            bodies[..., i, :] += _at(R @ centre, mass * g)
+        if beam_mass:
+            along, W = R @ [x, y, z], beam_mass * g
             clamp = np.zeros((*W.shape[:-1], 6))
-            clamp[..., :3] = np.cross(R @ (length * axis), W) / 12
+            clamp[..., :3] = np.cross(along, W) / 12
             bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
             parent = robot.parents[i]
             if parent >= 0:  # else the base carries it
                 # the beam starts where it starts, be that the parent's origin or not
-                start = T[..., i, :3, 3] - R @ (length * axis)
-                arm = start - T[..., parent, :3, 3]
+                arm = T[..., i, :3, 3] - along - T[..., parent, :3, 3]
                 carried[..., parent, :] += _at(arm, W / 2) + clamp
     return bodies, carried
+
+
+def _masses(robot: Robot) -> NDArray:
+    """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""
+    table = np.zeros((len(robot.frames), 8))
+    for row, frame in zip(table, robot.frames, strict=True):
+        row[0], row[1:4] = frame.mass, frame.centre_of_mass
+        link = frame.link
+        if isinstance(link, BeamLink) and link.density is not None:
+            length, axis = beam_axis(frame)
+            area = declared_section(link.section, link.poisson).area
+            row[4], row[5:] = link.density * area * length, length * axis
+    return table
 
 
 def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
@@ -142,12 +153,35 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         gravity: (3,) or (R, 3) [m/s^2] base axes.
 
     Returns:
-        Loads (6n,) or (R, 6n) on all small screws.
+        Loads (6n,) or (R, 6n) on all small screws, not to be written to: robots that
+        differ in errors, springs and clearances alone share them.
     """
+    robot = postures.robot
+    digest = blake2b(repr((robot.platform, load.shape, gravity.shape)).encode())
+    for numbers in (robot.parents, _masses(robot), load, gravity):
+        digest.update(np.ascontiguousarray(numbers).tobytes())
+    digest.update(postures.digest)
+    return _loads_with_weight(_LoadsKey(digest.digest(), postures, load, gravity))
+
+
+@dataclass(frozen=True)
+class _LoadsKey:
+    """Postures that stand alike under like loads."""
+
+    digest: bytes
+    postures: Posture = field(compare=False)
+    load: NDArray = field(compare=False)
+    gravity: NDArray = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _loads_with_weight(key: _LoadsKey) -> FrameLoads:
     bodies = carried = None
-    if gravity.any():
-        bodies, carried = weights(postures, gravity)
-    return loads_on_frames(postures, load, bodies, carried)
+    if key.gravity.any():
+        bodies, carried = weights(key.postures, key.gravity)
+    loads = loads_on_frames(key.postures, key.load, bodies, carried)
+    loads.body.flags.writeable = loads.joint.flags.writeable = False
+    return loads
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:

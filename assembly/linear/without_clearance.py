@@ -299,5 +299,6 @@ def _limits(postures: Posture, free: NDArray) -> NDArray:
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
     """(R, 6n) every frame's own (6, 6) times its screw or wrench."""
-    blocks = screws.reshape(len(screws), -1, 6)
-    return np.einsum("nij,rnj->rni", matrices, blocks).reshape(screws.shape)
+    blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
+    products = blocks @ np.swapaxes(matrices, 1, 2)
+    return np.swapaxes(products, 0, 1).reshape(screws.shape)

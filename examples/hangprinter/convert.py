@@ -17,7 +17,7 @@ from assembly.robots.placing import (
     drive_stiffness,
     place_frames,
 )
-from examples.campaign_folder import data_folder, write_campaign
+from examples.campaign_folder import from_command_line, write_campaign
 
 NAME = "hangprinter"
 FILE = "hp4_force_series2.csv"
@@ -30,7 +30,7 @@ ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # of the blocks
 GEAR = 255 / 20  # turns of the motor for one of the spool
 RADIUS = 0.075  # [m] of the spools
 STIFFNESS = 1e4  # [N/m] of every line; only their being equal matters here
-CAMERA = 2e-3  # [m] one sigma of a position, estimated by the study
+CAMERA = 2e-3  # [m] one sigma of a position: four lines say three coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +47,10 @@ class Samples:
     spool: NDArray
     force: NDArray
 
-    def take(self, rows: NDArray) -> "Samples":
-        """Some of the rows."""
-        return Samples(self.position[rows], self.spool[rows], self.force[rows])
-
 
 def read_samples(data: Path | None = None) -> Samples:
-    """The 41 samples, in SI."""
-    path = data_folder(NAME, data) / FILE
+    """The 41 samples, in SI; those beside this file unless others are given."""
+    path = (data / NAME if data else Path(__file__).parent) / FILE
     table = np.genfromtxt(path, delimiter=",", names=True)
     where = np.column_stack([table[f"{axis}_mm"] for axis in "xyz"]) / 1e3
     motor = np.column_stack([table[f"motor{line}_deg"] for line in LINES])
@@ -135,3 +131,7 @@ def convert(out: Path, data: Path | None = None) -> Path:
         columns[f"cov.force_{line}"] = samples.force[:, k]
         columns[f"cov.spool_{line}"] = samples.spool[:, k]
     return write_campaign(out, cable_robot(), columns, (1.0, CAMERA))
+
+
+if __name__ == "__main__":
+    from_command_line(convert, __doc__)

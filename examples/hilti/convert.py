@@ -18,6 +18,7 @@ from examples.campaign_folder import (
     base_pose,
     data_folder,
     deviation_columns,
+    from_command_line,
     write_campaign,
 )
 from forcefit.inputs.table import BadInput
@@ -124,12 +125,13 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
     columns["cov.time"] = time - time[0]
     for name in ("stationing", "height", "space"):
         columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
-    for place in ("base", "column"):
-        up = _up(rows, place)
-        for k, axis in enumerate("xyz"):
-            columns[f"cov.up_{place}_{axis}"] = up[:, k]
-    # the total station's z is vertical; the accelerometer follows it from row to row
+    # how the column leans against the base, and the base against its own mean: what
+    # both lean to is the floor's, another one on another day
     rocking = _up(rows, "base") - _up(rows, "base").mean(axis=0)
+    lean = _up(rows, "column") - _up(rows, "base")
+    for name, up in (("column", lean), ("base", rocking)):
+        columns[f"cov.{name}_rx"], columns[f"cov.{name}_ry"] = up[:, 1], -up[:, 0]
+    # the total station's z is vertical; the accelerometer follows it from row to row
     vertical = base_pose(T, measured)[2, :3] + rocking
     for k, axis in enumerate("xyz"):
         columns[f"cov.gravity.{axis}"] = -G * vertical[:, k]
@@ -152,3 +154,7 @@ def _rows(content: dict) -> list[dict]:
                 marks["stationing"] = kind == STATIONING[0]
                 found += [row | marks for row in station[kind]]
     return found
+
+
+if __name__ == "__main__":
+    from_command_line(convert, __doc__)

@@ -16,6 +16,7 @@ from examples.campaign_folder import (
     base_pose,
     data_folder,
     deviation_columns,
+    from_command_line,
     write_campaign,
 )
 from stiffness.screws import rotation_vector, transform
@@ -31,7 +32,6 @@ JOINTS = (
 )  # fmt: skip
 SIGMA = (4e-5, 1.2e-5)  # [rad], [m] medians of what series B states
 TMAC = 1.0  # [kg] of the tracker's target, a guess
-EVERY = 40  # row goes into the small campaigns
 MOVED = 1e-3  # [rad] less is no motion, and the direction of the last one stays
 
 
@@ -39,7 +39,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
     """Write a campaign folder for each series.
 
     Args:
-        out: folder of the campaigns; ``A_few`` and ``B_few`` are for a quick diagnosis.
+        out: folder of the campaigns.
         data: where all measured data lie.
 
     Returns:
@@ -63,8 +63,6 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
         columns |= deviation_columns(nominal, measured, turn=True)
         columns |= _covariates(table)
         folders[series] = write_campaign(out / series, robot, columns, SIGMA)
-        few = {name: column[::EVERY] for name, column in columns.items()}
-        write_campaign(out / f"{series}_few", robot, few, SIGMA)
     return folders
 
 
@@ -143,3 +141,7 @@ def last_direction(q: NDArray) -> NDArray:
     latest = np.searchsorted(moved, np.arange(len(side)), side="right") - 1
     known = np.where(latest >= 0, side[moved[np.maximum(latest, 0)]], 0.0)
     return np.concatenate([[0.0], known])
+
+
+if __name__ == "__main__":
+    from_command_line(convert, __doc__)

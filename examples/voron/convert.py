@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.files.robot_file import read_robot
-from examples.campaign_folder import data_folder, write_campaign
+from examples.campaign_folder import data_folder, from_command_line, write_campaign
 
 NAME = "voron_frame_expansion"
 RUNS = {
@@ -62,3 +62,7 @@ def read_run(path: Path) -> dict[str, NDArray]:
     clock = [datetime.strptime(row.pop("time"), "%Y/%m/%d-%H:%M:%S") for row in rows]
     table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     return table | {"time": np.array([(t - clock[0]).total_seconds() for t in clock])}
+
+
+if __name__ == "__main__":
+    from_command_line(convert, __doc__)

@@ -11,12 +11,13 @@ Order of things, each opened once:
 6. errors before and after on the rows kept aside.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects import apply_effects
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_finite_motions, with_second_order
 from validation.campaign.campaign import Campaign
@@ -28,15 +29,18 @@ from validation.diagnosis.lack_of_fit import (
     lack_of_fit,
     outlying,
 )
+from validation.diagnosis.learning import Learned
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
 from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.small_terms import screws_of
+from validation.diagnosis.small_terms import GEOMETRY, screws_of
 from validation.diagnosis.teaching import taught
 
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
 _LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
+_BENDS = 3  # times that what finite geometric errors add is found anew
+_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step towards the errors found
 _BENT = 0.1  # [sigma] change of what finite geometric errors add that is looked at
 
 
@@ -69,7 +73,8 @@ def diagnose(
         conditions = register(campaign.take(rows.fitted), conditions)
     impossible = impossible_rows(campaign)
     outliers = impossible.copy()
-    factor, inflation = np.ones(6), 1.0
+    factor, inflation, bends = np.ones(6), 1.0, 0
+    learned: tuple[Learned, ...] = ()
     for _ in range(_PASSES):
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
@@ -79,14 +84,18 @@ def diagnose(
         called = int((outliers & ~impossible).sum())
         most = max(0, len(campaign) // BLUNDERS - called)
         far[used] = outlying(fitting, left, most)
-        bent = _with_errors(campaign, conditions, used, selection, complete)
         if far.any():
             outliers |= far
             continue
-        if bent is not conditions:
-            conditions = bent
-            continue
-        selection, learned = taught(campaign, conditions, used, selection, update)
+        if bends < _BENDS:
+            bent = _with_errors(campaign, conditions, used, selection, complete)
+            if bent is not conditions:
+                conditions, bends = bent, bends + 1
+                continue
+        known = learned if inflation > 1.0 else None
+        selection, learned = taught(
+            campaign, conditions, used, selection, update, known
+        )
         left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
         lack = lack_of_fit(
@@ -122,24 +131,37 @@ def _with_errors(
     complete: Callable[[Conditions], Conditions],
 ) -> Conditions:  # fmt: skip
     """Conditions whose finite part is that of the geometric errors found, too."""
-    # the errors change with it, and are followed until it stays
+    # the errors change with it, and are followed until it stays; a step so large that
+    # what it adds leads away is halved
     behind, fitting = selection.behind, campaign.take(used)
+    affected = apply_effects(conditions, selection.fit.effects)
+    own = [affected.robot.index(frame.name) for frame in campaign.robot.frames]
     raw = behind.raw(selection.fit.residual)
-    own = [conditions.robot.index(frame.name) for frame in campaign.robot.frames]
+    was = predict(conditions.take(used)).deviation
+
+    def at(values: Sequence[NDArray]) -> tuple[float, NDArray, Conditions]:
+        errors = affected.errors.copy()
+        errors[:, own] += screws_of(campaign, behind.terms, values)
+        added = complete(replace(affected, errors=errors)).second_order
+        bent = replace(conditions, second_order=added)
+        change = whiten(fitting, predict(bent.take(used)).deviation - was)
+        left = raw - np.nan_to_num(change)
+        return behind.lost(left, values), left, bent
+
+    if not any(term.name == GEOMETRY for term in behind.terms):
+        return conditions
+    known = [np.zeros(len(term)) for term in behind.terms]
+    lost, left = at(known)[0], raw
     for _ in range(_PASSES):
-        values = behind.values(behind.whitened(raw))
-        errors = screws_of(campaign, behind.terms, values)
-        if not errors.any():
+        aim = behind.values(behind.whitened(left))
+        for share in _SHARES:
+            values = [k + share * (x - k) for k, x in zip(known, aim, strict=True)]
+            trial, there, bent = at(values)
+            if trial < lost:
+                break
+        else:
             break
-        errors_added = conditions.errors.copy()
-        errors_added[:, own] += errors
-        bent = complete(replace(conditions, errors=errors_added))
-        bent = replace(conditions, second_order=bent.second_order)
-        change = (
-            predict(bent.take(used)).deviation
-            - predict(conditions.take(used)).deviation
-        )
-        if np.nanmax(np.abs(change / fitting.sigma), initial=0.0) < _BENT:
+        if np.abs(there - left).max(initial=0.0) < _BENT:
             break
-        conditions, raw = bent, raw - np.nan_to_num(whiten(fitting, change))
+        conditions, known, lost, left = bent, values, trial, there
     return conditions

@@ -98,6 +98,23 @@ class Background:
         along = self.axes.T @ whitened * np.sqrt(self.gains / (1 + self.gains))
         return self._by_term(self.size * (self.turn @ along))
 
+    def lost(self, raw: NDArray, values: Sequence[NDArray]) -> float:
+        """Twice the negative logarithm of how likely unknowns are, but for a constant.
+
+        Args:
+            raw: (N,) residual without the small unknowns.
+            values: (k,) of every term.
+
+        Returns:
+            Squares of what they leave and of themselves over their prior.
+        """
+        moved = np.concatenate([np.zeros(0), *values])
+        known = self.size > 0.0
+        left = raw.copy()
+        for term, x in zip(self.terms, values, strict=True):
+            left -= term.columns @ x
+        return float(left @ left + np.sum((moved[known] / self.size[known]) ** 2))
+
     def deviations(self) -> list[NDArray]:
         """Standard deviations of the unknowns of every term."""
         kept = 1 - np.einsum("kr,r->k", self.turn**2, self.known)

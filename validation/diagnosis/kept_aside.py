@@ -149,10 +149,14 @@ def ladder(
     names = [term.name for term in model.behind.terms]
     first = [name for name in (GEOMETRY, SPRINGS) if name in names]
 
-    def rung(name: str, behind: Background, members: Sequence[Hypothesis]) -> None:
+    def rung(
+        name: str, behind: Background, members: Sequence[Hypothesis],
+        conditions: Conditions = conditions,
+    ) -> None:  # fmt: skip
         same = len(members) == len(model.fit.hypotheses)
         begin = np.concatenate([np.zeros(0), *(h.start for h in members)])
         start = model.fit.values if same else begin
+        some = conditions.take(rows.fitted)
         fit = refit(fitting, some, members, start, behind=behind)
         step = FittedModel(conditions, model.response, fit, behind, model.learned)
         error = errors_of(campaign, step.residual(campaign), rows.scored)
@@ -164,7 +168,9 @@ def ladder(
     nuisance: list[Hypothesis] = []
     if campaign.registration == "unknown":
         nuisance = [device_frame(some)]
-        rung("registration", NOTHING, nuisance)
+        # not yet with what finite geometric errors add
+        straight = replace(conditions, second_order=declared.second_order)
+        rung("registration", NOTHING, nuisance, straight)
         rungs[-1] = replace(rungs[-1], unknowns=6)
     z = whiten(fitting, fitting.measured - predict(some).deviation)
     for name in (GEOMETRY, SPRINGS):
@@ -178,7 +184,7 @@ def ladder(
     end = errors_of(campaign, residual, rows.scored)
     later = names[len(first) :]
     behind = _with_terms(model.behind, first)
-    if not rank:
+    if len(model.fit.hypotheses) == len(nuisance):
         rungs.append(replace(rungs[-1], term="library effects", unknowns=0))
     elif later:
         rung("library effects", behind, model.fit.hypotheses)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr, solve_triangular
 from scipy.stats import chi2
 
 from validation.campaign.campaign import Campaign
@@ -37,7 +38,8 @@ from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
 MOST = 4  # functions that are learned
-_LOOKED = 400  # rows that a first look takes
+_LOOKED = 1200  # readings that a first look takes
+_JUDGED = 12000  # readings by which forms are compared
 _REFINED = 16  # places and variables for which every form is tried
 _SURE = 3.0  # in score: what a function must be worth
 _SPLINE = 3.0  # in score: by which a form without a name must be better
@@ -93,19 +95,34 @@ class Lesson:
         return n * np.log(max(self.left / n, 1.0)) + self.unknowns * np.log(n)
 
 
+@dataclass(frozen=True, eq=False)
+class Unexplained:
+    """What a set of effects leaves in the N cells fitted.
+
+    Attributes:
+        terms: small terms, with all their unknowns.
+        residual: (N,) whitened readings minus the set of effects.
+        effects: (N, k) whitened change per unknown of that set and the device's frame.
+    """
+
+    terms: Sequence[SmallTerm]
+    residual: NDArray
+    effects: NDArray
+
+
 class _School:
     """What is known while functions are looked for."""
 
     def __init__(
         self, campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
-        terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
+        left: Unexplained,
     ) -> None:  # fmt: skip
         self.campaign, self.used, self.sensitivities = campaign, used, sensitivities
         self.fitting = campaign.take(used)
-        self.residual, self.effects = residual, effects
-        self.terms = list(terms)
+        self.residual, self.effects = left.residual, left.effects
+        self.terms = list(left.terms)
         self.learned: list[Learned] = []
-        self._Q = np.linalg.qr(effects)[0] if effects.shape[1] else effects
+        self._Q = np.linalg.qr(left.effects)[0]
         self.noise = 1.0
         self.update()
 
@@ -130,19 +147,24 @@ class _School:
             self.freedom = max(1, round(freedom))
             self.noise = max(1.0, np.sqrt(self.left / self.freedom))
 
-    def part(self) -> "_School":
-        """The same of fewer rows, for a first look."""
-        rows = np.flatnonzero(self.used)
-        if len(rows) <= _LOOKED:
+    def believe(self, one: Learned) -> None:
+        """A function is one of the small terms from now on."""
+        self.learned.append(one)
+        self.terms.append(_term(self, one, len(self.learned)))
+        self.update()
+
+    def part(self, most: int) -> "_School":
+        """The same of fewer rows, with about so many readings at most."""
+        rows, total = np.flatnonzero(self.used), len(self.residual)
+        if total <= most:
             return self
-        kept = rows[np.linspace(0, len(rows) - 1, _LOOKED).astype(int)]
+        count = len(rows) * most // total
+        kept = rows[np.linspace(0, len(rows) - 1, count).astype(int)]
         used = np.isin(np.arange(len(self.used)), kept)
         cells = used[rows[np.nonzero(self.fitting.cells)[0]]]
         terms = [t.take(np.ones(len(t), bool), cells) for t in self.terms]
-        return _School(
-            self.campaign, used, self.sensitivities, terms, self.residual[cells],
-            self.effects[cells],
-        )  # fmt: skip
+        left = Unexplained(terms, self.residual[cells], self.effects[cells])
+        return _School(self.campaign, used, self.sensitivities, left)
 
     @property
     def done(self) -> bool:
@@ -161,8 +183,8 @@ class _School:
 
 def learn(
     campaign: Campaign, used: NDArray, sensitivities: Sensitivities,
-    terms: Sequence[SmallTerm], residual: NDArray, effects: NDArray,
-    update: Callable[[str, int, int], None],
+    left: Unexplained, update: Callable[[str, int, int], None],
+    known: Sequence[Learned] | None = None,
 ) -> Lesson:  # fmt: skip
     """Learn what the library leaves.
 
@@ -170,27 +192,28 @@ def learn(
         campaign: of R rows.
         used: mask (R,) of the rows fitted.
         sensitivities: of all rows, and their conditions.
-        terms: small terms of the rows fitted, N cells.
-        residual: (N,) whitened readings minus the best set of effects.
-        effects: (N, k) whitened change per unknown of that set and the device's frame.
+        left: by the best set of effects, in the rows fitted.
         update: told how many functions were looked for.
+        known: functions found before, beside which none is looked for; absent if none
+            was looked for before.
 
     Returns:
         The lesson; no function where nothing can be shown.
     """
-    school = _School(campaign, used, sensitivities, terms, residual, effects)
+    school = _School(campaign, used, sensitivities, left)
     names = variables_of(sensitivities.conditions.take(used))
     every = list(places_of(campaign.robot, names))
-    for turn in range(MOST):
+    for one in known or ():
+        school.believe(one)
+    for turn in range(MOST if known is None else 0):
         update("functions learned", turn, MOST)
         if school.done:
             break
-        function = _best(school, every)
-        if function is None or not _foretells(school, function):
+        judged = school.part(_JUDGED)
+        function = _best(judged, every)
+        if function is None or not _foretells(judged, function):
             break
-        school.learned.append(function)
-        school.terms.append(_term(school, function, len(school.learned)))
-        school.update()
+        school.believe(function)
     update("functions learned", MOST, MOST)
     unknowns = school.effects.shape[1] + school.behind.unknowns
     return Lesson(
@@ -218,7 +241,7 @@ def _best(
 ) -> Learned | None:
     """The likeliest function, of those worth it."""
     robot = school.campaign.robot
-    looked, few = [], school.part()
+    looked, few = [], school.part(_LOOKED)
     for kind, parts in every:
         for shape in first_shapes(robot, parts[0].variable):
             looked.append(Candidate(parts, kind, shape))
@@ -299,6 +322,8 @@ def _foretells(school: _School, one: Learned) -> bool:
 def _foretold(X: NDArray, z: NDArray, kept: NDArray) -> NDArray:
     """Squared errors of the cells kept out of a fit with unknowns of size one."""
     # the prior as rows: products of columns would lose what nearly equal ones tell
-    A = np.vstack([X[~kept], np.eye(X.shape[1])])
-    x = np.linalg.lstsq(A, np.append(z[~kept], np.zeros(X.shape[1])))[0]
+    count = X.shape[1]
+    A = np.vstack([X[~kept], np.eye(count)])
+    R = qr(np.column_stack([A, np.append(z[~kept], np.zeros(count))]), mode="r")[0]
+    x = solve_triangular(R[:count, :count], R[:count, count])
     return (z[kept] - X[kept] @ x) ** 2

@@ -1,10 +1,11 @@
 """A set of hypotheses fitted in the full model, with the uncertainty of its numbers.
 
 Sources:
-    Nocedal, Wright, Numerical Optimization, chapter 10 (least squares).
+    Nocedal, Wright, Numerical Optimization, chapters 10 (least squares) and 11
+    (Broyden's update of slopes).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -14,8 +15,10 @@ from scipy.optimize import least_squares
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
+from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_rest_positions
+from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.evidence import NOTHING, Background
@@ -25,6 +28,7 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_TINY = 1e-300
 _CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
@@ -98,6 +102,30 @@ class Fit:
             J[:, i] = (ends[0] - ends[1]) / (2 * step)
         std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
         return [(n, v, float(s)) for (n, v), s in zip(value.items(), std, strict=True)]
+
+
+class _Secants:
+    """Slopes along the steps of a fit, updated instead of taken again."""
+
+    def __init__(self, left: Callable[[NDArray], NDArray], J: NDArray) -> None:
+        """Slopes are known where the fit begins.
+
+        Args:
+            left: residual (N,) of unknowns (k,).
+            J: (N, k) its slopes there.
+        """
+        self._left, self._J = left, J
+        self._at: tuple[NDArray, NDArray] | None = None
+
+    def __call__(self, x: NDArray) -> NDArray:
+        """(N, k) slopes at the next place: what they say of the last step is right."""
+        now = self._left(x)
+        if self._at is not None:
+            step, change = x - self._at[0], now - self._at[1]
+            wrong = change - self._J @ step
+            self._J = self._J + np.outer(wrong, step / max(step @ step, _TINY))
+        self._at = x.copy(), now
+        return self._J
 
 
 def _public(
@@ -204,8 +232,9 @@ def refit(
     for _ in range(_MOST_DEFECTS):
         fit = _refit(campaign, conditions, linear, start, defect, behind)
         exact = replace(fit.conditions, exact=True)
+        together = replace(_with_clearance_at_rest(fit.conditions), exact=True)
         read = [
-            whiten(campaign, predict(at).deviation) for at in (fit.conditions, exact)
+            whiten(campaign, predict(at).deviation) for at in (fit.conditions, together)
         ]
         last, defect = defect, np.nan_to_num(read[1] - read[0])
         start = fit.values
@@ -214,6 +243,21 @@ def refit(
     left = whiten(campaign, campaign.measured) - read[1]
     left = behind.whitened(np.where(np.isfinite(left), left, _LOST))
     return replace(fit, hypotheses=tuple(members), residual=left, conditions=exact)
+
+
+def _with_clearance_at_rest(conditions: Conditions) -> Conditions:
+    """Conditions with an open chain's clearances where the linear model has them.
+
+    Finite motions of all rows are then found together; where a clearance rests, they
+    change to second order.
+
+    Returns:
+        The same where there is no such clearance.
+    """
+    loose = bool(virtual_joints(conditions.robot).cones.shape[1])
+    if not loose or conditions.robot.closures or conditions.rest is not None:
+        return conditions
+    return with_clearances_taken_up(conditions)[0]
 
 
 def _refit(
@@ -234,7 +278,7 @@ def _refit(
         effects: dict[str, Values] = dict(_public(members, x, conditions.robot))
         return apply_effects(conditions, effects)
 
-    @lru_cache(maxsize=1)  # for the slopes, which are taken where the residual was
+    @lru_cache(maxsize=2)  # for the slopes, which are taken where the residual was
     def left_at(scaled: bytes) -> NDArray:
         x = np.frombuffer(scaled) * size
         model = whiten(campaign, predict(there(x)).deviation)
@@ -255,26 +299,26 @@ def _refit(
         J = slopes(scaled, range(len(scaled)))
         # what the readings do not see stays where it is
         seen = np.flatnonzero(np.linalg.norm(J, axis=0) > UNSEEN)
+        bounds = lower[seen] / size[seen], upper[seen] / size[seen]
 
         def with_seen(x: NDArray) -> NDArray:
             moved = scaled.copy()
             moved[seen] = x
             return moved
 
-        def slopes_at(x: NDArray) -> NDArray:
-            moved = with_seen(x)
-            at_start = np.array_equal(moved, scaled)
-            return J[:, seen] if at_start else slopes(moved, seen)
-
-        if len(seen):
+        before = np.inf
+        while len(seen):
             fitted = least_squares(
                 lambda x: left_at(with_seen(x).tobytes()), scaled[seen],
-                jac=slopes_at,
-                bounds=(lower[seen] / size[seen], upper[seen] / size[seen]),
-                max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED, gtol=1e-10,
-                x_scale="jac",
+                jac=_Secants(lambda x: left_at(with_seen(x).tobytes()), J[:, seen]),
+                bounds=bounds, max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED,
+                gtol=1e-10, x_scale="jac",
             )  # fmt: skip
-            scaled, J[:, seen] = with_seen(fitted.x), fitted.jac
+            scaled = with_seen(fitted.x)
+            if before - 2 * fitted.cost <= _CONVERGED * before:
+                break
+            before = 2 * fitted.cost
+            J[:, seen] = slopes(scaled, seen)
     J /= size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))
     scale[scale == 0] = 1.0

@@ -18,7 +18,7 @@ from validation.diagnosis.evidence import background
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, learn, term_name
+from validation.diagnosis.learning import Learned, Unexplained, learn, term_name
 from validation.diagnosis.refit import refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -34,6 +34,7 @@ def taught(
     used: NDArray,
     selection: Selection,
     update: Update,
+    known: tuple[Learned, ...] | None = None,
 ) -> tuple[Selection, tuple[Learned, ...]]:
     """Learn what the library leaves, where that is more than noise.
 
@@ -43,6 +44,7 @@ def taught(
         used: mask (R,) of the rows fitted.
         selection: what the library says of them.
         update: told what is done, how much of it and of how much.
+        known: functions found with a smaller sigma, beside which none is looked for.
 
     Returns:
         The selection with the functions behind its effects, or what was given, and the
@@ -67,10 +69,9 @@ def taught(
             campaign,
             used,
             sensitivities,
-            selection.terms,
-            fit.residual,
-            columns,
+            Unexplained(selection.terms, fit.residual, columns),
             update,
+            known,
         )
         for fit, columns in stories
     ]
