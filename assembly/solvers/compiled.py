@@ -18,6 +18,7 @@ import multiprocessing
 import sys
 from collections.abc import Callable
 from functools import cache, partial
+from pickle import UnpicklingError
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -63,6 +64,7 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     if function is None:
         return partial(kernel, **options)
     compiled = njit(no_cfunc_wrapper=True, **_OPTIONS, **options)(function)
+    _survive_moves(compiled)
     compile_one = compiled.compile
 
     def compile_with_parts(signature: Any) -> Any:
@@ -126,13 +128,28 @@ class _Part:
             name, result, self.signature.args
         )
         compiled = njit(
-            self.signature, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS,
-            **self.options,
-        )(function)  # fmt: skip
+            no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS, **self.options
+        )(function)
+        _survive_moves(compiled)
+        compiled.compile(self.signature)
         overload = compiled.overloads[self.signature.args]
         native = overload.fndesc.llvm_func_name
         add_symbol(name, overload.library.get_pointer_to_function(native))
         self.loaded = True
+
+
+def _survive_moves(compiled: Any) -> None:
+    """Take what is on disk for nothing where it names what an update has moved."""
+    file = compiled._cache._cache_file
+    load_index = file._load_index
+
+    def load_readable() -> dict:
+        try:
+            return load_index()
+        except (ImportError, AttributeError, EOFError, UnpicklingError):
+            return {}
+
+    file._load_index = load_readable
 
 
 def _load_parts(function: Callable) -> None:
