@@ -134,7 +134,7 @@ class Assemblies:
 
 
 def assemblies_of(assembly: Assembly) -> Assemblies:
-    """One as many: only what it knows without computing anything.
+    """One as many, without what would have to be computed: NaN there.
 
     Args:
         assembly: any.
@@ -142,14 +142,14 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
     Returns:
         One row.
     """
-    nothing = np.zeros(1)
+    unknown = np.full(1, np.nan)
     return Assemblies(
         energy=np.array([assembly.energy]),
-        bound=nothing,
+        bound=unknown,
         energy_without_clearance=np.array([assembly.energy_without_clearance]),
         platform_screw=assembly.platform_screw[None],
-        closure_residual=nothing,
-        clearance_excess=nothing,
+        closure_residual=unknown,
+        clearance_excess=unknown,
         clearances=assembly.clearances[None],
         motions=assembly.motions[None],
         multipliers=assembly.multipliers[None],
