@@ -180,7 +180,11 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
         values = quantity(data, key).transpose(y, x) * scale
         finite = values.where(np.isfinite(values))
         image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
-        figure.colorbar(image, ax=panel)
+        low, high = float(finite.min()), float(finite.max())
+        if low < high:
+            figure.colorbar(image, ax=panel)
+        elif low == high:  # a scale about one value shows differences there are none of
+            title = f"{title}: {low:.4g} everywhere"
         inside = bool((finite < 1).any()) and bool((finite > 1).any())
         if key.startswith("margin") and inside and min(finite.shape) > 1:
             panel.contour(data[x], data[y], finite, levels=[1.0], colors="cyan")

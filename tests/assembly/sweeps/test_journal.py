@@ -308,7 +308,7 @@ def test_commands_stopped_at_random_moments_lose_nothing():
 
 
 COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
-           "tx=-0.045:0.045:0.001,ty=0.10:0.15:0.001"]  # fmt: skip
+           "tx=-0.045:0.045:0.0005,ty=0.10:0.15:0.001"]  # fmt: skip
 
 
 def start_command(folder, *words):

@@ -68,6 +68,15 @@ def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
     assert any(plot_label(f"parallel: {ODD[2]}") in text for text in shown)
 
 
+def test_a_constant_map_says_its_value_and_has_no_scale():
+    data = grid((2, 3), ("tx", "ty"))
+    data["energy"] = (("tx", "ty"), np.arange(6.0).reshape(2, 3))
+    figure = map_figure(data)
+    shown = drawn_texts(figure)
+    assert sum(text.endswith(" everywhere") for text in shown) == 4
+    assert len(figure.axes) == 6 + 1  # panels, and the energy's scale
+
+
 def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
     attrs = {"robot": ODD[0], "seed": 1, "play": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
