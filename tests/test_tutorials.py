@@ -28,11 +28,14 @@ def blocks(page):
 
 
 def follow(page, folder):
-    """Do what a page says, in an empty folder beside the repository's meshes."""
+    """Do what a page says, in an empty folder beside the repository's meshes.
+
+    Returns how many blocks were run and how many lines of output compared.
+    """
     (folder / "meshes").symlink_to(ROOT / "meshes")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHON": sys.executable}
     shell = 'set -euo pipefail\nforcefit() { "$PYTHON" -m forcefit "$@"; }\n'
-    session, printed = [], ""
+    session, printed, ran, compared = [], "", 0, 0
     for language, title, text in blocks(page):
         if title:
             (folder / title).write_text(text, encoding="utf-8")
@@ -42,10 +45,11 @@ def follow(page, folder):
                 capture_output=True, text=True, check=False,
             )  # fmt: skip
             assert done.returncode == 0, text + done.stderr
-            printed = done.stdout
+            printed, ran = done.stdout, ran + 1
         elif language == "output":
             for line in text.strip().splitlines():
                 assert line in printed, f"{line}\nis not in\n{printed}"
+                compared += 1
         elif language == "python":
             session.append(text)
             # what was defined before is defined again: cheap, and one process a block
@@ -55,6 +59,8 @@ def follow(page, folder):
                 capture_output=True, text=True, check=False,
             )  # fmt: skip
             assert done.returncode == 0, text + done.stderr
+            ran += 1
+    return ran, compared
 
 
 def test_there_are_four_tutorials():
@@ -65,7 +71,9 @@ def test_there_are_four_tutorials():
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", TUTORIALS)
 def test_a_tutorial_runs_as_it_stands(tmp_path, name):
-    follow(DOCS / "tutorials" / f"{name}.md", tmp_path)
+    ran, compared = follow(DOCS / "tutorials" / f"{name}.md", tmp_path)
+    assert ran > 2
+    assert compared > 0
 
 
 @pytest.mark.slow
@@ -83,6 +91,8 @@ def test_the_measuring_protocol_s_files_are_a_campaign(tmp_path):
 
 @pytest.mark.parametrize("name", PAGES)
 def test_the_python_of_a_page_runs(tmp_path, name):
-    for language, _, text in blocks(DOCS / f"{name}.md"):
-        if language == "python":
-            exec(compile(text, name, "exec"), {})
+    python = [text for language, _, text in blocks(DOCS / f"{name}.md")
+              if language == "python"]  # fmt: skip
+    assert python
+    for text in python:
+        exec(compile(text, name, "exec"), {})

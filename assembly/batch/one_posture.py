@@ -2,8 +2,7 @@
 
 Free motions and springs are eliminated once: only the right sides differ from draw to
 draw, and every result, certificates included, is a linear map of few numbers.  A draw
-whose certificate falls short, or that this does not cover, is solved again: without
-loads by :mod:`assembly.linear.energy`, under loads by
+whose certificate falls short, or that this does not cover, is solved again by
 :mod:`assembly.linear.energy`.
 """
 

@@ -14,7 +14,7 @@ frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from hashlib import blake2b
 
@@ -86,11 +86,6 @@ class Posture:
         distinct = replace(self, coordinates=coordinates, transforms=transforms)
         return distinct, which
 
-    @property
-    def digest(self) -> bytes:
-        """Of the transforms: postures of one digest stand alike."""
-        return _digest(_Array(self.transforms))
-
     def pose(self) -> dict[str, float]:
         """Nominal platform pose by component, rotation vector in base axes."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
@@ -123,6 +118,35 @@ def _distinct(
 def _digest(array: _Array) -> bytes:
     """Of an array's numbers."""
     return blake2b(np.ascontiguousarray(array.numbers).tobytes()).digest()
+
+
+@dataclass(frozen=True)
+class Content:
+    """Key of a cache: postures that stand alike, with arrays of the same numbers."""
+
+    digest: bytes
+    postures: Posture = field(compare=False)
+    arrays: tuple[NDArray, ...] = field(compare=False)
+
+
+def content_of(
+    postures: Posture, arrays: tuple[NDArray, ...], names: object
+) -> Content:
+    """The key of what is computed of postures and arrays, whatever else a robot has.
+
+    Args:
+        postures: one, or many in one; of them the transforms and the frames' parents.
+        arrays: of numbers.
+        names: whatever else it depends on, by its ``repr``.
+
+    Returns:
+        The key, which also holds what it was made of.
+    """
+    digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
+    for array in (postures.robot.parents, *arrays):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(_digest(_Array(postures.transforms)))
+    return Content(digest.digest(), postures, arrays)
 
 
 def pose_components(T: NDArray) -> NDArray:

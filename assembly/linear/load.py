@@ -14,14 +14,13 @@ Sources:
     load: end moments q L^2 / 12).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
-from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
+from assembly.kinematics.posture import Content, Posture, content_of
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput
@@ -157,29 +156,17 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         differ in errors, springs and clearances alone share them.
     """
     robot = postures.robot
-    digest = blake2b(repr((robot.platform, load.shape, gravity.shape)).encode())
-    for numbers in (robot.parents, _masses(robot), load, gravity):
-        digest.update(np.ascontiguousarray(numbers).tobytes())
-    digest.update(postures.digest)
-    return _loads_with_weight(_LoadsKey(digest.digest(), postures, load, gravity))
-
-
-@dataclass(frozen=True)
-class _LoadsKey:
-    """Postures that stand alike under like loads."""
-
-    digest: bytes
-    postures: Posture = field(compare=False)
-    load: NDArray = field(compare=False)
-    gravity: NDArray = field(compare=False)
+    arrays = load, gravity, _masses(robot)
+    return _loads_with_weight(content_of(postures, arrays, robot.platform))
 
 
 @lru_cache(maxsize=4)
-def _loads_with_weight(key: _LoadsKey) -> FrameLoads:
+def _loads_with_weight(content: Content) -> FrameLoads:
+    load, gravity, _ = content.arrays
     bodies = carried = None
-    if key.gravity.any():
-        bodies, carried = weights(key.postures, key.gravity)
-    loads = loads_on_frames(key.postures, key.load, bodies, carried)
+    if gravity.any():
+        bodies, carried = weights(content.postures, gravity)
+    loads = loads_on_frames(content.postures, load, bodies, carried)
     loads.body.flags.writeable = loads.joint.flags.writeable = False
     return loads
 

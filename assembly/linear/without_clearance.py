@@ -20,15 +20,14 @@ w       ``joint_wrenches``    (R,6n)       through every joint
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Posture
+from assembly.kinematics.posture import Content, Posture, content_of
 from assembly.linear.closure import closure_signs, virtual_joints
 from assembly.linear.load import FrameLoads
 from assembly.linear.thresholds import RANK
@@ -215,33 +214,15 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    bodies, joints = link_compliances(robot), joint_compliances(robot)
-    digest = blake2b(repr((robot.closures, robot.platform)).encode())
-    for numbers in (
-        robot.parents,
-        bodies,
-        joints,
-        clearance_bounds(robot),
-    ):
-        digest.update(np.ascontiguousarray(numbers).tobytes())
-    digest.update(postures.digest)
-    return _factorise(_FlexibilityKey(digest.digest(), postures, bodies, joints))
-
-
-@dataclass(frozen=True)
-class _FlexibilityKey:
-    """Robots that differ in errors and loads alone share one factorisation."""
-
-    digest: bytes
-    postures: Posture = field(compare=False)
-    bodies: NDArray = field(compare=False)
-    joints: NDArray = field(compare=False)
+    # robots that differ in errors and loads alone share one factorisation
+    arrays = link_compliances(robot), joint_compliances(robot), clearance_bounds(robot)
+    return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
 
 
 @lru_cache(maxsize=4)
-def _factorise(key: _FlexibilityKey) -> Flexibility:
+def _factorise(content: Content) -> Flexibility:
     """The system of every posture, and its inverse."""
-    postures, C_body, C_joint = key.postures, key.bodies, key.joints
+    postures, (C_body, C_joint, _) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
     if joints.cones.shape[1]:

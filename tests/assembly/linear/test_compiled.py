@@ -143,7 +143,7 @@ def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
             assert batch.platform_screw[i] == pytest.approx(one.platform_screw)
 
 
-def test_random_robots_give_the_single_answer_or_go_the_slower_road():
+def test_random_robots_give_the_single_answer_or_fall_back():
     compiled = 0
     for seed in range(120):
         rng = np.random.default_rng(seed)
@@ -238,7 +238,7 @@ def test_what_the_compiled_road_does_not_cover_goes_the_slower_one():
     assert "no clearance within its bounds" in batch.reason[0]
 
 
-def test_a_bound_on_a_joints_own_motion_goes_the_slower_road():
+def test_a_bound_on_a_joints_own_motion_falls_back():
     """A passive slider of +-1e-4 m and a gap of 3e-4: the spring takes the rest."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
