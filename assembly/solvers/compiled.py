@@ -13,10 +13,12 @@ that is handed on where a few of them are needed.
 The first compilation is announced, once, on stderr.
 """
 
+import gc
 import inspect
 import multiprocessing
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from functools import cache, partial
 from pickle import UnpicklingError
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -25,6 +27,7 @@ import numpy as np
 from llvmlite.binding import add_symbol
 from numba import njit, types
 from numba.core import event, funcdesc
+from numba.core.codegen import CPUCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.typing import Signature
 from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
@@ -68,8 +71,9 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     compile_one = compiled.compile
 
     def compile_with_parts(signature: Any) -> Any:
-        _load_parts(function)
-        return compile_one(signature)
+        with _without_detours():
+            _load_parts(function)
+            return compile_one(signature)
 
     # what numba calls before it compiles a function or reads it from disk
     compiled.compile = compile_with_parts
@@ -106,6 +110,30 @@ def part(function: Callable | None = None, **options: Any) -> Any:
         return context.call_internal(builder, own.callee, signature, arguments)
 
     return function
+
+
+@contextmanager
+def _without_detours() -> Generator[None, None, None]:
+    """Compile without the garbage collector and with LLVM's module passes only.
+
+    The collector walks through everything numba holds, again and again, a tenth of the
+    time; the passes over single functions, which are to save memory, are repeated by
+    those over modules.
+    """
+    collects, optimize = gc.isenabled(), CPUCodeLibrary._optimize_functions
+    gc.disable()
+    CPUCodeLibrary._optimize_functions = _keep_functions
+    try:
+        yield
+    finally:
+        CPUCodeLibrary._optimize_functions = optimize
+        if collects:
+            gc.enable()
+
+
+def _keep_functions(library: Any, module: Any) -> None:
+    """Numba's own, without the passes."""
+    module.data_layout = library._codegen._data_layout
 
 
 class _Part:
