@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from contextlib import contextmanager
-from io import SEEK_SET, FileIO
+from io import SEEK_SET, BytesIO, FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,25 +95,27 @@ def forgive_damaged_files() -> None:
 
 
 class _Target:
-    """The file that HDF5 writes to; a failure is kept until HDF5 has closed it.
+    """The file that HDF5 writes to; when it fails, a copy in memory takes its place.
 
-    HDF5 crashes the whole process at its end when a file could not be closed.
+    HDF5 crashes the whole process when a file cannot be closed, or when what it reads
+    is not what it wrote before.
     """
 
     def __init__(self, file: FileIO) -> None:
-        self.file = file
+        self.file: FileIO | BytesIO = file
         self.failure: OSError | None = None
 
     def write(self, content: Any) -> int:
         """Write the content; a failure is recorded and success returned."""
         left = memoryview(content).cast("B")
         size = len(left)
-        try:
-            while left and self.failure is None:
+        while left:
+            try:
                 count = self.file.write(left)
+            except OSError as error:
+                self._go_on_in_memory(error)
+            else:
                 left = left[count:]
-        except OSError as error:
-            self.failure = error
         return size
 
     def readinto(self, content: Any) -> int:
@@ -137,8 +139,16 @@ class _Target:
         try:
             return self.file.truncate(size)
         except OSError as error:
-            self.failure = self.failure or error
-            return size or 0
+            self._go_on_in_memory(error)
+            return self.truncate(size)
 
     def flush(self) -> None:
         """Nothing is buffered."""
+
+    def _go_on_in_memory(self, failure: OSError) -> None:
+        """Keep the failure and copy what has been written."""
+        self.failure = failure
+        position = self.file.tell()
+        self.file.seek(0)
+        self.file = BytesIO(self.file.read() or b"")
+        self.file.seek(position)

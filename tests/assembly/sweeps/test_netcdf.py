@@ -1,0 +1,53 @@
+"""A file of results on a full disk."""
+
+import os
+import resource
+
+import h5py
+import numpy as np
+import pytest
+
+from assembly.sweeps.netcdf import netcdf_file
+from forcefit.inputs.table import BadInput
+
+
+def write(path):
+    """Texts and numbers by slabs, as a sweep does; HDF5 reads back what it wrote."""
+    names = ("error", "message", "screw", "wrench")
+    with netcdf_file(path) as file:
+        file.dimensions = {"point": 6_000}
+        for name in names:
+            file.create_variable(name, ("point",), h5py.string_dtype())
+        for first in range(0, 6_000, 500):
+            texts = [f"point {first + row}, " * 20 for row in range(500)]
+            for name in names:
+                file[name][first : first + 500] = np.array(texts, dtype=object)
+
+
+def write_on_a_disk_of(size, path):
+    """The exit status of a process that may write so many bytes."""
+    child = os.fork()
+    if not child:
+        status = 1
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+            write(path)
+            status = 0
+        except BadInput as error:
+            status = 2 if "File too large" in str(error) else 3
+        finally:
+            os._exit(status)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.6, 0.95])
+def test_a_disk_full_at_any_moment_is_bad_input_and_leaves_nothing(tmp_path, share):
+    """HDF5 crashed where it read back what had not been written."""
+    path = tmp_path / "sweep.nc"
+    write(path)
+    size = path.stat().st_size
+    path.unlink()
+    assert write_on_a_disk_of(int(share * size), path) == 2
+    assert list(tmp_path.iterdir()) == []
+    assert write_on_a_disk_of(2 * size, path) == 0
+    assert path.stat().st_size == size
