@@ -140,3 +140,11 @@ def with_papers_errors(robot, seed, frames=PAPERS_FRAMES, signed=False):
         if frame.name.split(".")[-1] in frames:
             errors[i] = rng.uniform(-1.0 if signed else 0.0, 1.0, 6) * size
     return robot.with_errors(errors)
+
+
+def stack(postures):
+    """Frames and closure errors of postures, as the batch takes them."""
+    return (
+        np.array([p.transforms for p in postures]),
+        np.array([p.mismatch for p in postures]),
+    )

@@ -1,0 +1,75 @@
+"""Batched margins (21) against one at a time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.fallback import reference_margin
+from assembly.linear.zone import Zone, zone_margins
+from assembly.model.robot import Clearance
+from assembly.robots import BUILT_IN
+from tests.robots_for_tests import coaxial_beams, random_robot, stack
+
+
+def assert_same_margin(batch, i, zone):
+    """Both margins lie within 1e-8 of their common certified bounds."""
+    expected = np.inf if zone.margin is None else zone.margin
+    assert batch.margin[i] == pytest.approx(expected, rel=1e-7, abs=1e-10)
+    assert batch.bound[i] <= batch.margin[i] * (1 + 1e-11) + 1e-15
+    assert batch.bound[i] <= expected * (1 + 1e-9) + 1e-10
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_equal_one_at_a_time(grid, compliant):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    batch = zone_margins(robot, T, compliant, mismatch)
+    assert not batch.fallback.any()
+    for i in range(0, len(postures), 5):
+        assert_same_margin(batch, i, Zone(*reference_margin(postures[i], compliant)))
+    assert np.all(batch.bound >= batch.margin * (1 - 1e-8))
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rng):
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(80):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    compiled = 0
+    for home in homes:
+        errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
+        robot = home.robot.with_errors(errors)
+        batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
+        compiled += not batch.fallback[0]
+        assert_same_margin(
+            batch, 0, Zone(*reference_margin(replace(home, robot=robot), compliant))
+        )
+    assert compiled > 15
+
+
+def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
+    """5e-5 m across, 2e-5 m of play: 2.5, by hand."""
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
+    batch = zone_margins(robot, home_posture(robot).transforms[None])
+    assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
+    assert not batch.fallback[0]
+
+
+def test_a_margin_has_two_readings():
+    robot = coaxial_beams(np.zeros(6))
+    with pytest.raises(ValueError, match="compliant is 'soft'"):
+        zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")
+
+
+def test_margins_of_a_perfect_robot_are_zero_and_none_goes_to_the_fallback(grid):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for compliant in ("rigid", "free"):
+        margins = zone_margins(robot, T, compliant, mismatch, 0.0 * robot.errors)
+        assert not margins.fallback.any()
+        assert np.array_equal(margins.margin, np.zeros(len(T)))
+        assert np.array_equal(margins.bound, margins.margin)
