@@ -8,13 +8,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from hypothesis import settings
 
 from forcefit.commands import app as command
+
+# a command is the same whenever it is called: its options are read from the signatures
+# once, not in each of a thousand tests
+typer.main.get_command = cache(typer.main.get_command)
 
 # The same cases in every run: a commit is judged by what it changes, not by luck.
 # Others, on purpose: pytest --hypothesis-profile search --hypothesis-seed N

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -71,17 +72,25 @@ INDEPENDENT = (
 
 def imports(path):
     """Modules a file imports, in functions too; not those for type checkers only."""
-    waiting = [ast.parse(path.read_text(encoding="utf-8"))]
+    return imports_of(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imports_of(source):
+    """The same of its text: tests of the whole tree parse it once."""
+    modules = []
+    waiting = [ast.parse(source)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            modules += [f"{node.module}.{alias.name}" for alias in node.names]
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             waiting += node.orelse
         else:
             waiting += ast.iter_child_nodes(node)
+    return modules
 
 
 def chapter(module):

@@ -204,7 +204,7 @@ def _numba_type(hint: Any) -> types.Type:
     if get_origin(hint) is tuple:
         return types.BaseTuple.from_types(tuple(map(_numba_type, get_args(hint))))
     fields = get_type_hints(hint, include_extras=True)
-    return types.NamedTuple(tuple(map(_numba_type, fields.values())), hint)
+    return types.BaseTuple.from_types(tuple(map(_numba_type, fields.values())), hint)
 
 
 class _Announcement(event.Listener):

@@ -16,6 +16,8 @@ Sources:
     interior-point method for conic quadratic optimization (steps and starting point).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,14 +25,20 @@ from assembly.solvers.compiled import (
     GivenIndices,
     GivenMatrix,
     GivenVector,
-    Indices,
     Matrix,
     Vector,
     kernel,
     part,
 )
 from assembly.solvers.layers import FAST, LANES, add, cone_sums, dot, layers_of
-from assembly.solvers.nesterov_todd import corrected, scalings, square_scaled
+from assembly.solvers.nesterov_todd import (
+    Point,
+    Scaling,
+    Sides,
+    correct,
+    scale,
+    square_scaled,
+)
 from assembly.solvers.vectors import matrix, vector
 
 _ITERATIONS = 60
@@ -38,6 +46,28 @@ _BACK_OFF = 0.99  # of the step to the nearest boundary of a cone
 # 3 is usual; on these problems 2 takes a seventh, 1.5 a sixth less iterations
 _CENTRING = 1.5
 _FAR = 1e30
+
+
+class System(NamedTuple):
+    """The symmetric system of a step, S right = .., with G's and H's rows.
+
+    Attributes:
+        M: (m, width) G above H, columns in layers.
+        B: (m, width) M D^-1/2.
+        S: (m, m) M D^-1 M^T + diag(1 .. 1, 0 .. 0), then its factor.
+        residual: (p,) k - H u.
+        right: (m,) right side, then (G du, dn).
+        e: (width,) for what lives within a function.
+        f: (width,) the same.
+    """
+
+    M: Matrix
+    B: Matrix
+    S: Matrix
+    residual: Vector
+    right: Vector
+    e: Vector
+    f: Vector
 
 
 @part(fastmath=FAST)
@@ -73,21 +103,23 @@ def interior_point(
             M[i, j] = G[i, order[j]]
         for i in range(p):
             M[r + i, j] = H[i, order[j]]
-    # one number a column: u, z and their steps, scalings, right sides
-    columns = matrix(9, width)
-    u, z1, w1, l1, t1, f, du, dz1, e = (
-        columns[0], columns[1], columns[2], columns[3], columns[4], columns[5],
-        columns[6], columns[7], columns[8],
+    # one number a column, and one a cone
+    columns, heads = matrix(9, width), matrix(15, cones)
+    point = Point(columns[0], heads[0], columns[1])
+    step = Point(columns[2], heads[1], columns[3])
+    sides = Sides(heads[2], columns[4], heads[3])
+    scaling = Scaling(
+        layers, heads[4], heads[5], columns[5], heads[6], columns[6], heads[7],
+        heads[8], heads[9:],
     )  # fmt: skip
-    # one number a cone; the last six are sums within it
-    heads = matrix(15, cones)
-    z0, eta, w0, l0, t0, r0, dz0 = (
-        heads[0], heads[1], heads[2], heads[3], heads[4], heads[5], heads[6]
-    )  # fmt: skip
-    across, along, sums = heads[7], heads[8], heads[9:]
-    B, S = matrix(m, width), matrix(m, m)
+    system = System(
+        M, matrix(m, width), matrix(m, m), vector(p), vector(m), columns[7], columns[8]
+    )
+    u, z0, z1 = point.u, point.z0, point.z1
+    t0, t1, r0 = sides.t0, sides.t1, sides.r0
+    sums, residual = scaling.sums, system.residual
     # multipliers of all rows: springs' own, v = G u + h, and n
-    y, right, residual = vector(m), vector(m), vector(p)
+    y = vector(m)
     for i in range(r):
         y[i] = h[i]
     _dual(M, y, linear, z1)
@@ -111,40 +143,36 @@ def interior_point(
             taken = iteration
             break
         mu = gap / cones
-        # scaling of each cone, and S = M D^-1 M^T + diag(1 .. 1, 0 .. 0)
-        if not scalings(layers, u, z0, z1, eta, w0, w1, l0, l1, across, along, sums):
+        if not scale(point, scaling):
             break
-        _fill_system(layers, M, w1, eta, along, across, sums, B, S, r)
-        if not _cholesky(S):
+        _fill_system(system, scaling)
+        if not _cholesky(system.S):
             break
         # predictor: no centring, no correction
         cone_sums(layers, u, z1, sums[0])
         for c in range(cones):
-            t0[c] = -l0[c]
+            t0[c] = -scaling.l0[c]
             r0[c] = -z0[c] - sums[0, c]
         for j in range(width):
-            t1[j] = -l1[j]
-        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1,
-                   residual, r, sums, e, f, right, du, dz0, dz1)  # fmt: skip
-        step = min(1.0, _longest(layers, u, du, z0, z1, dz0, dz1, sums))
-        sigma = (1.0 - step) ** _CENTRING
+            t1[j] = -scaling.l1[j]
+        _direction(system, scaling, sides, point, step)
+        length = min(1.0, _longest(scaling, point, step))
+        sigma = (1.0 - length) ** _CENTRING
         # corrector: centre, and what the predictor's product of steps leaves
-        corrected(layers, eta, w0, w1, l0, l1, du, dz0, dz1, sigma * mu, sums,
-                   t0, t1, r0)  # fmt: skip
-        _direction(layers, M, S, eta, w0, w1, across, along, t0, t1, r0, u, z1,
-                   residual, r, sums, e, f, right, du, dz0, dz1)  # fmt: skip
-        step = min(1.0, _BACK_OFF * _longest(layers, u, du, z0, z1, dz0, dz1, sums))
-        if not step >= 1e-10:
+        correct(scaling, step, sigma * mu, sides)
+        _direction(system, scaling, sides, point, step)
+        length = min(1.0, _BACK_OFF * _longest(scaling, point, step))
+        if not length >= 1e-10:
             break
         for j in range(width):
-            u[j] += step * du[j]
+            u[j] += length * step.u[j]
         for c in range(cones):
-            z0[c] += step * dz0[c]
+            z0[c] += length * step.z0[c]
         # the balance holds by construction; computed anew it cannot drift
         for i in range(r):
             y[i] = h[i] + dot(M[i], u)
         for i in range(r, m):
-            y[i] += step * right[i]
+            y[i] += length * system.right[i]
         _dual(M, y, linear, z1)
     minimiser = vector(nu)
     for j in range(nu):
@@ -162,11 +190,11 @@ def _dual(M: NDArray, y: NDArray, linear: NDArray, z1: NDArray) -> None:
 
 
 @part(fastmath=FAST)
-def _fill_system(
-    layers: Indices, M: Matrix, w1: Vector, eta: Vector, along: Vector,
-    across: Vector, sums: Matrix, B: Matrix, S: Matrix, r: int,
-) -> None:  # fmt: skip
+def _fill_system(system: System, scaling: Scaling) -> None:
     """B = M D^-1/2, and S's lower half."""
+    M, B, S = system.M, system.B, system.S
+    layers, eta, w1 = scaling.layers, scaling.eta, scaling.w1
+    along, sums = scaling.along, scaling.sums
     part, root, inverse = sums[0], sums[1], sums[5]
     for c in range(len(root)):
         root[c] = np.sqrt(along[c])
@@ -183,7 +211,7 @@ def _fill_system(
                 out[c] = eta[c] * (own[c] - lengthwise) + root[c] * lengthwise
         for l in range(i + 1):
             S[i, l] = dot(scaled, B[l])
-    for i in range(r):
+    for i in range(len(S) - len(system.residual)):
         S[i, i] += 1.0
 
 
@@ -217,18 +245,18 @@ def _cholesky(S: Matrix) -> bool:
 
 @part(fastmath=FAST)
 def _direction(
-    layers: Indices, M: Matrix, S: Matrix, eta: Vector, w0: Vector, w1: Vector,
-    across: Vector, along: Vector, t0: Vector, t1: Vector, r0: Vector, u: Vector,
-    z1: Vector, residual: Vector, r: int, sums: Matrix, e: Vector,
-    f: Vector, right: Vector, du: Vector, dz0: Vector, dz1: Vector,
-) -> None:  # fmt: skip
+    system: System, scaling: Scaling, sides: Sides, point: Point, step: Point
+) -> None:
     """Step for the scaled right sides t, with M's rows eliminated.
 
     dz1 comes from the balance and dz0 from s.dz + z.ds = r0, the first row of the
     scaled complementarity: the equal W^-1 t - W^-2 ds cancels near the solution.
-    ``right`` is overwritten with (G du, dn).
     """
-    m = len(S)
+    M, S, right, e, f = system.M, system.S, system.right, system.e, system.f
+    layers, eta, w0, w1 = scaling.layers, scaling.eta, scaling.w0, scaling.w1
+    t0, t1, sums, residual = sides.t0, sides.t1, scaling.sums, system.residual
+    du, dz0, dz1 = step.u, step.z0, step.z1
+    m, p = len(S), len(residual)
     part, other = sums[0], sums[1]
     cone_sums(layers, w1, t1, part)  # f = (W^-1 t)_1
     for c in range(len(part)):
@@ -239,11 +267,11 @@ def _direction(
         w, t, out = w1[a:b], t1[a:b], f[a:b]
         for c in range(len(w)):
             out[c] = (t[c] + part[c] * w[c]) * other[c]
-    square_scaled(layers, w1, across, along, sums, f, e)
+    square_scaled(scaling, f, e)
     for i in range(m):
         right[i] = dot(M[i], e)
-    for i in range(m - r):
-        right[r + i] -= residual[i]
+    for i in range(p):
+        right[m - p + i] -= residual[i]
     for i in range(m):
         total = right[i]
         for j in range(i):
@@ -260,19 +288,19 @@ def _direction(
         add(right[i], M[i], dz1)
     for j in range(len(dz1)):
         e[j] = f[j] - dz1[j]
-    square_scaled(layers, w1, across, along, sums, e, du)  # du = D^-1 (f - M^T right)
-    cone_sums(layers, z1, du, part)
-    cone_sums(layers, u, dz1, other)
+    square_scaled(scaling, e, du)  # du = D^-1 (f - M^T right)
+    cone_sums(layers, point.z1, du, part)
+    cone_sums(layers, point.u, dz1, other)
     for c in range(len(part)):
-        dz0[c] = r0[c] - part[c] - other[c]
+        dz0[c] = sides.r0[c] - part[c] - other[c]
 
 
 @part(fastmath=FAST)
-def _longest(
-    layers: Indices, u: Vector, du: Vector, z0: Vector, z1: Vector, dz0: Vector,
-    dz1: Vector, sums: Matrix,
-) -> float:  # fmt: skip
+def _longest(scaling: Scaling, point: Point, step: Point) -> float:
     """Longest step that keeps every s and z in its cone."""
+    layers, sums = scaling.layers, scaling.sums
+    u, z0, z1 = point.u, point.z0, point.z1
+    du, dz0, dz1 = step.u, step.z0, step.z1
     aa, ab, bb = sums[0], sums[1], sums[2]
     cone_sums(layers, du, du, aa)
     cone_sums(layers, u, du, ab)

@@ -6,26 +6,82 @@ Sources:
     interior-point method for conic quadratic optimization.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, part
 from assembly.solvers.layers import FAST, cone_sums
 
 
-@part(fastmath=FAST)
-def scalings(
-    layers: Indices, u: Vector, z0: Vector, z1: Vector, eta: Vector, w0: Vector,
-    w1: Vector, l0: Vector, l1: Vector, across: Vector, along: Vector,
-    sums: Matrix,
-) -> bool:  # fmt: skip
+class Point(NamedTuple):
+    """An iterate (u, z) of all cones, s = (1, u), or a step of it.
+
+    Attributes:
+        u: (width,).
+        z0: (cones,) heads of z.
+        z1: (width,) the rest of z.
+    """
+
+    u: Vector
+    z0: Vector
+    z1: Vector
+
+
+class Sides(NamedTuple):
+    """Right sides of the scaled complementarity.
+
+    Attributes:
+        t0: (cones,) heads of t, l o t = r.
+        t1: (width,) the rest of t.
+        r0: (cones,) heads of r.
+    """
+
+    t0: Vector
+    t1: Vector
+    r0: Vector
+
+
+class Scaling(NamedTuple):
     """Nesterov-Todd points of all cones, W = eta (w), and the scaled point l = W z.
 
     D^-1 = W^2 is ``across`` across w and ``along`` along it; w grows without bound, so
-    the two are kept apart.  ``sums[5]`` is overwritten with 1 / w.w.
+    the two are kept apart.
+
+    Attributes:
+        layers: of the columns.
+        eta: (cones,).
+        w0: (cones,) heads of w.
+        w1: (width,) the rest of w.
+        l0: (cones,) heads of l.
+        l1: (width,) the rest of l.
+        across: (cones,).
+        along: (cones,).
+        sums: (6, cones) for sums within cones; the last is the scaling's, 1 / w.w.
+    """
+
+    layers: Indices
+    eta: Vector
+    w0: Vector
+    w1: Vector
+    l0: Vector
+    l1: Vector
+    across: Vector
+    along: Vector
+    sums: Matrix
+
+
+@part(fastmath=FAST)
+def scale(point: Point, scaling: Scaling) -> bool:
+    """Overwrite the scaling with that of a point.
 
     Returns:
-        Whether all cones have such points.
+        Whether all cones have Nesterov-Todd points.
     """
+    u, z0, z1 = point.u, point.z0, point.z1
+    layers, sums = scaling.layers, scaling.sums
+    eta, w0, w1 = scaling.eta, scaling.w0, scaling.w1
+    l0, l1, across, along = scaling.l0, scaling.l1, scaling.across, scaling.along
     ss, zz, sz, s_part, z_part, inverse = (
         sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
     )  # fmt: skip
@@ -71,11 +127,10 @@ def scalings(
 
 
 @part(fastmath=FAST)
-def square_scaled(
-    layers: Indices, w1: Vector, across: Vector, along: Vector, sums: Matrix,
-    x: Vector, out: Vector,
-) -> None:  # fmt: skip
+def square_scaled(scaling: Scaling, x: Vector, out: Vector) -> None:
     """D^-1 x."""
+    layers, w1, sums = scaling.layers, scaling.w1, scaling.sums
+    across, along = scaling.across, scaling.along
     part, inverse = sums[0], sums[5]
     cone_sums(layers, x, w1, part)
     for c in range(len(part)):
@@ -89,12 +144,12 @@ def square_scaled(
 
 
 @part(fastmath=FAST)
-def corrected(
-    layers: Indices, eta: Vector, w0: Vector, w1: Vector, l0: Vector, l1: Vector,
-    du: Vector, dz0: Vector, dz1: Vector, target: float, sums: Matrix,
-    t0: Vector, t1: Vector, r0: Vector,
-) -> None:  # fmt: skip
+def correct(scaling: Scaling, step: Point, target: float, sides: Sides) -> None:
     """Solve l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t."""
+    du, dz0, dz1 = step.u, step.z0, step.z1
+    t0, t1, r0 = sides.t0, sides.t1, sides.r0
+    layers, eta, w0, w1 = scaling.layers, scaling.eta, scaling.w0, scaling.w1
+    l0, l1, sums = scaling.l0, scaling.l1, scaling.sums
     ds, dz, ll, lt = sums[0], sums[1], sums[2], sums[3]
     cone_sums(layers, w1, du, ds)
     cone_sums(layers, w1, dz1, dz)

@@ -26,6 +26,7 @@ def bar_surface(facets=48):
 PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 
 
+@pytest.mark.slow
 def test_the_papers_bar_from_its_surface(cache):
     """Converged references: bending 1 032 277 N m/rad, torsion G J / L.
 

@@ -192,6 +192,7 @@ def le11_stress(counts):
     return stress_at(mesh, held, loads, middle, direction=2) - thermal
 
 
+@pytest.mark.slow
 def test_le11_solid_cylinder_taper_sphere():
     """T = r + z, 2.3e-4 / K, ends held along z; sigma_zz at A is -105 MPa, 0.6 %.
 
