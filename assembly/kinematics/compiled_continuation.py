@@ -1,10 +1,7 @@
-"""Continuation from home to a target, compiled, for :mod:`assembly.kinematics.nominal`.
-
-Everything is plain arrays: ``kinds`` 0 fixed, 1 revolute, 2 prismatic; ``carries`` 1 in
-row i where joint j's motion moves frame i; ``pairs`` rows of each closure's frames.
-"""
+"""Continuation to a target, compiled, for :mod:`assembly.kinematics.nominal`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +13,6 @@ from assembly.kinematics.compiled_rotations import (
     times_transposed,
 )
 from assembly.solvers.compiled import (
-    GivenIndices,
-    GivenMatrices,
     IndexRows,
     Indices,
     Matrices,
@@ -43,25 +38,52 @@ _SMALLEST_STEP = 1e-5
 _NEWTON = 12  # iterations; quadratic convergence needs about 4
 
 
+class Tree(NamedTuple):
+    """A robot of n frames as arrays.
+
+    Attributes:
+        parents: (n,) rows, -1 for the base.
+        kinds: (n,) of joints: 0 fixed, 1 revolute, 2 prismatic.
+        fixed: (n, 4, 4) frames in their parents.
+        carries: (n, n) 1 in row i where joint j's motion moves frame i, else 0.
+        pairs: (closures, 2) rows of each closure's frames.
+        platform: its row.
+        size: [m] reference length.
+    """
+
+    parents: Indices
+    kinds: Indices
+    fixed: Matrices
+    carries: Matrix
+    pairs: IndexRows
+    platform: int
+    size: float
+
+
+class Free(NamedTuple):
+    """The coordinates that are solved for.
+
+    Attributes:
+        joints: (m,) their rows.
+        unit: (m,) reference length where they slide, else 1.
+    """
+
+    joints: Indices
+    unit: Vector
+
+
 @kernel
 def follow_all(
-    parents: NDArray, kinds: NDArray, fixed: NDArray, carries: NDArray, pairs: NDArray,
-    platform: int, start: NDArray, poses: NDArray, held: NDArray, size: float,
-    guess: bool, T: NDArray, still_open: NDArray,
+    tree: Tree, start: NDArray, poses: NDArray, held: NDArray, guess: bool, T: NDArray,
+    still_open: NDArray,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Follow every target along its straight line.
 
     Args:
-        parents: (n,) rows, -1 for the base.
-        kinds: (n,) of joints.
-        fixed: (n, 4, 4) frames in their parents.
-        carries: (n, n) 0 or 1.
-        pairs: (closures, 2) rows.
-        platform: its row.
+        tree: the robot, of n frames.
         start: (n,) coordinates at home.
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
         held: (k, n) coordinates, NaN where free.
-        size: [m] reference length.
         guess: the start is one, and does not close: one step, of any length.
         T: (k, n, 4, 4) to fill: rotations and origins of all frames where tracks end.
         still_open: (k, closures) to fill [rad, m]: largest component of each closure.
@@ -75,18 +97,15 @@ def follow_all(
     for i in range(count):
         for k in range(6):
             pose[k] = poses[i, k] if len(poses) else np.nan
-        progress[i] = _follow(
-            parents, kinds, fixed, carries, pairs, platform, start, pose, held[i],
-            size, guess, ends[i],
-        )  # fmt: skip
-        R, p = forward(parents, kinds, fixed, ends[i])
+        progress[i] = _follow(tree, start, pose, held[i], guess, ends[i])
+        R, p = forward(tree, ends[i])
         for j in range(n):
             for k in range(3):
                 T[i, j, k, 3] = p[j, k]
                 for l in range(3):
                     T[i, j, k, l] = R[j, k, l]
-        for c in range(len(pairs)):
-            a, b = pairs[c]
+        for c in range(len(tree.pairs)):
+            a, b = tree.pairs[c]
             turn = rotation_log(times_transposed(R[a], R[b]))
             for k in range(3):
                 most = max(abs(turn[k]), abs(p[a, k] - p[b, k]))
@@ -98,19 +117,18 @@ def follow_all(
 
 @part
 def _follow(
-    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
-    pairs: IndexRows, platform: int, start: Vector, pose: Vector,
-    held: Vector, size: float, guess: bool, q: Vector,
-) -> float:  # fmt: skip
+    tree: Tree, start: Vector, pose: Vector, held: Vector, guess: bool, q: Vector
+) -> float:
     """One target, q: as far a step as the tangent allows, half of it where it fails."""
     n = len(q)
     copy(start, q)
-    R, p = forward(parents, kinds, fixed, q)
-    home_pose, turn = vector(6), rotation_log(R[platform])
+    R, p = forward(tree, q)
+    home_pose, turn = vector(6), rotation_log(R[tree.platform])
     for k in range(3):
-        home_pose[k], home_pose[3 + k] = p[platform, k], turn[k]
+        home_pose[k], home_pose[3 + k] = p[tree.platform, k], turn[k]
     part, part_held, tried = vector(6), vector(n), vector(n)
-    jump = np.inf if guess else _FAR * max(1.0, size)
+    longest = max(1.0, tree.size)
+    jump = np.inf if guess else _FAR * longest
     done, step, careful = 0.0, 1.0, guess
     while done < 1.0 and step > _SMALLEST_STEP:
         goal = min(1.0, done + step)
@@ -124,13 +142,12 @@ def _follow(
                 part_held[j] = start[j] + goal * (held[j] - start[j])
             tried[j] = q[j]
         fine, determined, ahead = _newton(
-            parents, kinds, fixed, carries, pairs, platform, tried, part, part_held,
-            size, goal < 1.0, jump, careful,
-        )  # fmt: skip
+            tree, tried, part, part_held, goal < 1.0, jump, careful
+        )
         if not careful and (not determined or step < _SHORT):
             # where it ends depends on the way, or the way is hard: by short steps
             copy(start, q)
-            done, step, careful, jump = 0.0, _FIRST_STEP, True, _JUMP * max(1.0, size)
+            done, step, careful, jump = 0.0, _FIRST_STEP, True, _JUMP * longest
             continue
         for j in range(n):
             # a jump, or a coordinate that is NaN: another assembly mode
@@ -150,9 +167,8 @@ def _follow(
 
 @part
 def _newton(
-    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, carries: Matrix,
-    pairs: IndexRows, platform: int, q: Vector, pose: Vector, held: Vector,
-    size: float, near: bool, jump: float, careful: bool,
+    tree: Tree, q: Vector, pose: Vector, held: Vector, near: bool, jump: float,
+    careful: bool,
 ) -> tuple[bool, bool, float]:  # fmt: skip
     """Damped Gauss-Newton of least norm on closures and pose.
 
@@ -161,23 +177,24 @@ def _newton(
         that was asked; how far the tangent moves a joint.
     """
     n, count = len(q), 0
-    free, unit = indices(n), vector(n)
+    joints, unit = indices(n), vector(n)
     ahead = 0.0
     for j in range(n):
         if np.isfinite(held[j]):
             ahead = max(ahead, abs(held[j] - q[j]))
             q[j] = held[j]
-        elif kinds[j] > 0:
-            free[count], unit[count] = j, size if kinds[j] == 2 else 1.0
+        elif tree.kinds[j] > 0:
+            joints[count], unit[count] = j, tree.size if tree.kinds[j] == 2 else 1.0
             count += 1
-    free, unit = free[:count], unit[:count]
-    rows = 6 * len(pairs) + 6
+    joints, unit = joints[:count], unit[:count]
+    free = Free(joints, unit)
+    rows = 6 * len(tree.pairs) + 6
     # columns as rows, padded with zeros to a multiple of the vector registers
     r, J = vector(rows + -rows % LANES), matrix(count, rows + -rows % LANES)
     before, first = np.inf, 0.0
     for iteration in range(_NEWTON):
-        R, p = forward(parents, kinds, fixed, q)
-        _equations(kinds, carries, pairs, platform, R, p, pose, free, unit, size, r, J)
+        R, p = forward(tree, q)
+        _equations(tree, R, p, pose, free, r, J)
         worst = _largest(r)
         if near and not careful and worst < _NEAR:
             return True, True, ahead
@@ -194,7 +211,7 @@ def _newton(
         first = max(first, largest)
         limit = 0.5 / max(0.5, largest)
         for i in range(count):
-            q[free[i]] -= x[i] * limit * unit[i]
+            q[joints[i]] -= x[i] * limit * unit[i]
         if worst < 1e-14 or still or not np.isfinite(worst):
             # solved, or as well as a rounded overconstrained file can be
             return worst < _SOLVED or (still and worst < _ROUNDED), True, ahead
@@ -205,11 +222,9 @@ def _newton(
 
 
 @part
-def forward(
-    parents: GivenIndices, kinds: Indices, fixed: GivenMatrices, q: Vector
-) -> tuple[Matrices, Matrix]:
+def forward(tree: Tree, q: Vector) -> tuple[Matrices, Matrix]:
     """Rotations (n, 3, 3) and origins (n, 3) of all frames before their own motion."""
-    n = len(q)
+    n, parents, kinds, fixed = len(q), tree.parents, tree.kinds, tree.fixed
     R, p = matrices(n, 3, 3), matrix(n, 3)
     after_R, after_p = matrices(n, 3, 3), matrix(n, 3)
     for i in range(n):
@@ -236,31 +251,41 @@ def forward(
 
 @part
 def _equations(
-    kinds: Indices, carries: Matrix, pairs: IndexRows, platform: int, R: Matrices,
-    p: Matrix, pose: Vector, free: Indices, unit: Vector, size: float, r: Vector,
-    J: Matrix,
-) -> None:  # fmt: skip
+    tree: Tree, R: Matrices, p: Matrix, pose: Vector, free: Free, r: Vector, J: Matrix
+) -> None:
     """Scaled residuals and, a row for each free joint, their derivatives."""
+    kinds, carries, pairs = tree.kinds, tree.carries, tree.pairs
+    platform, size = tree.platform, tree.size
+    joints, unit = free.joints, free.unit
     for c in range(len(pairs)):
         a, b = pairs[c]
         row = 6 * c
         turn = rotation_log(times_transposed(R[a], R[b]))
         for k in range(3):
             r[row + k], r[row + 3 + k] = turn[k], (p[a, k] - p[b, k]) / size
-        for i in range(len(free)):
-            j = free[i]
+        for i in range(len(joints)):
+            j = joints[i]
             sign = carries[a, j] - carries[b, j]
             if sign != 0.0:
-                _move(kinds[j], R[j], p[j], p[a], sign * unit[i], size, J[i], row)
+                _move(
+                    kinds[j],
+                    R[j],
+                    p[j],
+                    p[a],
+                    sign * unit[i],
+                    size,
+                    J[i, row : row + 6],
+                )
     row = 6 * len(pairs)
     whole, none = True, True
     for k in range(3):
         whole = whole and np.isfinite(pose[3 + k])
         none = none and not np.isfinite(pose[3 + k])
-    for i in range(len(free)):
-        j = free[i]
+    for i in range(len(joints)):
+        j = joints[i]
         if carries[platform, j] != 0.0:
-            _move(kinds[j], R[j], p[j], p[platform], unit[i], size, J[i], row)
+            out = J[i, row : row + 6]
+            _move(kinds[j], R[j], p[j], p[platform], unit[i], size, out)
     turn = vector(3)
     if whole:
         # regular near half a turn when the whole rotation is given
@@ -269,7 +294,7 @@ def _equations(
     elif not none:
         turn = rotation_log(R[platform])
         left = inverse_left_jacobian(turn)
-        for i in range(len(free)):
+        for i in range(len(joints)):
             a0, a1, a2 = J[i, row], J[i, row + 1], J[i, row + 2]
             for k in range(3):
                 J[i, row + k] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
@@ -280,26 +305,26 @@ def _equations(
     for k in range(6):
         if not np.isfinite(pose[(k + 3) % 6]):
             r[row + k] = 0.0
-            for i in range(len(free)):
+            for i in range(len(joints)):
                 J[i, row + k] = 0.0
 
 
 @part
 def _move(
     kind: int, R: Matrix, origin: Vector, point: Vector, factor: float, size: float,
-    J: Vector, row: int,
+    screw: Vector,
 ) -> None:  # fmt: skip
-    """Screw of a unit joint motion at a point, scaled, from a place on."""
+    """Screw of a unit joint motion at a point, scaled."""
     for k in range(3):
         l, m = (k + 1) % 3, (k + 2) % 3
         if kind == 1:
-            J[row + k] = factor * R[k, 2]
+            screw[k] = factor * R[k, 2]
             moment = R[l, 2] * (point[m] - origin[m])
             moment -= R[m, 2] * (point[l] - origin[l])
-            J[row + 3 + k] = factor * moment / size
+            screw[3 + k] = factor * moment / size
         else:
-            J[row + k] = 0.0
-            J[row + 3 + k] = factor * R[k, 2] / size
+            screw[k] = 0.0
+            screw[3 + k] = factor * R[k, 2] / size
 
 
 @part

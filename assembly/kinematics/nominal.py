@@ -8,12 +8,15 @@ loops are compiled, in :mod:`assembly.kinematics.compiled_continuation`.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import JOINTS, Robot
+
+if TYPE_CHECKING:
+    from assembly.kinematics.compiled_continuation import Tree
 
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
@@ -90,29 +93,21 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
     return np.where(prismatic, sliding, turning) * mobile(robot)[:, None]
 
 
-class _Tree(NamedTuple):
-    """A robot as the compiled continuation reads it, its first arguments."""
-
-    parents: NDArray
-    kinds: NDArray
-    fixed: NDArray
-    carries: NDArray
-    pairs: NDArray
-    platform: int
-
-
 @lru_cache(maxsize=64)
-def _tree(robot: Robot) -> _Tree:
+def _tree(robot: Robot) -> "Tree":
     """The arrays, once for each robot."""
+    from assembly.kinematics.compiled_continuation import Tree
+
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    return _Tree(
-        parents=robot.parents,
+    return Tree(
+        parents=np.array(robot.parents),
         kinds=np.array([JOINTS.index(f.joint) for f in robot.frames]),
-        fixed=robot.fixed_transforms,
+        fixed=np.array(robot.fixed_transforms),
         # a joint's motion comes after its own frame
         carries=robot.on_path - np.eye(len(robot.frames)),
         pairs=np.array(pairs, dtype=int).reshape(-1, 2),
         platform=robot.index(robot.platform),
+        size=size_of(robot),
     )
 
 
@@ -139,7 +134,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
     T, still_open = np.zeros((count, n, 4, 4)), np.zeros((count, len(tree.pairs)))
     T[..., 3, 3] = 1.0
     q, progress = follow_all(
-        *tree, np.array(start, dtype=float), np.array(poses, dtype=float), held,
-        size_of(robot), guess, T, still_open,
+        tree, np.array(start, dtype=float), np.array(poses, dtype=float), held, guess,
+        T, still_open,
     )  # fmt: skip
     return Track(q, T, progress, still_open)
