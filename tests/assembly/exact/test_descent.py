@@ -1,5 +1,7 @@
 """What a step of the exact equilibrium promises."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,7 +30,9 @@ def test_a_step_gains_what_its_expansion_foretells(seed, start):
     """
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, 2, 3)
-    posture = home_posture(robot.with_errors(1e-4 * robot.errors))
+    stiff = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    robot = replace(robot, frames=stiff).with_errors(1e-3 * robot.errors)
+    posture = home_posture(robot)
     least = solve_assembly(posture)
     joints = virtual_joints(posture.robot)
     unknowns = sum(
@@ -38,7 +42,7 @@ def test_a_step_gains_what_its_expansion_foretells(seed, start):
     ended = step_from(at_rest, posture)
     part_way = place(at_rest.model, start * ended.placement.x)
     step = step_from(part_way, posture)
-    assert energy_of(step.placement) == pytest.approx(least.energy, rel=1e-3)
+    assert energy_of(step.placement) == pytest.approx(least.energy, rel=1e-3, abs=0)
     gained = energy_of(part_way) - energy_of(step.placement)
     assert abs(gained) > 0.1 * least.energy
-    assert step.gain == pytest.approx(gained, rel=1e-3)
+    assert step.gain == pytest.approx(gained, rel=1e-3, abs=0)
