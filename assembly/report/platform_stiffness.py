@@ -74,6 +74,8 @@ def stiffness_of(
         point = platform[:3, 3] + platform[:3, :3] @ np.asarray(at, dtype=float)
         values = [stiffness_values(side, point, length) for side in sides]
         results |= values[0] | {"status": _status(sides[0])}
+        if sides[0].free_text:
+            results["reason"] = sides[0].free_text
         if direction is not None:
             results["direction"] = _along(sides[0].at(point, length), direction)
         if exact:

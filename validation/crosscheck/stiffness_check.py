@@ -161,8 +161,7 @@ def check_stiffness(
     assembly = solve_exact(posture, wrench, gravity=gravity)
     exact = exact_tangent(assembly)
     if exact.free.shape[1]:
-        screw = numbers(exact.free[:, 0])
-        raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
+        raise FreeMotion(exact.free_text)
     model = link_models(robot, links)
     scale = np.repeat([1.0, 1.0 / exact.length], 3)
     columns, turns = [], []
