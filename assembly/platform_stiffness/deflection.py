@@ -23,8 +23,9 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.nearest_pose import nearest_pose
+from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import contacts, in_contact
+from assembly.platform_stiffness.linear_tangent import in_contact
 from assembly.platform_stiffness.matrices import (
     Part,
     PlatformStiffness,

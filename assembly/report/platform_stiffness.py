@@ -10,10 +10,10 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
     Side,
-    contacts,
     in_contact,
     without_clearance,
 )
