@@ -4,7 +4,7 @@
 along each axis, and how far each method's compliance is from the first, entries over
 sqrt(C_ii C_jj): virtual joints, the same compiled, the displacement method over all
 bodies, the tangent of the exact equilibrium, differences of the least energy (22), load
-steps in Exudyn with links as springs and as beams.
+steps in Exudyn with links as springs and as beams, and Exudyn's linearised system.
 """
 
 from dataclasses import replace
@@ -19,7 +19,9 @@ from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from validation.assumptions.platform_cost import solid_compliance
+from validation.crosscheck.link_models import link_models
 from validation.crosscheck.stiffness_check import check_stiffness
+from validation.multibody.linearised import linearised_compliance
 
 POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None}
 
@@ -40,7 +42,12 @@ def methods(posture: Posture) -> dict[str, NDArray]:
         "(22), unit loads": np.array(moved).T,
         "Exudyn, springs": check_stiffness(tight_posture).simulated,
         "Exudyn, beams": check_stiffness(tight_posture, links="beam").simulated,
-    }
+    } | {
+        f"linearised, {links}s": linearised_compliance(
+            tight_posture, link_models(tight, links)
+        )
+        for links in ("spring", "beam")
+    }  # fmt: skip
 
 
 def main() -> None:

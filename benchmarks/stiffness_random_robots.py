@@ -2,26 +2,31 @@
 
 ``python -m benchmarks.stiffness_random_robots``
 
-100 robots of one to three legs, and the built-in ones, with play, errors and loads,
-each three times: at home and two more poses to which its drives take it, or at three
-sizes of its errors where they move nothing, as in most random loops.  The exact tangent
-against differences of the exact equilibrium by the load; the classical matrix against
-the least energy (22) without play; the compiled one against that of one posture at a
-time.  Every robot has a matrix or a reason; differences are entries over
-sqrt(C_ii C_jj).  Differences by the load are extrapolated from several steps, each by
-itself, and of them that is taken which differs least from its neighbours (Ridders):
-small steps leave the solver's noise, large ones meet other contacts.  The compared
-tangent has no part in the choice.
+100 random robots of one to three legs, with play, errors and loads, each at home and at
+two more poses to which its drives take it; random robots are drawn until so many can
+move.  Then the built-in ones, at three sizes of their errors where they cannot.  The
+exact tangent against differences of the exact equilibrium by the load; the classical
+matrix against the least energy (22) without play, against the compiled one, and against
+load steps in Exudyn, links as springs.  Every robot has a matrix or a reason;
+differences are entries over sqrt(C_ii C_jj).
+
+Differences by the load are extrapolated from several steps, each by itself, and of them
+that is taken which differs least from its neighbours (Ridders): small steps leave the
+rounding of positions, 1e-14 m, beside a small motion, large ones meet other contacts or
+no equilibrium.  The compared tangent has no part in the choice.
+
+Exudyn holds what is idle by springs of its own: here of 1e-8 N m/rad, as 1e-6 shows in
+proportion beside springs of 1 N m/rad.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exact.exact import solve_exact
+from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_many_joints
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.linear.energy import CannotAssemble, solve_assembly
@@ -33,12 +38,19 @@ from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import BUILT_IN, load_robot
 from assembly.solvers.conic import SolverFailed
 from tests.robots_for_tests import random_robot
+from validation.crosscheck.stiffness_check import check_stiffness
+from validation.multibody import simulation
+from validation.multibody.exudyn_model import Regularisation
+from validation.multibody.simulation import SimulationFailed
 
 ROBOTS, SIZES = 100, (0.1, 0.3, 1.0)
+LEGS = {1: 3, 2: 6, 3: 7}  # joints of each leg, so that loops can move
+TIME_LIMIT = 5.0  # [s] of one simulation
 ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
 _FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
-_STEPS = 0.02 * 0.2 ** np.arange(5)  # of the loads' sizes
+_STEPS = 0.5 * 0.2 ** np.arange(7)  # of the loads' sizes
+_IDLE = tuple(Regularisation(k, 1e-8) for k in (1e10, 1e9))
 
 
 def relative(C: NDArray, other: NDArray) -> float:
@@ -59,23 +71,49 @@ def limit(slopes: NDArray) -> NDArray:
     return better[int(np.argmin(change)) + 1]
 
 
+def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
+    """The equilibrium under a load, or under the tenth or hundredth it carries."""
+    for share in (1.0, 0.1):
+        try:
+            return solve_exact(posture, share * load), share
+        except SolverFailed:
+            continue
+    return solve_exact(posture, 0.01 * load), 0.01
+
+
+def slopes_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
+    """(k, 6) central differences along a load, at falling steps."""
+    slopes: list[NDArray] = []
+    for step in _STEPS:
+        try:
+            ahead, back = (
+                solve_exact(
+                    equilibrium.posture, equilibrium.load + sign * step * unit,
+                    near=equilibrium,
+                ).platform_screw
+                for sign in (1, -1)
+            )  # fmt: skip
+        except SolverFailed:
+            # a large step may leave what any equilibrium carries
+            if step <= _STEPS[-3]:
+                raise
+            slopes.clear()
+        else:
+            slopes.append((ahead - back) / (2 * step))
+    return np.array(slopes)
+
+
 def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
     """Exact tangent against central differences, or why there is none."""
     try:
-        equilibrium = solve_exact(posture, load)
+        equilibrium, share = carried(posture, load)
         C = exact_tangent(equilibrium).compliance
         finite = np.flatnonzero(np.isfinite(C).all(axis=0))
-        columns = []
-        for row in finite:
-            unit = _SIZE[row] * np.eye(6)[row]
-            slopes = [
-                np.subtract(*(
-                    solve_exact(posture, load + sign * step * unit, near=equilibrium)
-                    .platform_screw for sign in (1, -1)
-                )) / (2 * step * _SIZE[row])
-                for step in _STEPS
-            ]  # fmt: skip
-            columns.append(limit(np.array(slopes)))
+        size = share * _SIZE
+        columns = [
+            limit(slopes_by(equilibrium, size[row] * np.eye(6)[row])) / size[row]
+            for row in finite
+        ]
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return np.nan, type(error).__name__
     if not len(finite):
@@ -86,7 +124,8 @@ def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
         return np.nan, "turned, and free in some directions"
     D = J @ np.column_stack(columns)
     D = D @ J.T if len(finite) == 6 else D
-    return relative(C[np.ix_(finite, finite)], D[finite]), "compared"
+    off = relative(C[np.ix_(finite, finite)], D[finite])
+    return off, f"compared under {share:g} of the load"
 
 
 def by_least_energy(posture: Posture) -> float:
@@ -104,8 +143,18 @@ def by_least_energy(posture: Posture) -> float:
     return relative(C[part], np.array(moved).T[finite])
 
 
-def cases(robot: Robot, rng: np.random.Generator) -> list[Posture]:
-    """Three postures of a robot, or one at three sizes of its errors."""
+def by_simulation(posture: Posture) -> tuple[float, str]:
+    """The classical matrix against load steps in Exudyn of the robot without errors."""
+    robot = posture.robot.with_errors(np.zeros_like(posture.robot.errors))
+    try:
+        check = check_stiffness(replace(posture, robot=robot), time_limit=TIME_LIMIT)
+    except (CannotAssemble, FreeMotion, SimulationFailed) as error:
+        return np.nan, type(error).__name__
+    return check.differences["exact"], "compared"
+
+
+def moved_postures(robot: Robot, rng: np.random.Generator) -> list[Posture]:
+    """Home and two poses to which the drives take a robot; fewer if they cannot."""
     home = home_posture(robot)
     driven = np.array([frame.actuated for frame in robot.frames])
     steps = rng.uniform(-_FAR, _FAR, (8, len(driven)))
@@ -115,54 +164,79 @@ def cases(robot: Robot, rng: np.random.Generator) -> list[Posture]:
         for posture in place_many_joints(robot, goals)[0]
         if posture and np.abs(posture.platform - home.platform).max() > _MOVED
     ]
-    if len(moved) >= 2:
-        return [home, *moved[:2]]
-    return [
-        replace(home, robot=robot.with_errors(size * robot.errors)) for size in SIZES
-    ]
+    return [home, *moved[:2]]
 
 
-def robots() -> Iterator[tuple[Robot, np.random.Generator]]:
-    """The built-in ones with errors of up to a mrad and 0.1 mm, then random ones."""
+def built_in() -> Iterator[tuple[list[Posture], NDArray]]:
+    """Postures and loads of the built-in robots, errors up to a mrad and 0.1 mm."""
     for seed, name in enumerate(BUILT_IN):
         rng, robot = np.random.default_rng(seed), load_robot(name)
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * ERRORS
-        yield robot.with_errors(errors), rng
-    for seed in range(ROBOTS):
-        rng = np.random.default_rng(seed)
-        yield random_robot(rng, legs=int(rng.integers(1, 4))), rng
-
-
-def main() -> None:
-    """Print the three comparisons."""
-    reasons: Counter[str] = Counter()
-    exact, linear, compiled = [], [], []
-    moving = 0
-    for robot, rng in robots():
+        robot = robot.with_errors(errors)
         load = rng.normal(size=6) * _SIZE
-        postures = cases(robot, rng)
-        moving += postures[0].robot is postures[1].robot
+        postures = moved_postures(robot, rng)
+        if len(postures) < 3:
+            sized = (robot.with_errors(size * robot.errors) for size in SIZES)
+            postures = [replace(postures[0], robot=one) for one in sized]
+        yield postures, load
+
+
+def random_ones() -> Iterator[tuple[list[Posture], NDArray]]:
+    """Postures and loads of random robots that can move."""
+    drawn, kept, loops = 0, 0, 0
+    while kept < ROBOTS:
+        rng = np.random.default_rng(10_000 + drawn)
+        drawn += 1
+        legs = int(rng.integers(1, 4))
+        robot = random_robot(rng, legs=legs, joints=LEGS[legs])
+        load = rng.normal(size=6) * _SIZE
+        postures = moved_postures(robot, rng)
+        if len(postures) == 3:
+            kept, loops = kept + 1, loops + (legs > 1)
+            yield postures, load
+    print(f"{ROBOTS} of {drawn} random robots can move, {loops} of them in loops")
+
+
+def compare(robots: Iterable[tuple[list[Posture], NDArray]]) -> None:
+    """Print the four comparisons of some robots."""
+    reasons: dict[str, Counter[str]] = {"exact": Counter(), "Exudyn": Counter()}
+    values: dict[str, list[float]] = {
+        "exact tangent, differences": [], "classical, (22)": [],
+        "compiled, one by one": [], "classical, Exudyn": [],
+    }  # fmt: skip
+    exact, linear, compiled, simulated = values.values()
+    for postures, load in robots:
         for posture in postures:
             linear.append(by_least_energy(posture))
             T = posture.transforms[None]
-            many = platform_stiffnesses(robot, T, posture.mismatch)
+            many = platform_stiffnesses(posture.robot, T, posture.mismatch)
             one = without_clearance(posture)
             if not one.free.size:
                 compiled.append(relative(one.compliance, many.compliance[0]))
-            off, reason = by_differences(posture, load)
-            reasons[reason] += 1
-            exact.append(off)
-    print(f"{moving} robots at three poses, the others at three sizes of their errors")
-    for name, values in (
-        ("exact tangent, differences", exact), ("classical, (22)", linear),
-        ("compiled, one by one", compiled),
-    ):  # fmt: skip
-        known = np.array([v for v in values if np.isfinite(v)])
+            for into, key, (off, reason) in (
+                (exact, "exact", by_differences(posture, load)),
+                (simulated, "Exudyn", by_simulation(posture)),
+            ):
+                into.append(off)
+                reasons[key][reason] += 1
+    for name, differences in values.items():
+        known = np.array([v for v in differences if np.isfinite(v)])
+        largest = " ".join(f"{v:.1e}" for v in np.sort(known)[:-4:-1])
         print(
             f"{name:28s} {len(known):4d} compared: median {np.median(known):.1e}, "
-            f"90 % {np.quantile(known, 0.9):.1e}, largest {known.max():.1e}"
+            f"90 % {np.quantile(known, 0.9):.1e}, largest {largest}"
         )
-    print(", ".join(f"{reason}: {count}" for reason, count in reasons.most_common()))
+    for key, counts in reasons.items():
+        print(key, ", ".join(f"{r}: {n}" for r, n in counts.most_common()))
+
+
+def main() -> None:
+    """Print the comparisons."""
+    simulation._TIGHT = (*_IDLE, *simulation._TIGHT)
+    print("built-in robots")
+    compare(built_in())
+    print("random robots")
+    compare(random_ones())
 
 
 if __name__ == "__main__":

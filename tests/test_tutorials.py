@@ -19,7 +19,8 @@ DOCS = ROOT / "docs"
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```', re.M | re.S)
 TUTORIALS = sorted(path.stem for path in (DOCS / "tutorials").glob("*.md"))
 # beside tutorials: pages whose Python needs nothing that is not there
-PAGES = ("reports",)
+PAGES = ("reports", "platform_stiffness")
+FOLLOWED = ("platform_stiffness",)  # beside tutorials: pages all of whose blocks run
 
 
 def blocks(page):
@@ -77,6 +78,14 @@ def test_a_tutorial_runs_as_it_stands(tmp_path, name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_a_page_runs_as_it_stands(tmp_path, name):
+    ran, compared = follow(DOCS / f"{name}.md", tmp_path)
+    assert ran > 5
+    assert compared > 1
+
+
+@pytest.mark.slow
 def test_the_measuring_protocol_s_files_are_a_campaign(tmp_path):
     """Its last block names a campaign that is still to be measured."""
     page = (DOCS / "measuring_protocol.md").read_text(encoding="utf-8")
@@ -94,5 +103,6 @@ def test_the_python_of_a_page_runs(tmp_path, name):
     python = [text for language, _, text in blocks(DOCS / f"{name}.md")
               if language == "python"]  # fmt: skip
     assert python
+    session = {}
     for text in python:
-        exec(compile(text, name, "exec"), {})
+        exec(compile(text, name, "exec"), session)

@@ -44,6 +44,7 @@ from assembly.exact.dead_load import (
 from assembly.exact.placement import Placement, place
 from assembly.linear.thresholds import ROWS_RANK, rank_tolerance
 from assembly.solvers.conic import SolverFailed, into_cones
+from forcefit.inputs.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths]
@@ -244,14 +245,15 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
         if attempt or not near or step is None:
             damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
-        problem_name(start),
+        problem_name(start, local.loads),
         f"no step lowers the energy; open by {start.largest_gap:.2g}",
     )
 
 
-def problem_name(at: Placement) -> str:
+def problem_name(at: Placement, loads: DeadLoads) -> str:
     """Name of the problem, for messages."""
-    return f"exact equilibrium of {at.model.posture.robot.name}"
+    under = f" under {numbers(loads.load)} N m, N" if loads.load.any() else ""
+    return f"exact equilibrium of {at.model.posture.robot.name}{under}"
 
 
 def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
@@ -280,7 +282,7 @@ def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
     step = clearance_step(problem, near)
     if step is None:
         status = "no clearance within its bounds closes what no spring can"
-        raise NotConverged(problem_name(at), status)
+        raise NotConverged(problem_name(at, local.loads), status)
     u, rigid = step
     z = np.concatenate([u, -relaxed[:, nu] - relaxed[:, :nu] @ u])
     change = normal + B @ z

@@ -370,7 +370,7 @@ def _search(
                 return last, imbalance(last), count
     unbalanced = imbalance(expand(current, loads, rigid))
     raise NotConverged(
-        problem_name(current),
+        problem_name(current, loads),
         f"after {_STEPS} steps closures are open by {current.largest_gap:.2g} and "
         f"forces out of balance by {unbalanced:.2g}, relative",
     )

@@ -12,21 +12,17 @@ from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
     Structure,
+    eliminate,
     eliminate_springs,
-    free_columns,
-    grouped_springs,
-    largest_spring,
     least_motions,
     misfit_of,
     moved_by,
-    orthogonal_rows,
     own_springs,
     paths_of,
     rigid_rows,
     small_problem,
-    spring_rows,
 )
-from assembly.linear.thresholds import MISMATCH_FACTOR, NOISE, OPEN, RANK
+from assembly.linear.thresholds import MISMATCH_FACTOR, OPEN, RANK
 from assembly.solvers.compiled import (
     Indices,
     Matrices,
@@ -37,12 +33,11 @@ from assembly.solvers.compiled import (
 )
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.dual_newton import dual_newton
-from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.householder import turn
 from assembly.solvers.interior import interior_point
 from assembly.solvers.vectors import (
     copy,
     divide,
-    indices,
     inner,
     into_cones,
     matrix,
@@ -104,27 +99,13 @@ def assemble_all(
         own = errors[point if len(errors) > 1 else 0]
         tolerance = RANK + MISMATCH_FACTOR * mismatch[point]
         P = paths_of(T[point], s)
-        closures = s.patterns.shape[1]
-        m, nq = 6 * closures, len(s.free_frame)
-        # free motions: their columns are the rows of F
-        F = free_columns(s, P, m)
-        turns, diagonal, order = vector(nq), vector(nq), indices(nq)
-        free = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-        if free < 0:
+        reduced = eliminate(s, P, tolerance)
+        if not reduced.decided:
             out.outcome[point] = AMBIGUOUS
             continue
-        Z = orthogonal_rows(F, turns, free, m)
-        # springs
-        L = grouped_springs(s, P)
-        Y = spring_rows(s, Z, L)
-        count = len(Z)
-        y_turns, y_diagonal = vector(count), vector(count)
-        y_order = indices(count)
-        noise = NOISE * largest_spring(s, P)
-        rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
-        if rank < 0:
-            out.outcome[point] = AMBIGUOUS
-            continue
+        F, turns, diagonal, order, free = reduced.free
+        Y, y_turns, y_diagonal, y_order, rank = reduced.springs
+        Z, L = reduced.Z, reduced.L
         eliminate_springs(Z, Y, y_diagonal, y_order, rank)
         known = misfit_of(s, P, own)
         if rigid_rows(s, P, Z, rank, known, own, tolerance):

@@ -234,6 +234,72 @@ def eliminate_springs(
                 Z[i, a] /= diagonal[i]
 
 
+class Triangle(NamedTuple):
+    """Columns brought to a triangle by reflections, as ``triangulate`` leaves them.
+
+    Attributes:
+        columns: (n, m) reflectors and the triangle, a column in each row.
+        turns: (n,) sizes of the reflectors.
+        diagonal: (n,) of the triangle.
+        order: (n,) in which columns were taken.
+        rank: how many are independent; negative if that is in doubt.
+    """
+
+    columns: Matrix
+    turns: Vector
+    diagonal: Vector
+    order: Indices
+    rank: int
+
+
+class Elimination(NamedTuple):
+    """What closures leave of free motions and springs; see the head of this module.
+
+    Attributes:
+        free: the free motions' columns F.
+        Z: rows that no free motion enters.
+        L: the groups' springs.
+        springs: the springs' columns Y of those rows.
+        decided: whether both ranks are beyond doubt; if not, Z to Y are empty.
+    """
+
+    free: Triangle
+    Z: Matrix
+    L: Matrices
+    springs: Triangle
+    decided: bool
+
+
+@part
+def eliminate(s: Structure, P: Matrices, tolerance: float) -> Elimination:
+    """Bring free motions, then springs to triangles.
+
+    Args:
+        s: the robot.
+        P: unit screws of all frames.
+        tolerance: relative, of ranks.
+
+    Returns:
+        Both triangles, and the rows between them.
+    """
+    m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
+    F = free_columns(s, P, m)
+    turns, diagonal, order = vector(nq), vector(nq), indices(nq)
+    rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
+    free = Triangle(F, turns, diagonal, order, rank)
+    if rank < 0:
+        return Elimination(free, matrix(0, 0), matrices(0, 6, 6), free, False)
+    Z = orthogonal_rows(F, turns, rank, m)
+    L = grouped_springs(s, P)
+    Y = spring_rows(s, Z, L)
+    count = len(Z)
+    own_turns, own_diagonal, own_order = vector(count), vector(count), indices(count)
+    noise = NOISE * largest_spring(s, P)
+    rank = triangulate(Y, own_turns, own_diagonal, own_order, tolerance, noise, -1.0)
+    springs = Triangle(Y, own_turns, own_diagonal, own_order, rank)
+    return Elimination(free, Z, L, springs, rank >= 0)
+
+
 @part
 def misfit_of(s: Structure, P: Matrices, errors: Matrix) -> Vector:
     """(m,) closure error that the geometric errors cause."""

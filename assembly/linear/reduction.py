@@ -29,7 +29,11 @@ from scipy.linalg import qr, svd
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads, loads_on_frames
 from assembly.linear.thresholds import NOISE, RANK, ROWS_RANK, rank_tolerance
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.display import html_table, numbers, short_repr
+from stiffness.screws import SCREW
+
+_STILL = 1e-6  # of the largest motion: what less counts as rounding
+_NAMED = 4  # joints of a free motion that a message names
 
 
 class FreeMotion(ValueError):
@@ -129,9 +133,7 @@ def reduce_problem(
     A = linearisation.rows
     tolerance = rank_tolerance(linearisation.posture.mismatch)
     Z = complement(A @ joints.free, tolerance)
-    load_multipliers = _load_multipliers(
-        A @ joints.free, joints.free.T @ frame_loads.joint
-    )
+    load_multipliers = _load_multipliers(linearisation, joints, frame_loads)
     A_u, A_y = Z.T @ A @ joints.cones, Z.T @ A @ joints.elastic
     d = joints.cones.T @ (A.T @ load_multipliers + frame_loads.joint)
     load_springs = spring_deformations(
@@ -212,13 +214,41 @@ def spring_deformations(
     return np.where(joints.links, of_links, of_joints)
 
 
-def _load_multipliers(A_q: NDArray, drive: NDArray) -> NDArray:
+def _load_multipliers(
+    lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
+) -> NDArray:
     """Multipliers that balance the loads along every free motion."""
+    A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    unbalanced = np.abs(A_q.T @ multipliers + drive).max(initial=0.0)
-    if unbalanced > 1e-8 * np.abs(drive).max(initial=1e-300):
-        raise FreeMotion("the load drives a motion that no joint or spring resists")
+    # what is left is orthogonal to A_q's rows: a free motion, which the load drives
+    left = A_q.T @ multipliers + drive
+    if np.abs(left).max(initial=0.0) > 1e-8 * np.abs(drive).max(initial=1e-300):
+        raise FreeMotion(
+            "the load drives a motion that no joint or spring resists: "
+            + _motion_text(lin, joints.free @ left)
+        )
     return multipliers
+
+
+def _motion_text(lin: Linearisation, screws: NDArray) -> str:
+    """A free motion in words: the joints that make it and the platform's unit screw."""
+    robot = lin.posture.robot
+    sizes = np.abs(screws.reshape(-1, 6) * np.repeat([1.0, 1.0 / lin.size], 3))
+    moved = sizes.max(axis=1)
+    joints = [
+        f"{robot.frames[i].name} {SCREW[sizes[i].argmax()].lower()}"
+        for i in np.argsort(-moved, kind="stable")
+        if moved[i] > _STILL * moved.max()
+    ]
+    rest = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
+    way = f"it moves {', '.join(joints[:_NAMED])}{rest}"
+    platform = lin.platform @ screws
+    turn, shift = np.linalg.norm(platform[:3]) * lin.size, np.linalg.norm(platform[3:])
+    if max(turn, shift) <= _STILL * moved.max() * lin.size:
+        return f"{way}; the platform stands still"
+    unit = platform / (turn / lin.size if turn > _STILL * shift else shift)
+    unit = np.where(np.abs(unit) > _STILL * np.abs(unit).max(), unit, 0.0)
+    return f"{way}; the platform along {numbers(unit)} [rad, m]"
 
 
 def _rigid_rows(

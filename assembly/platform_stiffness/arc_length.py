@@ -14,7 +14,8 @@ every equilibrium of the path is met.  Clearances are held at zero.
 
 Where an eigenvalue of Z'HZ changes its sign the load is critical: at a limit point it
 turns there, else another path branches off, as a buckled column's, which is named and
-not followed.
+not followed.  Motions that nothing resists and no load drives, as a rod's spin between
+two ball joints, have no second derivative; they are left out of Z.
 
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
@@ -32,6 +33,7 @@ from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.placement import place
 from assembly.kinematics.posture import Posture
+from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.deflection import DeflectionCurve, Event, mode_text
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
@@ -41,6 +43,7 @@ _CORRECTIONS = 8  # of a step
 _CLOSED = 1e-10  # [-] size of a last correction, of a step
 _SMALLEST = 1e-6  # of the first step
 _HALVINGS = 20  # of a step, to bracket a critical load in it
+_FLAT = 1e-12  # of the largest curvature: what less counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,7 @@ class _Path:
         weight: of squared motions, in squared parts of the largest load.
         range: [N or N m] the largest load.
         parts: whose springs they are.
+        idle: motions that nothing resists; no load drives them.
     """
 
     posture: Posture
@@ -91,6 +95,7 @@ class _Path:
     weight: float
     range: float
     parts: tuple[Part, ...]
+    idle: int = 0
 
     def expand(self, x: NDArray, load: float, model: Expansion) -> Expansion:
         """The problem near a placement, under a load."""
@@ -108,6 +113,16 @@ class _Path:
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
         """(N,) product with a motion, as lengths on the path count."""
         return self.weight * motion / local.placement.model.units**2
+
+    def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
+        """Second derivatives of the potential, lowest first, and their motions Z."""
+        units = local.placement.model.units
+        Q, R = np.linalg.qr(local.basis / units[:, None])
+        back = np.linalg.inv(R)
+        H = back.T @ local.basis.T @ local.hessian @ local.basis @ back
+        values, vectors = np.linalg.eigh((H + H.T) / 2)
+        kept = np.sort(np.argsort(np.abs(values))[self.idle :])
+        return values[kept], units[:, None] * (Q @ vectors[:, kept])
 
 
 def follow_load(
@@ -145,6 +160,8 @@ def follow_load(
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity)
+    # a motion that the load would drive is named before it is followed
+    solve_assembly(tight, np.eye(6)[component])
     span = abs(last - first)
     cut = start.cut.cut(tight)
     path = _Path(cut, component, rest, gravity, 1.0, span, part_owners(start))
@@ -173,24 +190,17 @@ def _begin(
 ) -> tuple[_Place, _Path]:
     """The first equilibrium, its tangent, and the weight that balances both lengths."""
     local = start.expansion
-    B, q = local.basis, path.reference_load(local)
-    motion = B @ np.linalg.solve(B.T @ local.hessian @ B, B.T @ q)
+    values, _ = path.modes(local)
+    flat = np.abs(values) <= _FLAT * np.abs(values).max(initial=0.0)
+    path = replace(path, idle=int(flat.sum()))
+    values, Z = path.modes(local)
+    motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
     weight = 1.0 / (size or 1.0) ** 2  # nothing gives way along a rigid bar
     # half of the length is the load's
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
-    place = _Place(first, local, motion * rise, float(rise), *_modes(local))
+    place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
-
-
-def _modes(local: Expansion) -> tuple[NDArray, NDArray]:
-    """Second derivatives of the potential, lowest first, and their motions."""
-    units = local.placement.model.units
-    Q, R = np.linalg.qr(local.basis / units[:, None])
-    back = np.linalg.inv(R)
-    H = back.T @ local.basis.T @ local.hessian @ local.basis @ back
-    values, vectors = np.linalg.eigh((H + H.T) / 2)
-    return values, units[:, None] * (Q @ vectors)
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
@@ -202,15 +212,16 @@ def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, in
     rise = place.rise / path.range**2
     for count in range(1, _CORRECTIONS + 1):
         local = path.expand(x, load, place.local)
-        B = local.basis
+        values, Z = path.modes(local)
         closing = np.zeros(len(x))
         closing[local.unbounded] = -local.inverse @ local.placement.residual
-        left = B.T @ (local.gradient + local.hessian @ closing)
+        left = Z.T @ (local.gradient + local.hessian @ closing)
         long_of = normal_to @ (x + closing - x0) + rise * (load - place.load) - step
-        change = _solve(path, local, normal_to, rise, np.append(left, long_of))
+        tangent = np.append(normal_to @ Z, rise)
+        change = _solve(path, local, (values, Z), tangent, np.append(left, long_of))
         if change is None:
             return None, count
-        moved = closing + B @ change[:-1]
+        moved = closing + Z @ change[:-1]
         x, load = x + moved, load + change[-1]
         size = np.sqrt(
             path.covector(local, moved) @ moved + (change[-1] / path.range) ** 2
@@ -224,14 +235,15 @@ def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, in
 
 
 def _solve(
-    path: _Path, local: Expansion, normal_to: NDArray, rise: float, left: NDArray
-) -> NDArray | None:
-    """Motion and load that put right what is left."""
-    B = local.basis
-    M = np.zeros((B.shape[1] + 1, B.shape[1] + 1))
-    M[:-1, :-1] = B.T @ local.hessian @ B
-    M[:-1, -1] = -(B.T @ path.reference_load(local))
-    M[-1, :-1], M[-1, -1] = normal_to @ B, rise
+    path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
+    left: NDArray,
+) -> NDArray | None:  # fmt: skip
+    """Motion along the modes and load that put right what is left."""
+    values, Z = modes
+    M = np.zeros((len(left), len(left)))
+    M[:-1, :-1] = np.diag(values)
+    M[:-1, -1] = -(Z.T @ path.reference_load(local))
+    M[-1] = tangent
     try:
         return np.linalg.solve(M, -left)
     except np.linalg.LinAlgError:
@@ -242,17 +254,18 @@ def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
     """An equilibrium with its tangent, of unit length, the way the path went."""
-    left = np.zeros(local.basis.shape[1] + 1)
+    values, Z = path.modes(local)
+    left = np.zeros(len(values) + 1)
     left[-1] = -1.0
-    way = _solve(path, local, normal_to, rise, left)
+    way = _solve(path, local, (values, Z), np.append(normal_to @ Z, rise), left)
     if way is None:
         return None
-    motion = local.basis @ way[:-1]
+    motion = Z @ way[:-1]
     length = np.sqrt(
         path.covector(local, motion) @ motion + (way[-1] / path.range) ** 2
     )
     rise = float(way[-1] / length)
-    return _Place(load, local, motion / length, rise, *_modes(local))
+    return _Place(load, local, motion / length, rise, values, Z)
 
 
 def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:

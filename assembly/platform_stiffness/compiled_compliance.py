@@ -10,45 +10,22 @@ C = sum of y y' (Castigliano).  Built from :mod:`assembly.linear.compiled_reduct
 problem (22) is, and as exact: no compliances are added before anything is eliminated.
 """
 
-from typing import NamedTuple
-
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
     Structure,
-    free_columns,
-    grouped_springs,
-    largest_spring,
-    orthogonal_rows,
+    Triangle,
+    eliminate,
     paths_of,
-    spring_rows,
 )
+from assembly.linear.thresholds import MISMATCH_FACTOR, RANK
 from assembly.solvers.compiled import kernel
-from assembly.solvers.householder import triangulate, turn, turn_back
-from assembly.solvers.vectors import fill, indices, matrix, vector
+from assembly.solvers.householder import turn, turn_back
+from assembly.solvers.vectors import fill, matrix, vector
 
-SOLVED, FREE, RANK = range(3)  # FREE: a motion of the platform that nothing resists
-_RANK = 1e-10  # as in assembly.linear.reduction, and so is the noise floor
-_NOISE = 1e-12
+# FREE: a motion of the platform that nothing resists
+SOLVED, FREE, AMBIGUOUS = range(3)
 _STILL = 1e-9  # [-] of a unit wrench's work on a free motion that counts as none
-
-
-class Triangle(NamedTuple):
-    """Columns brought to a triangle by reflections, as ``triangulate`` leaves them.
-
-    Attributes:
-        columns: (n, m) reflectors and the triangle, a column in each row.
-        turns: (n,) sizes of the reflectors.
-        diagonal: (n,) of the triangle.
-        order: (n,) in which columns were taken.
-        rank: how many are independent.
-    """
-
-    columns: NDArray
-    turns: NDArray
-    diagonal: NDArray
-    order: NDArray
-    rank: int
 
 
 @kernel(fastmath={"contract", "reassoc"})
@@ -134,27 +111,15 @@ def comply(s: Structure, T: NDArray, mismatch: float, out: NDArray) -> int:
         out: (6, ny) [sqrt(2 J) per N m and N] to fill, translations and forces scaled.
 
     Returns:
-        SOLVED, FREE or RANK.
+        SOLVED, FREE, or AMBIGUOUS ranks.
     """
-    tolerance = _RANK + 30.0 * mismatch
     P = paths_of(T, s)
-    m, nq, groups = 6 * s.patterns.shape[1], len(s.free_frame), len(s.groups) - 1
-    F = free_columns(s, P, m)
-    turns, diagonal, order = vector(nq), vector(nq), indices(nq)
-    kept = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    if kept < 0:
-        return RANK
-    free = Triangle(F, turns, diagonal, order, kept)
-    Z = orthogonal_rows(F, turns, kept, m)
-    L = grouped_springs(s, P)
-    Y = spring_rows(s, Z, L)
-    count = len(Z)
-    y_turns, y_diagonal = vector(count), vector(count)
-    y_order = indices(count)
-    noise = _NOISE * largest_spring(s, P)
-    rank = triangulate(Y, y_turns, y_diagonal, y_order, tolerance, noise, -1.0)
-    if rank < 0:
-        return RANK
+    reduced = eliminate(s, P, RANK + MISMATCH_FACTOR * mismatch)
+    if not reduced.decided:
+        return AMBIGUOUS
+    free, Z, L = reduced.free, reduced.Z, reduced.L
+    Y, y_turns, y_diagonal, y_order, rank = reduced.springs
+    m, groups, count = 6 * s.patterns.shape[1], len(s.groups) - 1, len(Z)
     closing, bent, mu = vector(m), vector(6 * groups), vector(count)
     wrenches = matrix(len(s.patterns) + 1, 6)
     for row in range(6):

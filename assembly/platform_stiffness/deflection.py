@@ -23,11 +23,17 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.nearest_pose import nearest_pose
+from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
-from assembly.platform_stiffness.linear_tangent import contacts, in_contact
-from assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from assembly.platform_stiffness.linear_tangent import in_contact
+from assembly.platform_stiffness.matrices import (
+    Part,
+    PlatformStiffness,
+    numbers_of,
+)
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.inputs.errors import BadInput
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
 _JUMP = 5.0  # times what the tangents on both sides explain
@@ -124,8 +130,15 @@ def load_deflection(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: the load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found; the load at which is in the message.
+        BadInput: no such component, no loads, or not numbers.
     """
-    rest = np.zeros(6) if load is None else np.array(load, dtype=float)
+    if component not in range(6) or not len(loads):
+        raise BadInput(
+            f"load_deflection: found component {component} and {len(loads)} loads, "
+            "expected one of 0 to 5 and at least one load"
+        )
+    rest = np.zeros(6) if load is None else numbers_of("load", load, 6, "N m, N")
+    loads = numbers_of("loads", loads, len(loads), "N m or N").tolist()
     largest = float(np.abs(loads).max(initial=0.0))
 
     def at(value: float, near: _Point | None) -> _Point:

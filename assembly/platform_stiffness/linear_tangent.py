@@ -31,15 +31,12 @@ from assembly.linear.closure import (
     virtual_joints,
 )
 from assembly.linear.energy import Assembly
+from assembly.platform_stiffness.active_set import bound_forces, contacts, settle
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness, unit_screws
-from assembly.solvers.conic import cone_sizes
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
 _NOISE = 1e-12  # of a column before a projection that removes it whole
-_AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
-_PRESSED = 1e-8  # of the largest force: smaller ones press nothing
-_ROUNDING = 1e-12  # nor does what is this small beside the energy without clearance
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
@@ -67,10 +64,23 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
         The stiffness at the platform's origin, second derivative of the least
         potential.
     """
+    return active_tangent(settle(assembly), side)
+
+
+def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
+    """The same of an assembly as it is, or of one a small step from equilibrium.
+
+    Args:
+        assembly: its clearances to rounding.
+        side: what clearances do that just touch their bound without a force.
+
+    Returns:
+        The stiffness at the platform's origin.
+    """
     joints, u = assembly.joints, assembly.clearances
     pressed, touching = contacts(assembly)
     held = pressed | (touching & (side == "holding"))
-    force = _forces(assembly)
+    force = bound_forces(assembly)
     springs, names, free = [joints.elastic], owners(joints), [joints.free]
     for k, is_held in enumerate(held):
         rows = np.flatnonzero(joints.group == k)
@@ -86,31 +96,6 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
                 free.append(along[:, None] / np.linalg.norm(along))
     return _stiffness(assembly.linearisation, "in contact", np.hstack(springs), names,
                       np.hstack(free))  # fmt: skip
-
-
-def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
-    """Clearances that carry a force, and those that touch their bound without one.
-
-    Args:
-        assembly: the manipulator at least energy.
-
-    Returns:
-        (cones,) bool each.
-    """
-    force = _forces(assembly)
-    size = cone_sizes(assembly.clearances, assembly.joints.group)
-    at_bound = size >= 1.0 - _AT_BOUND
-    least = max(
-        _PRESSED * force.max(initial=0.0), _ROUNDING * assembly.energy_without_clearance
-    )
-    pressed = at_bound & (force > least)
-    return pressed, at_bound & ~pressed
-
-
-def _forces(assembly: Assembly) -> NDArray:
-    """(cones,) [J] force on each clearance times its bound."""
-    forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
-    return cone_sizes(forces, assembly.joints.group)
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:

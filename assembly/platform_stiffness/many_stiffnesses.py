@@ -11,7 +11,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.energy import structure_of
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
-from assembly.platform_stiffness.matrices import Part
+from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import screw_map
 
@@ -30,6 +30,7 @@ class Stiffnesses:
             the platform is free.
         parts: (ny,) whose springs they are.
         fallback: (k,) bool, where the compiled solver failed.
+        singular: those where a motion of the platform is free, by their row.
     """
 
     robot: Robot
@@ -37,13 +38,17 @@ class Stiffnesses:
     springs: NDArray
     parts: tuple[Part, ...]
     fallback: NDArray
+    singular: dict[int, PlatformStiffness]
 
     __repr__, _repr_html_ = short_repr, html_table
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(k, 6, 6) [rad/(N m) .. m/N]; NaN where a motion of the platform is free."""
-        return np.swapaxes(self.springs, 1, 2) @ self.springs
+        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in what a free motion touches."""
+        compliance = np.swapaxes(self.springs, 1, 2) @ self.springs
+        for row, one in self.singular.items():
+            compliance[row] = one.compliance
+        return compliance
 
     @cached_property
     def _roots(self) -> tuple[NDArray, NDArray]:
@@ -63,22 +68,31 @@ class Stiffnesses:
 
     @cached_property
     def eigen_stiffnesses(self) -> NDArray:
-        """(k, 6) [N/m] softest first, rotations times the length; inf where rigid."""
+        """(k, 6) [N/m] softest first, rotations times the length.
+
+        inf where rigid, 0 where a motion is free.
+        """
         values, _ = self._roots
         rigid = values <= _RANK * values[:, :1]
         stiffness = np.full(values.shape, np.inf)
         np.divide(1.0, values**2, out=stiffness, where=~rigid)
-        return np.where(np.isnan(values), np.nan, stiffness)
+        for row, one in self.singular.items():
+            stiffness[row] = one.eigen.values
+        return stiffness
 
     @cached_property
     def eigen_screws(self) -> NDArray:
         """(k, 6, 6) [rad, m] their screws in columns."""
-        return self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
+        screws = self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
+        for row, one in self.singular.items():
+            screws[row] = one.eigen.screws
+        return screws
 
     @property
     def condition(self) -> NDArray:
         """(k,) [-] stiffest over softest."""
-        return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
+        with np.errstate(divide="ignore"):
+            return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
     def along(self, direction: ArrayLike) -> NDArray:
         """(k,) [N m/rad or N/m] stiffness along a direction, the others free.
@@ -87,10 +101,13 @@ class Stiffnesses:
             direction: (6,) unit, of a wrench.
 
         Returns:
-            1 / (d . C d); inf where nothing gives way, NaN where a motion is free.
+            1 / (d . C d); inf where nothing gives way, 0 along a free motion.
         """
         with np.errstate(divide="ignore"):
-            return 1.0 / np.sum((self.springs @ np.asarray(direction)) ** 2, axis=1)
+            K = 1.0 / np.sum((self.springs @ np.asarray(direction)) ** 2, axis=1)
+        for row, one in self.singular.items():
+            K[row] = one.along(direction)[0]
+        return K
 
     def shares(self, direction: ArrayLike) -> dict[Part, NDArray]:
         """(k,) share of every link and joint in the compliance along a direction.
@@ -99,7 +116,7 @@ class Stiffnesses:
             direction: (6,) of a wrench.
 
         Returns:
-            By part; together they are 1.
+            By part; together they are 1, or NaN at postures with a free motion.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
         with np.errstate(invalid="ignore"):
@@ -140,11 +157,16 @@ def platform_stiffnesses(
     alone = np.setdiff1d(np.arange(springs.shape[1]), structure.spring_order)
     if alone.size:
         springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
+    singular = {}
     for i in np.flatnonzero(status != SOLVED).tolist():
         q = np.full(len(robot.frames), np.nan)
         one = without_clearance(Posture(robot, q, T[i], float(off[i])))
         springs[i] = np.nan if one.free.size else one.springs @ one.root.T
-    return Stiffnesses(robot, size, springs, tuple(owners(joints)), status != SOLVED)
+        if one.free.size:
+            singular[i] = one
+    return Stiffnesses(
+        robot, size, springs, tuple(owners(joints)), status != SOLVED, singular
+    )
 
 
 def _outside_closures(robot: Robot, T: NDArray, columns: NDArray) -> NDArray:

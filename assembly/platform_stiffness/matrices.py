@@ -35,6 +35,8 @@ from scipy.linalg import null_space
 
 from assembly.kinematics.posture import Posture
 from forcefit.inputs.display import Figures, html_table, numbers, short_repr
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.number_arrays import find_fault
 from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size of a motion that counts as none
@@ -130,7 +132,7 @@ class PlatformStiffness:
         Returns:
             Its stiffness there.
         """
-        point, length = np.array(point, dtype=float), length or self.length
+        point, length = numbers_of("point", point, 3, "m"), length or self.length
         move = screw_map(self.point - point)
         return replace(
             self, point=point, length=length, root=move @ self.root,
@@ -148,6 +150,12 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         K = way @ core @ way.T
         return _blank((K + K.T) / 2, rigid)
+
+    @property
+    def free_text(self) -> str:
+        """Which motions nothing resists, in words; empty if all are resisted."""
+        screws = ", ".join(numbers(screw) for screw in self.free.T)
+        return f"nothing resists the platform's motion {screws} [rad, m]" * bool(screws)
 
     @property
     def rigid(self) -> NDArray:
@@ -208,7 +216,7 @@ class PlatformStiffness:
             with all other displacements zero.
 
         Raises:
-            ValueError: the direction is zero.
+            BadInput: the direction is zero, or no direction.
         """
         d = _direction(direction)
         with np.errstate(divide="ignore"):
@@ -270,7 +278,7 @@ class PlatformStiffness:
             together are 1.  NaN where the compliance is infinite, or none.
 
         Raises:
-            ValueError: the direction is zero.
+            BadInput: the direction is zero, or no direction.
         """
         d = _direction(direction)
         whole = self._compliance_along(d)
@@ -318,11 +326,32 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
     return np.where(np.abs(unit) > _UNTOUCHED, unit, 0.0)
 
 
+def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
+    """So many finite numbers.
+
+    Args:
+        name: of the argument, for the message.
+        value: what was given.
+        count: how many are expected.
+        unit: of them, for the message.
+
+    Returns:
+        (count,).
+
+    Raises:
+        BadInput: it is something else.
+    """
+    fault = find_fault(np.asarray(value).tolist(), (count,))
+    if fault:
+        raise BadInput(f"{name}: found {fault}, expected {count} numbers [{unit}]")
+    return np.array(value, dtype=float)
+
+
 def _direction(direction: ArrayLike) -> NDArray:
     """(6,) of unit size."""
-    d = np.array(direction, dtype=float)
-    if d.shape != (6,) or not np.isfinite(d).all() or not d.any():
-        raise ValueError(f"direction: found {d}, expected 6 numbers, not all 0")
+    d = numbers_of("direction", direction, 6, "N m, N")
+    if not d.any():
+        raise BadInput("direction: found 0 in all, expected 6 numbers, not all 0")
     return d / np.linalg.norm(d)
 
 

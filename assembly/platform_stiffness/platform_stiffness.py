@@ -1,8 +1,7 @@
 """The platform's stiffness matrix K_C at a posture, in the state that is asked for."""
 
-from typing import Literal
+from typing import Literal, get_args
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.exact.exact import solve_exact
@@ -14,7 +13,7 @@ from assembly.platform_stiffness.linear_tangent import (
     in_contact,
     without_clearance,
 )
-from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
 
 State = Literal["without clearance", "in contact", "exact"]
 
@@ -50,8 +49,14 @@ def platform_stiffness(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        ValueError: no such state.
+        BadInput: a point or a load that is no number.
+        ValueError: no such state or side.
     """
+    offset = numbers_of("at", at, 3, "m")
+    if load is not None:
+        load = numbers_of("load", load, 6, "N m, N")
+    if side not in get_args(Side):
+        raise ValueError(f"platform_stiffness: no side {side!r}")
     if state == "without clearance":
         tangent, platform = without_clearance(posture), posture.platform
     elif state == "in contact":
@@ -62,5 +67,4 @@ def platform_stiffness(
         tangent, platform = exact_tangent(exact, side), exact.placement.platform
     else:
         raise ValueError(f"platform_stiffness: no state {state!r}")
-    offset = np.asarray(at, dtype=float)
     return tangent.at(platform[:3, 3] + platform[:3, :3] @ offset)

@@ -10,10 +10,10 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
+from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
     Side,
-    contacts,
     in_contact,
     without_clearance,
 )
@@ -74,6 +74,8 @@ def stiffness_of(
         point = platform[:3, 3] + platform[:3, :3] @ np.asarray(at, dtype=float)
         values = [stiffness_values(side, point, length) for side in sides]
         results |= values[0] | {"status": _status(sides[0])}
+        if sides[0].free_text:
+            results["reason"] = sides[0].free_text
         if direction is not None:
             results["direction"] = _along(sides[0].at(point, length), direction)
         if exact:

@@ -75,10 +75,18 @@ def vibration_text(results: dict[str, Any]) -> str:
     for mode in results["modes"]:
         most = list(mode["shares"].items())[:_NAMED]
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
-        lines.append(f"{mode['frequency']:12.6g} Hz  {shares or 'nothing resists'}")
+        lines.append(f"{mode['frequency']:12.6g} Hz  {shares or _free(mode)}")
     if results["idle_motions"]:
         lines.append(
             f"{results['idle_motions']} motions that nothing resists leave the "
             "platform where it is"
         )
     return "\n".join(lines)
+
+
+def _free(mode: dict[str, Any]) -> str:
+    """A mode without springs: the platform along a screw of 1 rad, or 1 m."""
+    screw = np.asarray(mode["platform_screw"])
+    turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
+    unit = screw / (turn if turn > 1e-6 * shift else shift or 1.0)
+    return f"nothing resists: the platform along {numbers(unit)} [rad, m]"

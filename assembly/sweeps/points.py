@@ -306,6 +306,9 @@ def _record_stiffness(
         out["eigen_stiffness"][rows[run]] = stiffnesses.eigen_stiffnesses[i]
         out["stiffness_condition"][rows[run]] = stiffnesses.condition[i]
         out["share"][rows[run]] = shares[i]
+    for i, one in stiffnesses.singular.items():
+        for row in rows[runs[i]].tolist():
+            solved.texts["reason"].setdefault(row, one.free_text)
 
 
 def _record_frequencies(

@@ -1,7 +1,7 @@
 """The command ``forcefit assembly stiffness``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -55,7 +55,10 @@ def stiffness(
     ] = None,
     by: Annotated[
         list[str] | None,
-        typer.Option(help="Also dC by a number of the robot file, by its path."),
+        typer.Option(
+            help="Also dC by a number of the robot file, by its path; with --exact at "
+            "the exact equilibrium."
+        ),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Bar chart of the shares.")
@@ -81,13 +84,20 @@ def stiffness(
             applied.posture, applied.load, applied.gravity, point, exact, length,
             way,
         )  # fmt: skip
-        if by:
-            results["slopes"] = _slopes(robot, by, pose, joint, point)
+        if by and "compliance" in results:
+            states = {"slopes": "exact" if exact else "without clearance"}
+            if "in_contact" in results:
+                states["slopes_in_contact"] = "in contact"
+            asked = (applied.load, applied.gravity, point)
+            for key, state in states.items():
+                results[key] = _slopes(robot, by, pose, joint, (state, *asked))
     write_json(results, json)
     if json != "-":
         print(stiffness_text(results))
-        for path, slope in results.get("slopes", {}).items():
-            print(f"dC/d({path}), diagonal: {slope.diagonal()}")
+        for key in ("slopes", "slopes_in_contact"):
+            for path, slope in results.get(key, {}).items():
+                name = key.removeprefix("slopes").replace("_", " ")
+                print(f"dC/d({path}){name}, diagonal: {slope.diagonal()}")
     if output is not None and "shares" in results:
         save_figure(plot_shares(results), output)
     if results["status"] != "ok":
@@ -99,16 +109,15 @@ def _slopes(
     by: list[str],
     pose: list[str] | None,
     joint: list[str] | None,
-    point: list[float],
+    asked: tuple[Any, ...],
 ) -> "dict[str, NDArray]":
-    """Derivatives of the classical compliance, posture kept."""
-    import numpy as np
-
+    """Derivatives of the compliance of one state, posture kept."""
+    from assembly.platform_stiffness.tangent_slopes import TangentState
     from assembly.sweeps.parameters import load_design
     from assembly.sweeps.stiffness_slopes import stiffness_slopes
 
     return stiffness_slopes(
         load_design(robot), by,
         parse_assignments(pose, "--pose") if pose else None,
-        parse_assignments(joint, "--joint") if joint else None, np.array(point),
+        parse_assignments(joint, "--joint") if joint else None, TangentState(*asked),
     )  # fmt: skip

@@ -31,7 +31,6 @@ from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
-from forcefit.inputs.display import numbers
 from stiffness.screws import screw_map
 from validation.assumptions.solid_links import SolidLink, solid_links
 
@@ -84,8 +83,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
     robot, declared = postures[0].robot, _compliances(postures, {})
     known = np.isfinite(declared).all(axis=(1, 2))
     if not known.any():
-        screw = numbers(without_clearance(postures[0]).free[:, 0])
-        raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
+        raise FreeMotion(without_clearance(postures[0]).free_text)
     solids = solid_links(robot)
     if not solids:
         raise NoSolids("no link has a shape that could be meshed")

@@ -3,7 +3,8 @@
 The simulation is loaded a little along each axis, both ways, at the equilibrium with
 the robot's errors and its load; half the difference of the platform's motions, per unit
 of load, is the compliance.  What is left of finite steps falls with their square, and
-the simulation's own noise grows with their inverse: in between 1e-7 is left.
+the simulation's own noise grows with their inverse: in between 1e-7 is left.  Beside
+it the simulation's own linearised system, of the nominal robot without loads.
 
 Clearances are left out on both sides.  A moment of fixed axes has no potential and the
 exact equilibrium's has one (``docs/exact.md``): the load that is already there may have
@@ -28,8 +29,10 @@ from forcefit.inputs.display import html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput
 from stiffness.screws import SCREW
 from validation.crosscheck.link_models import link_models
+from validation.multibody.linearised import linearised_compliance
 from validation.multibody.simulation import (
     TIME_LIMIT,
+    SimulationFailed,
     simulate_assembly,
     without_clearance,
 )
@@ -52,6 +55,8 @@ class StiffnessCheck:
         load: (6,) [N m, N] already there.
         links: how the simulation modelled links.
         turned: [rad] largest turn of a spring at the exact equilibrium.
+        linearised: (6, 6) of the nominal robot by the simulation's linearised system;
+            NaN where that found no equilibrium.
     """
 
     exact: PlatformStiffness
@@ -60,21 +65,27 @@ class StiffnessCheck:
     load: NDArray
     links: str
     turned: float
+    linearised: NDArray
 
     __repr__, _repr_html_ = short_repr, html_table
 
     @cached_property
     def differences(self) -> dict[str, float]:
-        """Largest difference of entries over sqrt(C_ii C_jj): of exact and linear."""
-        size = np.sqrt(np.abs(np.diag(self.simulated)))
-        return {
-            name: float(
-                np.abs((C - self.simulated) / np.outer(size, size)).max(initial=0.0)
-            )
-            for name, C in (
-                ("exact", self.exact.compliance), ("linear", self.linear.compliance)
-            )
+        """Largest difference of entries over sqrt(C_ii C_jj).
+
+        Of the exact and the classical compliance from the load steps, and of the
+        classical one from the linearised system.
+        """
+        exact, linear = self.exact.compliance, self.linear.compliance
+        pairs = {
+            "exact": (exact, self.simulated), "linear": (linear, self.simulated),
+            "linearised": (linear, self.linearised),
         }  # fmt: skip
+        sizes = {k: np.sqrt(np.abs(np.diag(other))) for k, (_, other) in pairs.items()}
+        return {
+            name: float(np.abs((C - other) / np.outer(sizes[name], sizes[name])).max())
+            for name, (C, other) in pairs.items()
+        }
 
     @property
     def tolerance(self) -> float:
@@ -97,6 +108,7 @@ class StiffnessCheck:
                 "exact": self.exact.compliance,
                 "linear": self.linear.compliance,
                 "multibody": self.simulated,
+                "multibody_linearised": self.linearised,
             },
             "difference": self.differences,
             "tolerance": self.tolerance,
@@ -113,12 +125,15 @@ class StiffnessCheck:
         ]
         for name, C in (
             ("exact", self.exact.compliance), ("linear", self.linear.compliance),
-            ("simulation", self.simulated),
+            ("simulation", self.simulated), ("linearised", self.linearised),
         ):  # fmt: skip
             cells = "".join(f"{value:12.5g}" for value in np.diag(C))
             lines.append(f"{name:12s}{cells}")
         for name, value in self.differences.items():
-            lines.append(f"{name} minus simulation: {value:.2g} of sqrt(C_ii C_jj)")
+            pair = f"{name} minus simulation"
+            if name == "linearised":
+                pair = "linear minus the simulation's linearised system"
+            lines.append(f"{pair}: {value:.2g} of sqrt(C_ii C_jj)")
         outcome = "passed" if self.passed else "FAILED"
         lines.append(f"{outcome}: exact within {self.tolerance:.2g}")
         return "\n".join(lines)
@@ -161,8 +176,7 @@ def check_stiffness(
     assembly = solve_exact(posture, wrench, gravity=gravity)
     exact = exact_tangent(assembly)
     if exact.free.shape[1]:
-        screw = numbers(exact.free[:, 0])
-        raise FreeMotion(f"nothing resists the platform's motion {screw} [rad, m]")
+        raise FreeMotion(exact.free_text)
     model = link_models(robot, links)
     scale = np.repeat([1.0, 1.0 / exact.length], 3)
     columns, turns = [], []
@@ -182,4 +196,10 @@ def check_stiffness(
     simulated = to_motion @ np.column_stack(columns)
     springs = np.stack([assembly.link_screws, assembly.joint_screws])[..., :3]
     turned = float(np.linalg.norm(springs, axis=-1).max())
-    return StiffnessCheck(exact, classical(posture), simulated, wrench, links, turned)
+    try:
+        linearised = linearised_compliance(posture, model)
+    except SimulationFailed:
+        linearised = np.full((6, 6), np.nan)
+    return StiffnessCheck(
+        exact, classical(posture), simulated, wrench, links, turned, linearised
+    )

@@ -218,7 +218,7 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build, solve, read, and give the memory back."""
     robot = case.posture.robot
-    model = Model(*_import_exudyn(), robot.name, regularisation)
+    model = Model(*import_exudyn(), robot.name, regularisation)
     model.deadline = started + limit
     try:
         tree = build(model, case)
@@ -254,7 +254,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    model = Model(*_import_exudyn(), robot.name, _TIGHT[0])
+    model = Model(*import_exudyn(), robot.name, _TIGHT[0])
     model.deadline = time.monotonic() + TIME_LIMIT
     try:
         tree = build(model, case)
@@ -306,7 +306,7 @@ def closing_sequence(
         gravity=np.zeros(3),
         couple=np.zeros(3),
     )
-    model = Model(*_import_exudyn(), robot.name, _TIGHT[-1])
+    model = Model(*import_exudyn(), robot.name, _TIGHT[-1])
     model.deadline = time.monotonic() + TIME_LIMIT
     try:
         tree = build(model, case)
@@ -371,7 +371,7 @@ def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAs
     )
 
 
-def _import_exudyn() -> tuple[Any, Any, Any]:
+def import_exudyn() -> tuple[Any, Any, Any]:
     """Exudyn without windows and without a word on the console."""
     with contextlib.redirect_stdout(io.StringIO()):
         import exudyn

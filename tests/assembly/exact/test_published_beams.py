@@ -27,7 +27,7 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from benchmarks.princeton_solids import in_pieces, root_link
 from stiffness.screws import screw_map
-from validation.multibody.simulation import simulate_assembly
+from validation.multibody.simulation import SimulationModel, simulate_assembly
 
 ANGLES = np.radians([0, 15, 30, 45, 60, 75, 90])
 # [m] along the height and across, ANSYS beam elements, at 8.896 N and 13.345 N
@@ -357,3 +357,17 @@ def test_a_four_bar_with_a_tilted_hinge_is_forced_together_as_published(
         off = 1e3 * moved - published
         assert np.linalg.norm(off[:2]) < in_plane * np.linalg.norm(published[:2])
         assert abs(off[2]) < across * abs(published[2])
+
+
+@pytest.mark.exudyn
+@pytest.mark.parametrize("row", BAUCHAU)
+def test_the_cross_check_forces_that_four_bar_together_as_published(row):
+    """Our model of it in Exudyn, 8 elements a bar: 1e-4 in the plane, 0.1 % across."""
+    angle, *published = row
+    posture = place_robot(bauchau(1), joints={"crank": -angle})
+    model = SimulationModel(links="beam", elements=8)
+    answer = simulate_assembly(posture, model=model)
+    moved = posture.platform[:3, 3] - [0.24, 0.12, 0] + answer.platform_screw[3:]
+    off = 1e3 * moved - published
+    assert np.linalg.norm(off[:2]) < 1e-4 * np.linalg.norm(published[:2])
+    assert abs(off[2]) < 1e-3 * abs(published[2])

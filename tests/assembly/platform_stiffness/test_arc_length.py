@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
+from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import Frame, Robot
 from assembly.platform_stiffness.arc_length import follow_load
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
 from tests.assembly.platform_stiffness.test_deflection import FY, shallow_arch
 
 
@@ -42,3 +45,20 @@ def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
     assert event.what.startswith("branch point, buckles: platform along [0 0 1.768 0 ")
     assert event.what.endswith("most in hinge joint")
     assert np.abs(curve.screws).max() < 1e-12
+
+
+def test_rods_that_spin_in_their_ball_joints_are_no_part_of_the_path():
+    """The delta's six rods; the tangent at no load is the classical stiffness."""
+    posture = home_posture(load_robot("delta"))
+    curve = follow_load(posture, 5, 0.0, -500.0, count=4)
+    classical = platform_stiffness(posture).along(np.eye(6)[5])[0]
+    assert curve.stiffness[0] == pytest.approx(classical, rel=1e-8)
+    assert not curve.events
+    assert abs(curve.loads[-1]) >= 500.0
+
+
+def test_a_load_along_a_free_motion_is_refused_before_the_path_begins():
+    slide = Frame("slide", joint="prismatic")
+    robot = Robot("slide", "tip", (slide, Frame("tip", "slide")))
+    with pytest.raises(FreeMotion, match="it moves slide tz"):
+        follow_load(home_posture(robot), 5, 0.0, -10.0)

@@ -17,7 +17,8 @@ def assert_same(many, row, one):
     """Entries over sqrt(C_ii C_jj); both keep compliances of very different sizes."""
     C = one.compliance
     if one.free.size:
-        assert np.isnan(many.compliance[row]).all()
+        np.testing.assert_array_equal(many.compliance[row], C)
+        assert many.singular[row].free_text == one.free_text
         return
     size = np.sqrt(np.diag(C)) + 1e-300
     np.testing.assert_allclose(
@@ -71,6 +72,11 @@ def test_a_free_motion_has_no_number():
     )
     posture = home_posture(Robot("slider", "tip", frames))
     many = platform_stiffnesses(posture.robot, posture.transforms[None])
-    assert np.isnan(many.compliance).all()
-    assert np.isnan(many.eigen_stiffnesses).all()
-    assert np.isnan(many.along(UNIT[0])).all()
+    free = np.isnan(many.compliance[0])
+    assert free[5].all()
+    np.testing.assert_allclose(many.compliance[0, :5, :5], np.eye(5))
+    np.testing.assert_allclose(many.eigen_stiffnesses[0], [0, 1, 1, 1, 1, 1])
+    assert [many.along(axis)[0] for axis in UNIT] == [1, 1, 1, 1, 1, 0]
+    assert many.singular[0].free_text == (
+        "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
+    )

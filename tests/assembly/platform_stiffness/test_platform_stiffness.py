@@ -10,7 +10,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.linear_tangent import contacts
+from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot

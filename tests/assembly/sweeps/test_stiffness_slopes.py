@@ -62,6 +62,21 @@ def test_the_command_gives_them(run):
     assert (np.diag(slope) < 0).all()
 
 
+def test_the_command_gives_them_at_the_exact_equilibrium(run):
+    """The load's own stiffness is in them: they are not those without it."""
+    slopes = {}
+    for words in ([], ["--exact", "--load", "fx=-300"]):
+        status, out, _ = run(
+            "assembly", "stiffness", "four_bar", "--by", "crank_pin.link.young",
+            "--json", "-", *words,
+        )  # fmt: skip
+        answer = json.loads(out)
+        assert status == 0
+        slopes[len(words)] = np.array(answer["slopes"]["crank_pin.link.young"])
+    assert slopes[3][3, 3] < 0.0
+    assert np.abs(slopes[3] / slopes[0] - 1)[3, 3] > 1e-4
+
+
 def test_an_unknown_number_is_named():
     with pytest.raises(BadInput, match="no number"):
         stiffness_slopes(load_design("irsbot2"), ["link_a.link.beam.raduis"])

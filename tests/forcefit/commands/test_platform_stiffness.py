@@ -5,6 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from assembly.sweeps.request import SweepOptions, ask_sweep
+from assembly.sweeps.sweep import sweep_in_memory
+
 SLIDER = """
 name = "slider"
 platform = "tip"
@@ -54,6 +57,44 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
     np.testing.assert_allclose(answer["free_motions"], [[0, 0, 0, 0, 0, 1]])
     assert answer["compliance"][5] == [None] * 6
     assert answer["compliance"][3][3] == pytest.approx(0.5 / (7e10 * np.pi * 1e-4))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["stiffness", "--exact", "--load", "fz=5"],
+        ["deflection", "--along", "fz=0:5:5"],
+        ["deflection", "--along", "fz=0:5:5", "--exact"],
+        ["deflection", "--along", "fz=0:5:5", "--follow"],
+        ["frequencies", "--exact", "--load", "fz=5"],
+    ],
+)
+def test_a_load_that_nothing_resists_is_exit_1_with_the_motion_named(
+    run, tmp_path, words
+):
+    (tmp_path / "slider.toml").write_text(SLIDER)
+    status, out, err = run(
+        "assembly", words[0], str(tmp_path / "slider.toml"), *words[1:]
+    )
+    assert status == 1
+    assert err == ""
+    assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in out
+
+
+def test_a_sweep_names_the_motion_that_is_free(tmp_path):
+    """At the singular postures of a workspace, too, where the rest has its number."""
+    (tmp_path / "slider.toml").write_text(SLIDER)
+    asked = ask_sweep(
+        str(tmp_path / "slider.toml"),
+        SweepOptions(grid="tz=0:0:1", reading="none", stiffness=True),
+    )
+    data = sweep_in_memory(asked).squeeze()
+    assert str(data.reason.values) == (
+        "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
+    )
+    assert float(data.stiffness.sel(wrench_component="FZ")) == 0.0
+    stretched = 7e10 * np.pi * 1e-4 / 0.5
+    assert float(data.stiffness.sel(wrench_component="FX")) == pytest.approx(stretched)
 
 
 @pytest.mark.parametrize(

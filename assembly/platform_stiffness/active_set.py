@@ -1,0 +1,176 @@
+r"""An equilibrium whose pressed clearances are known, solved to rounding.
+
+Cone programmes are solved to a certified gap: clearances stand within 1e-6 of the
+bounds that they press, and their forces are as good.  With the pressed ones known, the
+conditions of an equilibrium are equations,
+
+    [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
+    [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
+    [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
+
+and Newton's method solves them; N = the normals u_k of the pressed bounds.
+
+Sources:
+    Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from assembly.exact.contact_qp import boundary_normals
+from assembly.linear.assembled import Assembly
+from assembly.linear.closure import Linearisation, VirtualJoints
+from assembly.linear.load import FrameLoads
+from assembly.solvers.conic import cone_sizes
+
+AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
+_NEAR_BOUND = 1e-3  # [-] within which one may still be pressed, see ``contacts``
+_PRESSED = 1e-8  # of the largest force: smaller ones press nothing
+_ROUNDING = 1e-12  # nor does what is this small beside the energy without clearance
+_RANK = 1e-10  # relative size below which a singular value counts as zero
+_FLAT = 1e-12  # of the largest curvature: what less counts as none
+_STEPS = 4  # of Newton's method; two are usual
+_SETTLED = 1e-14  # [-] beyond the bounds
+
+
+def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
+    """Clearances that carry a force, and those that touch their bound without one.
+
+    A cone solver leaves a gap times a force that is the same for all: of a clearance
+    near its bound the larger of the two, the force by the energy, says which it is.
+
+    Args:
+        assembly: the manipulator at least energy.
+
+    Returns:
+        (cones,) bool each.
+    """
+    force = bound_forces(assembly)
+    gap = 1.0 - cone_sizes(assembly.clearances, assembly.joints.group)
+    largest = force.max(initial=0.0)
+    at_bound = gap <= AT_BOUND
+    least = max(_PRESSED * largest, _ROUNDING * assembly.energy_without_clearance)
+    scale = max(largest, assembly.stored)
+    near = at_bound | ((gap <= _NEAR_BOUND) & (force > gap * scale))
+    pressed = near & (force > least)
+    return pressed, at_bound & ~pressed
+
+
+def bound_forces(assembly: Assembly) -> NDArray:
+    """(cones,) [J] force on each clearance times its bound."""
+    forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
+    return cone_sizes(forces, assembly.joints.group)
+
+
+def settle(assembly: Assembly) -> Assembly:
+    """The same equilibrium of (22) to rounding, pressed clearances at their bounds.
+
+    Args:
+        assembly: the manipulator at least energy, as a cone solver found it.
+
+    Returns:
+        What Newton's method makes of it; the assembly itself if nothing is pressed, or
+        if a clearance would leave its bound or be pulled.
+    """
+    pressed, _ = contacts(assembly)
+    if not pressed.any():
+        return assembly
+    joints, group = assembly.joints, assembly.joints.group
+    x, multipliers = unknowns(assembly), assembly.multipliers
+    bounded = bounded_unknowns(joints)
+    rows = closure_rows(assembly.linearisation, joints)
+    misfit = assembly.linearisation.misfit
+    loads = work_of_loads(assembly.frame_loads, joints)
+    for _ in range(_STEPS):
+        u = x[bounded]
+        force = np.bincount(group, (loads + rows.T @ multipliers)[bounded] * u)
+        H = curvature(joints, force * pressed)
+        held = np.vstack([rows, _normals(joints, u, pressed).T])
+        beyond = (cone_sizes(u, group)[pressed] ** 2 - 1) / 2
+        left = np.append(rows @ x + misfit, beyond)
+        gradient = H @ x - loads - rows.T @ multipliers
+        dx, forces = newton_step(H, held, left, gradient)
+        x, multipliers = x + dx, multipliers + forces[: len(rows)]
+        if np.abs(beyond).max() <= _SETTLED:
+            break
+    y, u, q = np.split(x, [bounded.start, bounded.stop])
+    settled = replace(
+        assembly, elastic=y, clearances=u, motions=q, multipliers=multipliers
+    )
+    inside = cone_sizes(u, group) <= 1.0 + 1e-9
+    same = np.array_equal(contacts(settled)[0], pressed)
+    return settled if same and inside.all() else assembly
+
+
+def unknowns(assembly: Assembly) -> NDArray:
+    """(N,) springs, clearances and free motions."""
+    parts = (assembly.elastic, assembly.clearances, assembly.motions)
+    return np.concatenate(parts)
+
+
+def bounded_unknowns(joints: VirtualJoints) -> slice:
+    """Where the clearances are among them."""
+    springs = joints.elastic.shape[1]
+    return slice(springs, springs + len(joints.group))
+
+
+def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
+    """(6 closures, N) closures in all unknowns."""
+    return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
+
+
+def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
+    """(N,) [J] of every unknown."""
+    of_links, of_joints = (joints.elastic.T @ w for w in (loads.body, loads.joint))
+    springs = np.where(joints.links, of_links, of_joints)
+    others = (columns.T @ loads.joint for columns in (joints.cones, joints.free))
+    return np.concatenate([springs, *others])
+
+
+def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
+    """(N, N) [J] of springs, and of the round bounds that forces press."""
+    diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
+    return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))
+
+
+def _normals(joints: VirtualJoints, u: NDArray, pressed: NDArray) -> NDArray:
+    """(N, pressed) normals of the pressed bounds in all unknowns."""
+    normals = np.zeros((_count(joints), int(pressed.sum())))
+    normals[bounded_unknowns(joints)] = boundary_normals(u, pressed, joints.group)
+    return normals
+
+
+def _count(joints: VirtualJoints) -> int:
+    """Number of unknowns."""
+    return bounded_unknowns(joints).stop + joints.free.shape[1]
+
+
+def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
+    """(6 closures + pressed, N) closures, then the bounds that are pressed."""
+    normals = _normals(assembly.joints, assembly.clearances, pressed)
+    return np.vstack([closure_rows(assembly.linearisation, assembly.joints), normals.T])
+
+
+def newton_step(
+    H: NDArray, held: NDArray, left: NDArray, gradient: NDArray
+) -> tuple[NDArray, NDArray]:
+    """The change that meets the conditions at the head of this module.
+
+    Args:
+        H: (N, N) [J] second derivative of the Lagrangian.
+        held: (m, N) derivatives of what must hold: closures, and bounds.
+        left: (m,) by how much it does not.
+        gradient: (N,) [J] of the Lagrangian.
+
+    Returns:
+        (N,) change of the unknowns, of least size where nothing resists, and (m,) of
+        the multipliers, the least where they are not determined.
+    """
+    closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]
+    Z = null_space(held, rcond=_RANK) if len(held) else np.eye(len(H))
+    K, load = Z.T @ H @ Z, Z.T @ (gradient + H @ closing)
+    dx = closing - Z @ (np.linalg.pinv(K, rcond=_FLAT, hermitian=True) @ load)
+    return dx, np.linalg.lstsq(held.T, gradient + H @ dx, rcond=_RANK)[0]

@@ -1,0 +1,228 @@
+r"""How a tangent answers to a number of the robot: its equilibrium moves with it.
+
+The stiffness at an equilibrium depends on a number p itself, and on where the
+equilibrium (x, lambda, f) stands, unknowns, closures' multipliers and forces of the
+pressed clearances.  That moves by the derivative of its own conditions,
+
+    [ H   A'  N ] [ dx       ]     [ dg/dp ]
+    [ A   0   0 ] [ -dlambda ] = - [ dr/dp ] dp
+    [ N'  0   0 ] [ df       ]     [   0   ]
+
+(:mod:`.active_set`), g the gradient of the Lagrangian and r the closures at x, both in
+closed form for any p, N the normals of the pressed bounds: nothing is solved again.
+The tangent is then evaluated a step ahead and back along (p, x, lambda): central
+differences of what is known in closed form, with an error of the square of the step.
+
+The clearances that are pressed stay so.  Where one is at a change of contact, the
+tangent has a derivative on neither side, and it is NaN.
+
+Sources:
+    Haftka, Adelman (1989), Recent developments in structural sensitivity analysis
+    (semi-analytical derivatives).
+    Fiacco (1983), Introduction to Sensitivity and Stability Analysis in Nonlinear
+    Programming, chapter 2 (derivatives of solutions with active constraints).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.exact.contact_qp import boundary_normals
+from assembly.exact.dead_load import dead_loads
+from assembly.exact.descent import Expansion, expand
+from assembly.exact.equilibrium import active_clearances
+from assembly.exact.exact import ExactAssembly, solve_exact
+from assembly.exact.finite_robot import FiniteRobot
+from assembly.exact.placement import place
+from assembly.kinematics.pieces import cut_beams
+from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly, all_loads
+from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from assembly.linear.energy import solve_assembly
+from assembly.platform_stiffness.active_set import (
+    bound_forces,
+    bounded_unknowns,
+    closure_rows,
+    contacts,
+    curvature,
+    held_rows,
+    newton_step,
+    settle,
+    unknowns,
+    work_of_loads,
+)
+from assembly.platform_stiffness.exact_tangent import exact_tangent
+from assembly.platform_stiffness.linear_tangent import (
+    Side,
+    active_tangent,
+    without_clearance,
+)
+from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
+from assembly.platform_stiffness.platform_stiffness import State
+
+
+@dataclass(frozen=True)
+class TangentState:
+    """Of which tangent, and where it is read; see ``platform_stiffness``.
+
+    Attributes:
+        state: ``"without clearance"``, ``"in contact"`` or ``"exact"``.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        at: (3,) [m] of the platform, in its axes.
+        side: of a change of contact.
+    """
+
+    state: State = "without clearance"
+    load: ArrayLike | None = None
+    gravity: ArrayLike | None = None
+    at: ArrayLike = (0.0, 0.0, 0.0)
+    side: Side = "holding"
+
+
+_Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
+
+
+def compliance_slope(
+    posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
+) -> NDArray:
+    """Derivative of the platform's compliance by a number of its robot.
+
+    Args:
+        posture: where the robot stands.
+        ahead: where it stands with the number a step larger.
+        back: a step smaller.
+        step: of the number.
+        asked: of which tangent, and where it is read.
+
+    Returns:
+        (6, 6) [rad/(N m) .. m/N per unit of the number], base axes; NaN where a motion
+        of the platform is free, or at a change of contact.
+
+    Raises:
+        CannotAssemble: the errors cannot be closed.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: no equilibrium was found.
+        BadInput: a point or a load that is no number.
+    """
+    offset = numbers_of("at", asked.at, 3, "m")
+    moved = _STATES[asked.state](posture, ahead, back, step, asked)
+    compliances = []
+    for there, sign in ((ahead, 1.0), (back, -1.0)):
+        tangent, platform = moved(there, sign * step)
+        at = tangent.at(platform[:3, 3] + platform[:3, :3] @ offset)
+        compliances.append(at.compliance)
+    return (compliances[0] - compliances[1]) / (2 * step)
+
+
+def _classical(
+    posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
+) -> _Moved:
+    """Without loads and clearances the equilibrium is the nominal posture."""
+    return lambda there, by: (without_clearance(there), there.platform)
+
+
+def _linear(
+    posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
+) -> _Moved:
+    """Of problem (22), with the clearances that are pressed."""
+    start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
+    pressed, touching = contacts(start)
+    x, multipliers = unknowns(start), start.multipliers
+    held = held_rows(start, pressed)
+    bounded, count = bounded_unknowns(start.joints), len(multipliers)
+
+    def neighbour(there: Posture, x: NDArray, multipliers: NDArray) -> Assembly:
+        y, u, q = np.split(x, [bounded.start, bounded.stop])
+        return replace(
+            start, linearisation=linearise(there), elastic=y, clearances=u, motions=q,
+            joints=_like(start.joints, there), multipliers=multipliers,
+            frame_loads=all_loads(there, asked.load, None, asked.gravity),
+        )  # fmt: skip
+
+    def conditions(there: Posture) -> tuple[NDArray, NDArray]:
+        other = neighbour(there, x, multipliers)
+        rows = closure_rows(other.linearisation, other.joints)
+        gradient = work_of_loads(other.frame_loads, other.joints)
+        return rows @ x + other.linearisation.misfit, -gradient - rows.T @ multipliers
+
+    closures, gradient = _difference(conditions, ahead, back, step)
+    left = np.append(closures, np.zeros(len(held) - count))
+    H = curvature(start.joints, bound_forces(start) * pressed)
+    dx, forces = newton_step(H, held, left, gradient)
+
+    def moved(there: Posture, by: float) -> tuple[PlatformStiffness, NDArray]:
+        other = neighbour(there, x + by * dx, multipliers + by * forces[:count])
+        tangent = active_tangent(other, asked.side)
+        same = np.array_equal(contacts(other)[0], pressed) and not touching.any()
+        return tangent if same else _unknown(tangent), there.platform
+
+    return moved
+
+
+def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
+    """The virtual joints of a neighbouring robot."""
+    return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
+
+
+def _exact(
+    posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
+) -> _Moved:
+    """Of the exact equilibrium, geometric stiffness included."""
+    start = solve_exact(posture, asked.load, gravity=asked.gravity)
+    local = start.expansion
+    at, model = local.placement, local.placement.model
+    active, force = active_clearances(local)
+    N = np.zeros((len(at.x), int(active.sum())))
+    N[model.bounded] = boundary_normals(at.x[model.bounded], active, model.joints.group)
+    H = local.hessian.copy()
+    H[model.bounded, model.bounded] += np.diag(force[model.joints.group])
+
+    def expansion(there: Posture, x: NDArray, multipliers: NDArray) -> Expansion:
+        cut = cut_beams(there.robot)
+        placed = cut.cut(there) if cut.robot is not there.robot else there
+        finite = FiniteRobot(placed, _like(model.joints, placed))
+        loads = dead_loads(placed, asked.load, gravity=asked.gravity)
+        return expand(place(finite, x), loads, multipliers)
+
+    def conditions(there: Posture) -> tuple[NDArray, NDArray]:
+        other = expansion(there, at.x, local.multipliers)
+        gradient = other.gradient - other.placement.rows.T @ local.multipliers
+        return other.placement.residual, gradient
+
+    closures, gradient = _difference(conditions, ahead, back, step)
+    unit = model.units
+    held = np.vstack([at.rows, N.T]) * unit
+    left = np.append(closures, np.zeros(N.shape[1]))
+    dz, forces = newton_step(unit[:, None] * H * unit, held, left, unit * gradient)
+    dx, multipliers = unit * dz, forces[: len(closures)]
+
+    def moved(there: Posture, by: float) -> tuple[PlatformStiffness, NDArray]:
+        other = expansion(there, at.x + by * dx, local.multipliers + by * multipliers)
+        neighbour: ExactAssembly = replace(
+            start, whole=there, cut=cut_beams(there.robot), expansion=other
+        )
+        tangent = exact_tangent(neighbour, asked.side)
+        same = np.array_equal(active_clearances(other)[0], active)
+        return tangent if same else _unknown(tangent), other.placement.platform
+
+    return moved
+
+
+_STATES = {"without clearance": _classical, "in contact": _linear, "exact": _exact}
+
+
+def _difference(
+    conditions: Callable[[Posture], tuple[NDArray, NDArray]],
+    ahead: Posture, back: Posture, step: float,
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Derivatives of closures and gradient by the number, unknowns kept."""
+    there, behind = conditions(ahead), conditions(back)
+    return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
+
+
+def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
+    """A tangent at a change of contact: no derivative of it exists."""
+    return replace(tangent, root=np.full_like(tangent.root, np.nan))

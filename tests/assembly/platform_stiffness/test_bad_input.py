@@ -1,0 +1,62 @@
+"""What has no stiffness is refused in one line that says which."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import load_robot
+from forcefit.inputs.errors import BadInput
+
+
+def test_a_load_that_nothing_resists_is_refused_with_the_motion_it_drives():
+    """The slide's own z is along x: the platform goes there, and nothing else does."""
+    spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
+                   link=MatrixLink(np.eye(6)))  # fmt: skip
+    posture = home_posture(Robot("slide", "tip", (spring, Frame("tip", "spring"))))
+    named = r"it moves spring tz; the platform along \[0 0 0 1 0 0\] \[rad, m\]"
+    for state in ("in contact", "exact"):
+        with pytest.raises(FreeMotion, match=named):
+            platform_stiffness(posture, state, load=[0, 0, 0, 5.0, 1.0, 0])
+
+
+def test_what_turns_beside_the_platform_leaves_it_where_it_is():
+    """A wheel that runs freely, driven by a couple on its rim."""
+    frames = (
+        Frame("wheel", joint="revolute"),
+        Frame("rim", "wheel", [0.1, 0, 0]),
+        Frame("tip", translation=[0, 0, 0.3], link=MatrixLink(np.eye(6))),
+    )
+    couple = np.zeros((3, 6))
+    couple[1, 2] = 2.0
+    with pytest.raises(
+        FreeMotion, match="it moves wheel rz; the platform stands still"
+    ):
+        solve_assembly(home_posture(Robot("beside", "tip", frames)), bodies=couple)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"at": [0, np.nan, 0]}, "at: found nan as number 2, expected 3 numbers"),
+        ({"at": [0, 1]}, "at: found .* of length 2, expected 3 numbers"),
+        ({"load": [1.0]}, "load: found .* of length 1, expected 6 numbers"),
+        ({"load": [np.inf] * 6}, "load: found inf as number 1"),
+        ({"state": "loaded"}, "no state 'loaded'"),
+        ({"side": "left"}, "no side 'left'"),
+    ],
+)
+def test_what_is_no_point_load_or_state_is_refused(words, message):
+    with pytest.raises(ValueError, match=message):
+        platform_stiffness(home_posture(load_robot("orthoglide")), **words)
+
+
+@pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
+def test_what_is_no_direction_is_refused(direction):
+    stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
+    for asked in (stiffness.along, stiffness.shares):
+        with pytest.raises(BadInput, match="direction: found"):
+            asked(direction)

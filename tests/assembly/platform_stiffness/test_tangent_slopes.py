@@ -1,0 +1,114 @@
+"""Derivatives of tangents, against closed forms and against solving again."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.platform_stiffness.active_set import bound_forces, contacts, settle
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.platform_stiffness.tangent_slopes import TangentState
+from assembly.solvers.conic import cone_sizes
+from assembly.sweeps.parameters import design_of
+from assembly.sweeps.stiffness_slopes import stiffness_slopes
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
+
+PAPER = irsbot2_with({case["name"]: case for case in NUMBERS["cases"]}["literal"])
+POSE, LOAD = {"tx": 0.1, "tz": -0.45}, [0, 0, 0, 50.0, 0, -320.0]
+
+
+def torsion_bar(k, L):
+    """A rigid bar on a torsion spring."""
+    K = np.diag([np.inf, np.inf, k, np.inf, np.inf, np.inf])
+    hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
+    return Robot("bar", "bar", (hinge, Frame("bar", "hinge", [L, 0, 0])))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, -1.0, 1.5])
+def test_a_loaded_bar_on_a_torsion_spring(share):
+    """C = 1 / (k/L^2 - F/L), by k and by L, below, without and beyond buckling."""
+    k, L = 50.0, 0.4
+    F = share * k / L
+    paths = ["hinge.joint_stiffness.rz", "bar.translation.x"]
+    asked = TangentState("exact", [0, 0, 0, -F, 0, 0])
+    by_k, by_L = stiffness_slopes(
+        design_of(torsion_bar(k, L)), paths, asked=asked
+    ).values()
+    C = 1.0 / (k / L**2 - F / L)
+    assert by_k[4, 4] == pytest.approx(-(C**2) / L**2, rel=1e-6)
+    assert by_L[4, 4] == pytest.approx(C**2 * (2 * k / L**3 - F / L**2), rel=1e-6)
+
+
+def test_a_pin_that_is_pressed_into_its_hole_gives_way_along_the_rim():
+    """C = c / F, and F is the load: dC/dc = 1 / F, with the motion of the contact."""
+    c, F = 1e-4, 200.0
+    pin = Frame("pin", clearance=Clearance(radial=c, axial=0.0, tilt=0.0, spin=0.0))
+    robot = Robot("pin", "tip", (pin, Frame("tip", "pin")))
+    asked = TangentState("in contact", [0, 0, 0, F, 0, 0])
+    path = "pin.clearance.radial"
+    slope = stiffness_slopes(design_of(robot), [path], asked=asked)[path]
+    assert slope[4, 4] == pytest.approx(1 / F, rel=1e-6)
+
+
+@pytest.mark.parametrize("state", ["in contact", "exact"])
+@pytest.mark.parametrize(
+    ("path", "step"),
+    [
+        ("leg1.link_a.link.beam.radius", 4e-5),
+        ("leg1.elbow_a_second.clearance.radial", 2e-8),
+        ("leg1.link_a.geometric_error.tx", 1e-7),
+    ],
+)
+def test_the_paper_s_robot_against_solving_again(state, path, step):
+    """At its full errors, under load; what is pressed stays so."""
+    design, asked = design_of(PAPER), TangentState(state, LOAD, at=(0, 0, 0.05))
+    slope = stiffness_slopes(design, [path], POSE, asked=asked)[path]
+
+    def compliance(value):
+        posture = place_robot(design.robot({path: value}), POSE)
+        return platform_stiffness(posture, state, LOAD, at=asked.at).compliance
+
+    value = design.values[path]
+    wide, narrow = (
+        (compliance(value + h) - compliance(value - h)) / (2 * h)
+        for h in (step, step / 2)
+    )
+    expected = (4 * narrow - wide) / 3
+    size = np.sqrt(np.diag(compliance(value)))
+    size = np.outer(size, size)
+    assert np.abs(expected / size).max() * abs(value) > 1e-4
+    np.testing.assert_allclose(
+        slope / size, expected / size, atol=2e-5 * np.abs(expected / size).max()
+    )
+
+
+def test_at_a_change_of_contact_there_is_no_derivative():
+    """A gap as large as the clearance that takes it up: it touches without a force."""
+    touching = coaxial_beams(
+        [0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=1e-4, axial=0, tilt=0, spin=0)
+    )
+    _, touches = contacts(solve_assembly(home_posture(touching)))
+    assert touches.any()
+    path = "two.geometric_error.ty"
+    asked = TangentState("in contact")
+    slope = stiffness_slopes(design_of(touching), [path], asked=asked)[path]
+    assert np.isnan(slope).all()
+
+
+def test_a_settled_assembly_stands_on_its_bounds_to_rounding():
+    """A cone solver leaves 1e-6 of a bound where little presses."""
+    solved = solve_assembly(place_robot(PAPER, POSE), LOAD)
+    settled = settle(solved)
+    pressed, touching = contacts(settled)
+    assert pressed.sum() == 24
+    assert not touching.any()
+    np.testing.assert_allclose(
+        cone_sizes(settled.clearances, settled.joints.group)[pressed], 1.0, atol=1e-13
+    )
+    assert settled.closure_residual() < 1e-13
+    assert settled.duality_gap() <= solved.duality_gap() + 1e-12
+    assert settled.energy == pytest.approx(solved.energy, rel=1e-9)
+    # of small ones the solver knows few digits: it proves the energy
+    force = bound_forces(solved)
+    np.testing.assert_allclose(bound_forces(settled), force, atol=1e-7 * force.max())
