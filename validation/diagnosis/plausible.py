@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import Background
+from validation.diagnosis.background import Background
 from validation.diagnosis.refit import Fit
 from validation.diagnosis.small_terms import (
     GEOMETRY,

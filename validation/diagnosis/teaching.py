@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from assembly.measurement.conditions import Conditions
 from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.background import background
 from validation.diagnosis.candidates import Sensitivities
-from validation.diagnosis.evidence import background
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, Unexplained, learn, term_name
+from validation.diagnosis.learning import Learned, learn, term_name
 from validation.diagnosis.refit import refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
+from validation.diagnosis.remainder import Unexplained
 from validation.diagnosis.responses import responses
 from validation.diagnosis.selection import Selection, Update
 from validation.diagnosis.signatures import whiten
@@ -126,11 +127,10 @@ def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]
         For every effect learned one function, or several of one kind.
     """
     behind = model.behind
-    sensitivities = Sensitivities(model.conditions, campaign.robot, model.response)
     values = behind.values(model.fit.residual)
     terms = zip(behind.terms, values, behind.deviations(), strict=True)
     known = {term.name: (x, std) for term, x, std in terms}
     return [
-        sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
+        model.sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
         for k, one in enumerate(model.learned)
     ]

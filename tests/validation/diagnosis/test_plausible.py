@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.planar_arm_for_tests import measured
-from validation.diagnosis.evidence import NOTHING
+from validation.diagnosis.background import NOTHING
 from validation.diagnosis.plausible import implausible, impossible_rows
 
 
