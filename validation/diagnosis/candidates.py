@@ -162,10 +162,9 @@ class Sensitivities:
         Returns:
             (R, 6, m) [rad, m] per unknown.
         """
-        return np.concatenate(
-            [s[:, :, None] * columns[:, None, :] for s, columns in self._factors(one)],
-            axis=2,
-        )
+        # unknown by unknown in memory, as they are made and put together
+        blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one)]
+        return np.moveaxis(np.concatenate(blocks), 0, 2)
 
     def moved(self, one: Candidate, x: NDArray) -> NDArray:
         """What a candidate with known numbers adds to the readings.

@@ -8,7 +8,7 @@ block must foretell configurations it was not fitted to before it is believed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +102,7 @@ class _School:
         for term in left.terms:
             self._add(term)
         self.noise = 1.0
+        self.prior = Prior((), {}, 0.0, 0.0)
         self.update()
 
     def without_effects(self, columns: NDArray) -> NDArray:
@@ -121,12 +122,12 @@ class _School:
     def update(self) -> None:
         """Sizes of all small terms, and the noise that is left, found anew."""
         squares = float(self._free @ self._free)
-        start = None
         for _ in range(2):
             v = self.noise**2
             evidence = Evidence(self.terms, len(self._free), self._gram / v)
-            start = self.prior = evidence.best_of(self._along / v, squares / v, start)
-            values, self.unknowns = evidence.posterior(start, self._along / v)
+            start = self._with_new(self.prior) if self.prior.used else None
+            self.prior = evidence.best_of(self._along / v, squares / v, start)
+            values, self.unknowns = evidence.posterior(self.prior, self._along / v)
             ends = np.cumsum([len(term) for term in self.terms])
             parts = np.split(values, ends[:-1]) if self.terms else []
             left = self._free.copy()
@@ -137,13 +138,21 @@ class _School:
             self.freedom = max(1, round(freedom))
             self.noise = max(1.0, np.sqrt(self.left / self.freedom))
 
-    def believe(self, one: Learned) -> None:
-        """A function is one of the small terms from now on."""
-        self.learned.append(one)
-        columns = in_cells(self.sensitivities, one.candidate, self.fitting)
-        axis = self.sensitivities.axes(one.candidate)
-        self._add(function_term(term_name(len(self.learned)), axis, columns))
-        self.update()
+    def _with_new(self, prior: Prior) -> Prior:
+        """A prior in whose terms all that were added since are in use."""
+        new = self.terms[len(prior.used) :]
+        used = [*prior.used, *(np.ones(len(term), bool) for term in new)]
+        return replace(prior, used=tuple(used))
+
+    def believe(self, functions: Sequence[Learned]) -> None:
+        """Functions are among the small terms from now on."""
+        for one in functions:
+            self.learned.append(one)
+            columns = in_cells(self.sensitivities, one.candidate, self.fitting)
+            axis = self.sensitivities.axes(one.candidate)
+            self._add(function_term(term_name(len(self.learned)), axis, columns))
+        if functions:
+            self.update()
 
     def part(self, most: int) -> Remainder:
         """What is left in some of the rows, with about so many readings at most."""
@@ -186,8 +195,7 @@ def learn(
     school = _School(campaign, used, sensitivities, left)
     names = variables_of(sensitivities.conditions.take(used))
     every = list(places_of(campaign.robot, names))
-    for one in known or ():
-        school.believe(one)
+    school.believe(known or ())
     for turn in range(MOST if known is None else 0):
         update("functions learned", turn, MOST)
         if school.done:
@@ -196,7 +204,7 @@ def learn(
         function = _best(school, judged, every)
         if function is None or not judged.foretells(function.candidate):
             break
-        school.believe(function)
+        school.believe([function])
     update("functions learned", MOST, MOST)
     unknowns = school.effects.shape[1] + school.unknowns
     return Lesson(

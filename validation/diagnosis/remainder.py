@@ -62,7 +62,7 @@ class Unexplained:
 
     def take(self, cells: NDArray) -> "Unexplained":
         """The same in some of the cells."""
-        every = [term.take(np.arange(len(term)), cells) for term in self.terms]
+        every = [replace(term, columns=term.columns[cells]) for term in self.terms]
         return Unexplained(every, self.residual[cells], self.effects[cells])
 
 
@@ -201,11 +201,11 @@ def in_cells(
     Returns:
         (N, m) in the cells, over sigma.
     """
-    cells = campaign.cells
-    changes = sensitivities.changes(one) / campaign.sigma[:, :, None]
-    if cells.all():
-        return changes.reshape(-1, changes.shape[2])
-    return changes[cells]
+    changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
+    columns = changes.reshape(len(changes), -1)
+    if not campaign.cells.all():
+        columns = columns[:, campaign.cells.ravel()]
+    return columns.T
 
 
 def function_term(name: str, axis: NDArray, columns: NDArray) -> SmallTerm:
