@@ -129,14 +129,6 @@ class Evidence:
         """The prior of a machine made exactly as declared."""
         return Prior(tuple(np.zeros(len(t), bool) for t in self.terms), {}, 0.0, 0.0)
 
-    def sizes(self, prior: Prior) -> NDArray:
-        """Standard deviations of all unknowns that a prior of these terms uses."""
-        sizes = [np.zeros(0)]
-        for term, used in zip(self.terms, prior.used, strict=True):
-            if used.any():
-                sizes.append(sizes_of(term, prior.scales[term.name])[used])
-        return np.concatenate(sizes)
-
     def posterior(self, prior: Prior, along: NDArray) -> tuple[NDArray, float]:
         """The most probable unknowns.
 
@@ -149,7 +141,7 @@ class Evidence:
             the readings say.
         """
         mask = np.concatenate([np.zeros(0, bool), *prior.used])
-        size = self.sizes(prior)
+        size = sizes_in_use(self.terms, prior)
         values = np.zeros(len(mask))
         if not len(size):
             return values, 0.0
@@ -232,6 +224,15 @@ class Evidence:
                 scales[term.name] = (float(size[0]), float(size[1]))
                 cost += 0.0 if term.sure else _FURTHER
         return Prior(tuple(used), scales, -cost, evidence - cost), values, every
+
+
+def sizes_in_use(terms: Sequence[SmallTerm], prior: Prior) -> NDArray:
+    """Standard deviations of all unknowns that a prior of these terms uses."""
+    sizes = [np.zeros(0)]
+    for term, used in zip(terms, prior.used, strict=True):
+        if used.any():
+            sizes.append(sizes_of(term, prior.scales[term.name])[used])
+    return np.concatenate(sizes)
 
 
 def gram_of(blocks: Sequence[NDArray]) -> NDArray:

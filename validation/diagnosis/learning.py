@@ -161,10 +161,10 @@ class _School:
         if total > most:
             rows = np.linspace(0, count - 1, count * most // total).astype(int)
         cells = np.isin(np.nonzero(self.fitting.cells)[0], rows)
-        left = Unexplained(self.terms, self.residual, self.effects).take(cells)
+        left = Unexplained(self.terms, self.residual, self.effects)
         return Remainder(
-            self.fitting.take(rows), self.sensitivities.take(rows), left, self.prior,
-            self.noise,
+            self.fitting.take(rows), self.sensitivities.take(rows), left, cells,
+            self.prior, self.noise,
         )  # fmt: skip
 
     @property

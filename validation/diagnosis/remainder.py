@@ -1,15 +1,15 @@
 r"""What is left in some rows, and what a candidate is worth there.
 
-Effects E and small unknowns of covariance S^2 are taken out of residual and candidates
+Effects and small unknowns are taken out of residual and candidates
 once, for all candidates together:
 
 ======  ===============  ======  =====================================================
 symbol  code             shape   meaning
 ======  ===============  ======  =====================================================
 Q                        (N, e)  orthonormal basis of what effects can do
-U, l                     (N, r)  axes and gains of the small unknowns without that
-Y       ``_known``       (N, p)  Q and U sqrt(l/(1 + l)), so that what counts of columns
-                                 B is B'P B with P = 1 - Y Y'
+S                        (N, k)  small columns without that, times their sizes
+Y       ``_known``       (N, p)  Q and S L^-T with L L' = I + S'S, so that what counts
+                                 of columns B is B'P B with P = I - Y Y'
 b       ``_left``        (N,)    P z
 ======  ===============  ======  =====================================================
 
@@ -26,16 +26,15 @@ Sources:
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.background import background
 from validation.diagnosis.candidates import Candidate, Sensitivities
-from validation.diagnosis.evidence import Evidence, Prior
+from validation.diagnosis.evidence import Evidence, Prior, sizes_in_use
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
@@ -60,10 +59,16 @@ class Unexplained:
     residual: NDArray
     effects: NDArray
 
-    def take(self, cells: NDArray) -> "Unexplained":
-        """The same in some of the cells."""
-        every = [replace(term, columns=term.columns[cells]) for term in self.terms]
-        return Unexplained(every, self.residual[cells], self.effects[cells])
+    def scaled(self, prior: Prior, cells: NDArray) -> NDArray:
+        """(n, k) small columns in use, by a prior's sizes, in a mask's n cells."""
+        size = sizes_in_use(self.terms, prior)
+        scaled = np.empty((int(cells.sum()), len(size)), order="F")
+        at = 0
+        for term, used in zip(self.terms, prior.used, strict=True):
+            for k in np.flatnonzero(used):
+                scaled[:, at] = term.columns[cells, k] * size[at]
+                at += 1
+        return scaled
 
 
 class Remainder:
@@ -71,35 +76,37 @@ class Remainder:
 
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, left: Unexplained,
-        prior: Prior, noise: float,
+        cells: NDArray, prior: Prior, noise: float,
     ) -> None:  # fmt: skip
         """Take out what is known.
 
         Args:
             campaign: of the rows looked at.
             sensitivities: of these rows.
-            left: in their cells.
+            left: in these rows and others.
+            cells: mask over its readings, of these rows.
             prior: of its terms.
             noise: [sigma] that stays.
         """
         self.campaign, self.sensitivities = campaign, sensitivities
-        self.count = len(left.residual)
-        self._raw, self._noise = left, noise
-        Q = np.linalg.qr(left.effects)[0]
+        self.count = int(cells.sum())
+        self._all, self._cells = left, cells
+        self._prior, self._noise = prior, noise
+        Q = np.linalg.qr(left.effects[cells])[0]
 
         def free(columns: NDArray) -> NDArray:
             return columns - Q @ (Q.T @ columns)
 
-        terms = [replace(t, columns=free(t.columns) / noise) for t in left.terms]
-        behind = background(terms, prior)
-        self._size = behind.size
-        self._used = prior.used
-        small = behind.axes * np.sqrt(behind.known) if behind else Q[:, :0]
+        small = free(left.scaled(prior, cells)) / noise
+        M = small.T @ small
+        M[np.diag_indices(len(M))] += 1.0
+        if len(M):
+            L = cholesky(M, lower=True, overwrite_a=True, check_finite=False)
+            small = solve_triangular(L, small.T, lower=True, check_finite=False).T
         self._known = np.hstack([Q, small])
-        z = free(left.residual)
-        seen = behind.whitened(z)
-        self._squares = float(seen @ seen) / noise**2
-        self._left = behind.whitened(seen) / noise**2
+        z = free(left.residual[cells])
+        self._left = (z - small @ (small.T @ z)) / noise**2
+        self._squares = float(z @ self._left)
 
     def worths(self, candidates: Sequence[Candidate]) -> NDArray:
         """How much likelier each candidate makes the readings.
@@ -164,17 +171,17 @@ class Remainder:
         size = self._likeliest(one, B)
         if len(names) < 2:
             return False
-        norm = np.linalg.norm(self._raw.effects, axis=0)
-        flat = self._raw.effects * (_FLAT / np.where(norm > 0, norm, 1.0))
-        used = zip(self._raw.terms, self._used, strict=True)
-        small = np.hstack([flat[:, :0], *(t.columns[:, u] for t, u in used)])
-        known = flat.shape[1] + small.shape[1]
-        X = np.hstack([flat, small * self._size, B * size])
+        effects = self._all.effects[self._cells]
+        norm = np.linalg.norm(effects, axis=0)
+        flat = effects * (_FLAT / np.where(norm > 0, norm, 1.0))
+        X = np.hstack([flat, self._all.scaled(self._prior, self._cells), B * size])
+        known = X.shape[1] - len(size)
+        z = self._all.residual[self._cells]
         gram = X.T @ X
         less = np.zeros(len(where))
         for fold in np.array_split(names, min(_FOLDS, len(names))):
             kept = np.isin(where, fold)
-            without, beside = _foretold(X, self._raw.residual, gram, kept, known)
+            without, beside = _foretold(X, z, gram, kept, known)
             less[kept] = (without - beside) / self._noise**2
         gain, error = gain_over_blocks(less, where)
         return gain > _PROVEN * error
@@ -185,7 +192,8 @@ class Remainder:
         Y = self._known.T @ B
         gram = (B.T @ B - Y.T @ Y) / self._noise**2
         evidence = Evidence([function_term("", axis, B)], self.count, gram)
-        return evidence.sizes(evidence.best_of(B.T @ self._left, self._squares))
+        prior = evidence.best_of(B.T @ self._left, self._squares)
+        return sizes_in_use(evidence.terms, prior)
 
 
 def in_cells(
