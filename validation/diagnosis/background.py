@@ -145,8 +145,8 @@ def background(terms: Sequence[SmallTerm], prior: Prior) -> Background:
     Returns:
         The background.
     """
-    kept = [t.take(used) for t, used in zip(terms, prior.used, strict=True)]
-    kept = [term for term in kept if len(term)]
+    used = zip(terms, prior.used, strict=True)
+    kept = [t if on.all() else t.take(on) for t, on in used if on.any()]
     if not kept:
         return NOTHING
     size = np.concatenate([sizes_of(term, prior.scales[term.name]) for term in kept])
@@ -155,7 +155,7 @@ def background(terms: Sequence[SmallTerm], prior: Prior) -> Background:
     gains, turn = np.linalg.eigh(scaled.T @ scaled)
     shown = gains > _FAINT
     gains, turn = gains[shown], turn[:, shown]
-    axes = scaled @ turn / np.sqrt(gains)
+    axes = scaled @ (turn / np.sqrt(gains))
     return Background(
         terms=tuple(kept),
         size=size,

@@ -98,7 +98,6 @@ class _School:
         self.learned: list[Learned] = []
         # inner products of all columns without effects, and of the residual with them
         self._gram, self._along = np.zeros((0, 0)), np.zeros(0)
-        self._columns: list[NDArray] = []
         for term in left.terms:
             self._add(term)
         self.noise = 1.0
@@ -112,11 +111,10 @@ class _School:
     def _add(self, term: SmallTerm) -> None:
         """One small term more."""
         own = self.without_effects(term.columns)
-        across = [other.T @ own for other in self._columns]
+        across = [other.columns.T @ own for other in self.terms]
         beside = np.vstack([np.zeros((0, len(term))), *across])
         self._gram = np.block([[self._gram, beside], [beside.T, own.T @ own]])
         self._along = np.append(self._along, own.T @ self._free)
-        self._columns.append(own)
         self.terms.append(term)
 
     def update(self) -> None:
@@ -130,9 +128,10 @@ class _School:
             values, self.unknowns = evidence.posterior(self.prior, self._along / v)
             ends = np.cumsum([len(term) for term in self.terms])
             parts = np.split(values, ends[:-1]) if self.terms else []
-            left = self._free.copy()
-            for own, x in zip(self._columns, parts, strict=True):
-                left -= own @ x
+            shown = np.zeros_like(self._free)
+            for term, x in zip(self.terms, parts, strict=True):
+                shown += term.columns @ x
+            left = self._free - self.without_effects(shown)
             freedom = len(left) - self.effects.shape[1] - self.unknowns
             self.left = float(left @ left)
             self.freedom = max(1, round(freedom))

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.blas import dtrsm
 
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Candidate, Sensitivities
@@ -94,17 +95,18 @@ class Remainder:
         self._prior, self._noise = prior, noise
         Q = np.linalg.qr(left.effects[cells])[0]
 
-        def free(columns: NDArray) -> NDArray:
-            return columns - Q @ (Q.T @ columns)
-
-        small = free(left.scaled(prior, cells)) / noise
+        small = left.scaled(prior, cells)
+        small -= Q @ (Q.T @ small)
+        small /= noise
         M = small.T @ small
         M[np.diag_indices(len(M))] += 1.0
         if len(M):
             L = cholesky(M, lower=True, overwrite_a=True, check_finite=False)
-            small = solve_triangular(L, small.T, lower=True, check_finite=False).T
-        self._known = np.hstack([Q, small])
-        z = free(left.residual[cells])
+            # in place: small columns are most of what there is
+            small = dtrsm(1.0, L, small, side=1, lower=1, trans_a=1, overwrite_b=1)
+        self._known = Q, small
+        z = left.residual[cells]
+        z = z - Q @ (Q.T @ z)
         self._left = (z - small @ (small.T @ z)) / noise**2
         self._squares = float(z @ self._left)
 
@@ -119,13 +121,17 @@ class Remainder:
         """
         worths: list[float] = []
         for blocks in self._together(candidates):
-            known = self._known.T @ np.hstack(blocks)
+            every = self._along(np.hstack(blocks))
             ends = np.cumsum([block.shape[1] for block in blocks])
             for block, Y in zip(
-                blocks, np.split(known, ends[:-1], axis=1), strict=True
+                blocks, np.split(every, ends[:-1], axis=1), strict=True
             ):
                 worths.append(self._worth(block, block.T @ block - Y.T @ Y))
         return np.array(worths)
+
+    def _along(self, columns: NDArray) -> NDArray:
+        """(p, m) Y' times columns (N, m)."""
+        return np.vstack([known.T @ columns for known in self._known])
 
     def _together(self, candidates: Sequence[Candidate]) -> Iterator[list[NDArray]]:
         """Columns of candidates, some hundred at once."""
@@ -189,7 +195,7 @@ class Remainder:
     def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:
         """(m,) likeliest sizes of a candidate's unknowns."""
         axis = self.sensitivities.axes(one)
-        Y = self._known.T @ B
+        Y = self._along(B)
         gram = (B.T @ B - Y.T @ Y) / self._noise**2
         evidence = Evidence([function_term("", axis, B)], self.count, gram)
         prior = evidence.best_of(B.T @ self._left, self._squares)
@@ -241,7 +247,7 @@ def _foretold(
     Returns:
         By the first ``known`` columns, and by all of them.
     """
-    fitted, aside = X[~kept], X[kept]
+    aside = X[kept]
     A = gram - aside.T @ aside
     A[np.diag_indices(len(A))] += 1.0
     L = cholesky(A, lower=True, overwrite_a=True)
@@ -250,8 +256,8 @@ def _foretold(
         own, x = L[:count, :count], np.zeros(count)
         # a second time: products of columns lose what nearly equal ones tell
         for _ in range(2):
-            left = z[~kept] - fitted[:, :count] @ x
-            wanted = fitted[:, :count].T @ left - x
+            left = np.where(kept, 0.0, z - X[:, :count] @ x)
+            wanted = X[:, :count].T @ left - x
             y = solve_triangular(own, wanted, lower=True, check_finite=False)
             x += solve_triangular(own, y, lower=True, trans=1, check_finite=False)
         errors.append((z[kept] - aside[:, :count] @ x) ** 2)

@@ -206,6 +206,6 @@ def with_small(
                 error = frame.geometric_error + value * np.eye(6)[axis]
                 frames[i] = replace(frame, geometric_error=error)
             elif value > 0.0:
-                K = in_series(frame.joint_stiffness, int(axis), float(value))
+                K = in_series(frame.resistance, int(axis), float(value))
                 frames[i] = replace(frame, joint_stiffness=K)
     return replace(robot, frames=tuple(frames))

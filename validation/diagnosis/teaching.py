@@ -65,19 +65,13 @@ def taught(
     if selection.sets[0].members and selection.sets[0].rank:
         raw = selection.behind.raw(selection.fit.residual)
         stories.append((replace(selection.fit, residual=raw), selection.columns))
-    lessons = [
-        learn(
-            campaign,
-            used,
-            sensitivities,
-            Unexplained(selection.terms, fit.residual, columns),
-            update,
-            known,
-        )
-        for fit, columns in stories
-    ]
-    best = min(range(len(stories)), key=lambda k: lessons[k].cost)
-    lesson, fit = lessons[best], stories[best][0]
+    best, lesson, fit = 0, None, alone
+    for k, (story, columns) in enumerate(stories):
+        left_over = Unexplained(selection.terms, story.residual, columns)
+        new = learn(campaign, used, sensitivities, left_over, update, known)
+        if lesson is None or new.cost < lesson.cost:
+            best, lesson, fit = k, new, story
+    assert lesson is not None
     if not lesson.learned:
         return selection, ()
     behind = background(lesson.terms, lesson.prior)
@@ -88,16 +82,16 @@ def taught(
         fit.values,
         behind=behind,
     )
-    story = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
+    told = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
     if best == 0:
         nothing = selection.screen.fit(())
-        story = replace(story, sets=[nothing, *selection.sets], unknowns=len(begin))
+        told = replace(told, sets=[nothing, *selection.sets], unknowns=len(begin))
     held = with_clearance_held(conditions, selection.fit)
     before = FittedModel(held, response, selection.fit, selection.behind)
     after = FittedModel(conditions, response, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
         return selection, ()
-    return story, lesson.learned
+    return told, lesson.learned
 
 
 def _foretells(
