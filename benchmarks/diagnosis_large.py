@@ -29,8 +29,8 @@ CASES = (  # robot, rows, configurations, what is hidden at 5 times the noise
     ("hexapod", 1000, 330, "encoder_offset"),
     ("five_bar", 3000, 60, "link_length"),
     ("3rrr", 3000, 1000, "base_compliance"),
-    ("arm6", 3000, 1000, "_second_harmonic"),
-    ("arm6", 100, 25, "_second_harmonic"),
+    ("arm6", 3000, 1000, "_pose_stiffness"),
+    ("arm6", 100, 25, "_pose_stiffness"),
 )
 TRIES = 8  # draws of a robot until its simulation comes to rest
 
