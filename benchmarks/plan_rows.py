@@ -31,8 +31,8 @@ from validation.inspection.planning import plan_rows, rows_as_campaign
 from validation.multibody.simulation import without_clearance
 from validation.synthetic.design import CampaignDesign, plan_campaign
 
-ROBOTS = ("arm6", "delta", "3rrr")
-ROWS = (8, 12, 16, 24, 32, 48, 64)
+ROBOTS = ("arm6", "five_bar")
+ROWS = (8, 12, 16, 24, 32, 48)
 STRENGTH = 1.0  # [sigma]
 SIGMA = (1e-5, 5e-6)
 # the base stands where it is declared to; finite motions have no unknown
