@@ -39,7 +39,7 @@ def plan(
     seed: Annotated[int, typer.Option(help="Of the rows to choose from.")] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Plan a campaign that tells the library's effects apart in few rows.
+    """Plan rows that tell effects apart.
 
     Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
     temperatures are those to aim at, to be replaced by those that were.
