@@ -47,6 +47,7 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
+NEAR = 1.2  # of the noise: what the machine's error is to come to
 # weight and stiffening set the noise; clearance is left where the load pushes it
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
@@ -93,22 +94,29 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
     """Errors at the machine before and after, in units of the noise."""
     begin = time.process_time()
     case = draw_case(seed, robots)
-    rng = np.random.default_rng([seed, 999])
     design = replace(_design(case.robot), configurations=TARGETS, rows=TARGETS)
-    plan = plan_campaign(case.robot, design, rng)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_campaign(case, folder / "campaign")
         found = diagnose(read_campaign(folder / "campaign"))
-        (folder / "targets.csv").write_text(plan_table(plan))
-        targets = read_commands(folder / "targets.csv", corrected(found))
-    answer = compensate(targets)
-    error = {
-        when: distances(case.robot, case.effects, targets, q, "springs")
-        for when, q in (
-            ("before", targets.coordinates), ("after", answer.coordinates)
-        )
-    }  # fmt: skip
+        for attempt in range(TRIES):
+            rng = np.random.default_rng([seed, 999, *([attempt] if attempt else [])])
+            plan = plan_campaign(case.robot, design, rng)
+            (folder / "targets.csv").write_text(plan_table(plan))
+            targets = read_commands(folder / "targets.csv", corrected(found))
+            answer = compensate(targets)
+            try:
+                error = {
+                    when: distances(case.robot, case.effects, targets, q, "springs")
+                    for when, q in (
+                        ("before", targets.coordinates), ("after", answer.coordinates)
+                    )
+                }  # fmt: skip
+            except SimulationFailed:  # of targets that springs do not come to rest at
+                continue
+            break
+        else:
+            raise RuntimeError(f"case {seed}: no targets that can be simulated")
     six = sum(frame.actuated for frame in case.robot.frames) >= 6
     return {
         "seed": seed, "robot": case.robot.name,
@@ -148,6 +156,8 @@ def main() -> None:
         answers.append(run_case(seed, robots))
         given.out.write_text(json.dumps(answers, indent=1))
         print(json.dumps(answers[-1]), flush=True)
+    near = np.mean([answer["after"] <= NEAR for answer in answers])
+    print(f"within {NEAR} of the noise: {near:.0%} of {len(answers)}")
     for key in ("before", "after", "before_um", "after_um"):
         values = np.array([answer[key] for answer in answers])
         ends = np.quantile(values, [0.5, 0.9])

@@ -12,12 +12,13 @@ import time
 from pathlib import Path
 
 import numpy as np
-from random_robots import draw_robot
+from random_robots import Drawn, draw_robot
 
+from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.diagnose import diagnose
-from validation.multibody.simulation import SimulationFailed
+from validation.multibody.simulation import SimulationFailed, without_clearance
 from validation.synthetic.design import CampaignDesign
 from validation.synthetic.generator import Noise, generate_campaign, write_campaign
 
@@ -28,6 +29,8 @@ CASES = (  # robot, rows, configurations, what is hidden at 5 times the noise
     ("hexapod", 1000, 330, "encoder_offset"),
     ("five_bar", 3000, 60, "link_length"),
     ("3rrr", 3000, 1000, "base_compliance"),
+    ("arm6", 3000, 1000, "_pose_stiffness"),
+    ("arm6", 100, 25, "_pose_stiffness"),
 )
 TRIES = 8  # draws of a robot until its simulation comes to rest
 
@@ -37,7 +40,7 @@ def make(folder: Path, case: int) -> None:
     kind, rows, configurations, hidden = CASES[case]
     for attempt in range(TRIES):
         rng = np.random.default_rng([77, case, attempt])
-        drawn = draw_robot(rng, kind)
+        drawn = _arm(rng) if kind == "arm6" else draw_robot(rng, kind)
         design = CampaignDesign(
             configurations, rows, drawn.reach, load=drawn.load,
             reference_point=tuple(drawn.point),
@@ -54,12 +57,21 @@ def make(folder: Path, case: int) -> None:
     raise RuntimeError(f"{kind}: no robot that was drawn comes to rest")
 
 
+def _arm(rng: np.random.Generator) -> Drawn:
+    """The built-in arm of six joints, frames a little off as declared."""
+    robot = without_clearance(load_robot("arm6"))
+    size = np.repeat([2e-4, 1e-4], 3)
+    errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * size
+    return Drawn("arm6", robot.with_errors(errors), 0.6, 60.0, np.zeros(3))
+
+
 def main() -> None:
     """Make, diagnose, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default="", help="a robot")
     asked = parser.parse_args()
+    asked.folder.mkdir(parents=True, exist_ok=True)
     for case, (kind, rows, _, hidden) in enumerate(CASES):
         folder = asked.folder / f"{kind}_{rows}"
         if asked.only not in kind:

@@ -92,6 +92,7 @@ def declared_robot(root: Table, name: str) -> Robot:
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
     effects = root.tables("effect")
+    ranges = _learned_range(root)
     root.finish()
     if not 0 < len(tables[0]) <= _MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -102,12 +103,31 @@ def declared_robot(root: Table, name: str) -> Robot:
     _check_known(root, "platform", platform, names)
     try:
         remarks = _remarks(tables[0])
-        robot = Robot(name, platform, frames, closures, description, remarks=remarks)
+        robot = Robot(
+            name, platform, frames, closures, description, learned_range=ranges,
+            remarks=remarks,
+        )  # fmt: skip
         robot = with_effects(robot, effects)
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
     return robot
+
+
+def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
+    """Least and largest values by variable, of none where the file says nothing."""
+    ranges: dict[str, tuple[float, float]] = {}
+    if not root.has("learned_range"):
+        return ranges
+    table = root.table("learned_range")
+    for name in table.content:
+        least, most = table.array(name, (2,), "its unit")
+        if least > most:
+            fault = f"found [{least:g}, {most:g}], expected the smaller one first"
+            raise table.bad(name, fault)
+        ranges[name] = (float(least), float(most))
+    table.finish()
+    return ranges
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
@@ -289,6 +309,8 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     if robot.description:
         table["description"] = robot.description
     table["platform"] = robot.platform
+    if robot.learned_range:
+        table["learned_range"] = dict(robot.learned_range)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]

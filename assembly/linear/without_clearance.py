@@ -129,11 +129,11 @@ class Flexibility:
             (c, t, s) generalised force on each per unit of each; of the same, negative
             semidefinite.
         """
-        through = np.einsum("cki,is->cks", self.rows, columns)
-        met = through if read is None else np.einsum("cki,it->ckt", self.rows, read)
+        through = self.rows @ columns
+        met = through if read is None else self.rows @ read
         count = self.rows.shape[1]
         inner = self.inverse[:, :count, :count] / self.softness
-        return -np.einsum("cks,ckl,clt->cst", met, inner, through)
+        return -(np.swapaxes(met, 1, 2) @ (inner @ through))
 
     def platform_of(self, columns: NDArray) -> NDArray:
         """Platform screw that stress-free screws at the frames cause.
@@ -144,16 +144,15 @@ class Flexibility:
         Returns:
             (c, 6, s) [rad, m] platform screw per unit of each.
         """
-        through = np.einsum("cki,is->cks", self.rows, columns)
         count = self.rows.shape[1]
-        x = -np.einsum("ckl,cls->cks", self.inverse[:, :, :count], through)
-        closing = np.einsum("cki,cks->cis", self.rows, x[:, :count] / self.softness)
+        if not count:
+            return self.platform @ columns
+        x = -(self.inverse[:, :, :count] @ (self.rows @ columns))
+        closing = np.swapaxes(self.rows, 1, 2) @ (x[:, :count] / self.softness)
         n = len(self.compliance)
-        bent = np.einsum(
-            "nij,cnjs->cnis", self.compliance, closing.reshape(len(x), n, 6, -1)
-        ).reshape(closing.shape)
-        screws = columns + bent + np.einsum("iq,cqs->cis", self.free, x[:, count:])
-        return np.einsum("cki,cis->cks", self.platform, screws)
+        bent = self.compliance @ closing.reshape(len(x), n, 6, -1)
+        screws = columns + bent.reshape(closing.shape) + self.free @ x[:, count:]
+        return self.platform @ screws
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,7 +174,7 @@ def with_springs(conditions: Conditions, row: int) -> Conditions:
             left.append(each)
             continue
         i = conditions.robot.index(each.frame)
-        K = in_series(frames[i].joint_stiffness, each.component, compliance)
+        K = in_series(frames[i].resistance, each.component, compliance)
         frames[i] = replace(frames[i], joint_stiffness=K)
     robot = replace(conditions.robot, frames=tuple(frames))
     return replace(one, robot=robot, yields=tuple(left))

@@ -195,6 +195,15 @@ class Frame:
         return self.passive and bool(self.own_stiffness)
 
     @property
+    def resistance(self) -> NDArray | None:
+        """(6, 6) its K_B, None if rigid: a passive joint is free along its motion."""
+        if self.joint_stiffness is not None or not self.passive:
+            return self.joint_stiffness
+        K = np.full(6, np.inf)
+        K[self.own_axis] = 0.0
+        return np.diag(K)
+
+    @property
     def own_axis(self) -> int:
         """Row of the screw along which the joint moves: RZ, or TZ if prismatic."""
         return 5 if self.joint == "prismatic" else 2

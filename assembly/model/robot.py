@@ -51,6 +51,8 @@ class Robot:
             see :mod:`assembly.effects`.
         session_effects: likewise those of one session alone, by session.
         functions: general effects that it is known to have.
+        learned_range: least and largest value of what varied where its effects were
+            learned, by public name.
         remarks: defaults of its file that are easily overlooked.
     """
 
@@ -64,6 +66,7 @@ class Robot:
         default_factory=dict
     )
     functions: tuple[Function, ...] = ()
+    learned_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr

@@ -3,8 +3,9 @@
 Each parses, calls one function, prints or saves.
 """
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +24,7 @@ from forcefit.inputs.writing import (
 
 if TYPE_CHECKING:
     from assembly.model.function import Function
+    from validation.campaign.campaign import Campaign
 
 CommandsArgument = Annotated[
     Path,
@@ -50,7 +52,7 @@ def predict(
 
     check_writable(output, TABLE)
     prediction = foretell(read_commands(commands, load_robot(robot)))
-    table = prediction.table()
+    table = prediction.table() | _warned(prediction.commands)
     write_text(reading_table(prediction), output)
     write_json(table, json)
     if json != "-":
@@ -110,8 +112,9 @@ def compensate(
     if offsets is not None:
         check_writable(offsets, TABLE)
     left = None if diagnosed is None else _left(diagnosed)
-    compensation = correct(read_commands(targets, load_robot(robot)), as_read=as_read)
-    table = tables.summary(compensation, left)
+    wanted = read_commands(targets, load_robot(robot))
+    compensation = correct(wanted, as_read=as_read)
+    table = tables.summary(compensation, left) | _warned(wanted)
     write_text(tables.command_table(compensation), output)
     if offsets is not None:
         write_text(tables.offset_table(compensation), offsets)
@@ -120,6 +123,16 @@ def compensate(
         print(tables.summary_text(compensation, table))
     if any(compensation.reason):
         raise typer.Exit(1)
+
+
+def _warned(commands: "Campaign") -> dict[str, Any]:
+    """What leaves the range in which the robot was learned, said in a line each."""
+    from validation.diagnosis.learned_range import beyond
+
+    left = beyond(commands.robot, commands)
+    for one in left:
+        print(f"warning: {one}", file=sys.stderr)
+    return {"beyond_learned_range": [one.table() for one in left]}
 
 
 def _left(path: Path) -> dict[str, float]:
@@ -180,7 +193,7 @@ def carry(
     good = all(one.suffices and one.better for one in sessions)
     if output is not None and good:
         write_robot(carrying.carried_robot(data.robot, sessions), output)
-    write_json(carrying_table.table(sessions), json)
+    write_json(carrying_table.table(sessions) | _warned(data), json)
     if json != "-":
         print(carrying_table.text(sessions))
         if output is not None and not good:

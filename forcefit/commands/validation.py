@@ -26,6 +26,7 @@ from forcefit.commands.options import (
     parse_load,
     posture_of,
 )
+from forcefit.commands.plan import plan
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
@@ -37,6 +38,7 @@ app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
+app.command()(plan)
 app.command("import")(import_)
 app.command()(iso)
 app.command()(carry)

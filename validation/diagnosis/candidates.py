@@ -14,6 +14,7 @@ A component of a candidate adds a times P T to the readings.
 """
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -27,14 +28,13 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
 from assembly.model.function import Function
 from assembly.model.robot import BeamLink, Robot, beam_axis
+from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.responses import Responses
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-KNOTS = 7
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
-MANY = 150  # rows from which many waves a turn are looked for
 
 
 @dataclass(frozen=True)
@@ -50,21 +50,6 @@ class CandidatePart:
     where: str
     components: tuple[str, ...]
     variable: str
-
-
-@dataclass(frozen=True)
-class CandidateShape:
-    """A form with the names of its columns.
-
-    Attributes:
-        form: a name of :data:`assembly.effects.forms.FORMS`.
-        names: of its columns.
-        given: numbers in which it is not linear.
-    """
-
-    form: str
-    names: tuple[str, ...]
-    given: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,18 +96,34 @@ class Sensitivities:
             response: of the readings there.
         """
         self.conditions, self.robot, self._response = conditions, robot, response
+        self.rows = np.arange(len(conditions))
+        self._origin = conditions.postures.platform[:, :3, 3]
         self.basis = lru_cache(maxsize=None)(self._basis)
+
+    def take(self, rows: NDArray) -> "Sensitivities":
+        """The same of some rows.
+
+        Args:
+            rows: their numbers.
+
+        Returns:
+            Sensitivities of those; forms are normalised over all rows as before.
+        """
+        other = copy(self)
+        other.rows, other._origin = self.rows[rows], self._origin[rows]
+        r = self._response
+        other._response = Responses(r.reading[rows], r.screws[rows], r.wrenches[rows])
+        return other
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         axis = AXES.index(component)
         if where == "reading":
-            return np.broadcast_to(np.eye(6)[axis], (len(self.conditions), 6))
+            return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
         if where == "base":
-            screw = np.zeros((len(self.conditions), 6))
+            screw = np.zeros((len(self._origin), 6))
             screw[:, axis] = 1.0
-            origin = self.conditions.postures.platform[:, :3, 3]
-            screw[:, 3:] += np.cross(screw[:, :3], origin)
+            screw[:, 3:] += np.cross(screw[:, :3], self._origin)
             return np.einsum("rij,rj->ri", self._response.reading, screw)
         row = self.conditions.robot.index(where)
         sensitivity = self._response.screws[:, :, row, axis]
@@ -152,23 +153,48 @@ class Sensitivities:
             mixed = np.eye(len(shape.names))
         return raw @ mixed, mixed
 
-    def changes(self, one: Candidate) -> tuple[NDArray, NDArray]:
+    def changes(self, one: Candidate) -> NDArray:
         """What a candidate adds to the readings.
 
         Args:
             one: of m unknowns.
 
         Returns:
-            (R, 6, m) [rad, m] per unknown, and (m,) the component each acts in.
+            (R, 6, m) [rad, m] per unknown.
         """
-        blocks, axes = [], []
+        # unknown by unknown in memory, as they are made and put together
+        blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one)]
+        return np.moveaxis(np.concatenate(blocks), 0, 2)
+
+    def moved(self, one: Candidate, x: NDArray) -> NDArray:
+        """What a candidate with known numbers adds to the readings.
+
+        Args:
+            one: of m unknowns.
+            x: (m,) their values.
+
+        Returns:
+            (R, 6) [rad, m].
+        """
+        total, at = np.zeros((len(self.rows), 6)), 0
+        for sensitivity, columns in self._factors(one):
+            own = slice(at, at + columns.shape[1])
+            at = own.stop
+            total += sensitivity * (columns @ x[own])[:, None]
+        return total
+
+    def axes(self, one: Candidate) -> NDArray:
+        """(m,) component that each unknown of a candidate acts in."""
+        counts = [columns.shape[1] for _, columns in self._factors(one)]
+        components = [c for part in one.parts for c in part.components]
+        return np.repeat([AXES.index(c) for c in components], counts)
+
+    def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:
+        """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
         for part in one.parts:
-            columns, _ = self.basis(part.variable, one.shape)
+            columns = self.basis(part.variable, one.shape)[0][self.rows]
             for component in part.components:
-                sensitivity = self.sensitivity(part.where, component, one.kind)
-                blocks.append(sensitivity[:, :, None] * columns[:, None, :])
-                axes += [AXES.index(component)] * columns.shape[1]
-        return np.concatenate(blocks, axis=2), np.array(axes)
+                yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
         """The functions of a robot file with their numbers.
@@ -276,84 +302,3 @@ def _along(robot: Robot, name: str) -> tuple[str, ...]:
     assert isinstance(frame.link, BeamLink)
     axis = np.abs(beam_axis(frame)[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
-
-
-def _waves(*orders: int) -> CandidateShape:
-    return CandidateShape(
-        "waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
-    )
-
-
-def _powers(*powers: int) -> CandidateShape:
-    return CandidateShape("powers", tuple(str(k) for k in powers))
-
-
-REVERSAL = CandidateShape("reversal", ("0",))
-
-
-def first_shapes(robot: Robot, name: str) -> list[CandidateShape]:
-    """Forms general enough to show whether a variable counts at all."""
-    if name == "approach":
-        return [_powers(1)]
-    if is_angle(robot, name):
-        return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
-    if name.startswith("q."):
-        return [_powers(0, 1, 2, 3), REVERSAL]
-    return [_powers(0, 1, 2, 3)]
-
-
-def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
-    """Every form that is tried where a variable counts, those with a name first."""
-    x = variable(conditions, name)
-    low, high = float(x.min()), float(x.max())
-    if name == "approach":
-        return [_powers(1)]
-    shapes = [_powers(1), _powers(2), _powers(3), _powers(0, 1), _powers(0, 1, 2),
-              _powers(0, 1, 2, 3)]  # fmt: skip
-    if name.startswith("q."):
-        shapes.append(REVERSAL)
-    if is_angle(conditions.robot, name):
-        shapes += [_waves(k) for k in range(1, 9)]
-        shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]
-        if len(conditions) >= MANY:
-            shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
-        if kind == "compliance":
-            shapes += [
-                CandidateShape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))
-                for k in range(1, 5)
-            ]
-    if name in {"time", "cov.time"}:
-        shapes += [
-            CandidateShape(
-                "slow_wave", ("sine", "cosine"), (("period", (high - low) / k),)
-            )
-            for k in (0.5, 1, 1.5, 2, 3, 4, 6)
-        ]
-    if not name.startswith(("load", "position")):
-        levels = np.quantile(x, np.linspace(0.1, 0.9, 9))
-        shapes += [
-            CandidateShape("step", ("size",), (("at", float(v)),))
-            for v in np.unique(levels)
-        ]
-    if (
-        name.startswith("cov.")
-        and np.isfinite(conditions.time).all()
-        and np.ptp(conditions.time) > 0
-    ):
-        span = float(np.ptp(conditions.time))
-        shapes += [
-            CandidateShape("lag", ("gain", "start"), (("time_constant", part * span),))
-            for part in (0.02, 0.05, 0.1, 0.2, 0.5)
-        ]
-    if len(np.unique(x)) > KNOTS:
-        ends = (("first", low), ("last", high))
-        shapes.append(
-            CandidateShape("spline", tuple(str(k + 1) for k in range(KNOTS)), ends)
-        )
-    return shapes
-
-
-def is_angle(robot: Robot, name: str) -> bool:
-    """Whether a variable is the coordinate of a joint that turns."""
-    kind, _, rest = name.partition(".")
-    return kind == "q" and robot.frame(rest).joint == "revolute"

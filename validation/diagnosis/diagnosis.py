@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from assembly.measurement.conditions import Conditions
 from forcefit.inputs.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import Background
+from validation.diagnosis.background import Background
 from validation.diagnosis.holdout import Split
 from validation.diagnosis.kept_aside import Errors, FittedModel, Rung
 from validation.diagnosis.lack_of_fit import LackOfFit

@@ -7,6 +7,7 @@ fitted together with all before it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,9 @@ from assembly.effects import apply_effects
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import (
-    NOTHING,
-    Background,
-    Evidence,
-    Prior,
-    background,
-)
+from validation.diagnosis.background import NOTHING, Background, background
+from validation.diagnosis.candidates import Sensitivities
+from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.learning import Learned, term_name
 from validation.diagnosis.refit import Fit, refit, with_clearance_held
@@ -114,14 +111,23 @@ class FittedModel:
     behind: Background
     learned: tuple[Learned, ...] = ()
 
+    @cached_property
+    def sensitivities(self) -> Sensitivities:
+        """To functions at any place."""
+        return Sensitivities(self.conditions, self.conditions.robot, self.response)
+
     def residual(self, campaign: Campaign) -> NDArray:
         """(R, 6) [rad, m] readings minus the model; NaN where not measured."""
         fitted = apply_effects(self.conditions, self.fit.effects)
+        values = self.behind.values(self.fit.residual)
         small = added(
-            campaign, self.response, self.conditions, self.behind.terms,
-            self.behind.values(self.fit.residual),
-            {term_name(k + 1): one.changes for k, one in enumerate(self.learned)},
-        )  # fmt: skip
+            campaign, self.response, self.conditions, self.behind.terms, values
+        )
+        known = {t.name: x for t, x in zip(self.behind.terms, values, strict=True)}
+        for k, one in enumerate(self.learned):
+            if term_name(k + 1) in known:
+                x = known[term_name(k + 1)]
+                small += self.sensitivities.moved(one.candidate, x)
         return campaign.measured - predict(fitted).deviation - small
 
 

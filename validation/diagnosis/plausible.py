@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import Background
+from validation.diagnosis.background import Background
 from validation.diagnosis.refit import Fit
 from validation.diagnosis.small_terms import (
     GEOMETRY,
@@ -27,6 +27,7 @@ from validation.diagnosis.small_terms import (
 )
 
 _GIVES = 0.2  # [rad, sizes] that nothing gives under the largest load
+_MADE = {"rotation": 0.1, "translation": 0.02}  # [rad, sizes] nobody makes worse
 _HOT = 150.0  # [K] away from calibration: no machine is measured there
 _G = 9.81  # [m/s^2]
 _RANGES = {
@@ -95,10 +96,13 @@ def implausible(campaign: Campaign, fit: Fit, behind: Background) -> tuple[str, 
                     low, high = _FACTORS[effect]
                     if not low <= value <= high:
                         yield f"{statement}, expected {low:g} to {high:g}"
-        for kind, size_found, most in zip(
-            KINDS, behind.scales.get(GEOMETRY, ()), largest.values(), strict=False
-        ):
+        scales = behind.scales.get(GEOMETRY, (0.0, 0.0))
+        for kind, size_found, unit in zip(KINDS, scales, ("rad", "m"), strict=True):
+            most = _MADE[kind] * (size if unit == "m" else 1.0)
             if size_found > most:
-                yield f"geometric errors of {size_found:.2g} in {kind}"
+                yield (
+                    f"geometric errors of {size_found:.2g} {unit} in {kind}, "
+                    f"larger than {most:.2g}"
+                )
 
     return tuple(f"{one}: {_LIKELY}" for one in wrong())

@@ -21,7 +21,7 @@ from assembly.measurement.predict import predict, with_rest_positions
 from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import NOTHING, Background
+from validation.diagnosis.background import NOTHING, Background
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.scoring import FINITE
 from validation.diagnosis.signatures import UNSEEN, whiten

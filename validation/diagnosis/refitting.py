@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import Background
+from validation.diagnosis.background import Background
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.refit import Fit, adds_clearance, refit, resting
 from validation.diagnosis.scoring import FINITE, Scored, Screen

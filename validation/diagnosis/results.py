@@ -12,6 +12,7 @@ from assembly.model.robot import Robot
 from stiffness.screws import SCREW
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.kept_aside import Errors
+from validation.diagnosis.learned_range import learned_range
 from validation.diagnosis.sentence import formula, sentence
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
 from validation.diagnosis.teaching import functions_of
@@ -193,7 +194,11 @@ def corrected(diagnosis: Diagnosis) -> Robot:
             merged[name] = {**merged.get(name, {}), **values}
     new = functions_of(diagnosis.campaign, diagnosis.model)
     functions = (*robot.functions, *(f for some in new for f in some))
-    robot = replace(robot, effects=merged, functions=functions)
+    ranges = learned_range(diagnosis.campaign, ~diagnosis.outliers)
+    robot = replace(
+        robot, effects=merged, functions=functions,
+        learned_range={**robot.learned_range, **ranges},
+    )  # fmt: skip
     unknown = diagnosis.campaign.registration == "unknown"
     return _registered(diagnosis, robot) if unknown else robot
 

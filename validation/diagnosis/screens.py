@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis.evidence import Evidence, Prior, background
+from validation.diagnosis.background import background
+from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.scoring import Scored, Screen
 from validation.diagnosis.signatures import Signature
 from validation.diagnosis.small_terms import SmallTerm

@@ -18,7 +18,7 @@ from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import with_rest_positions
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.evidence import Background, background
+from validation.diagnosis.background import Background, background
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.refit import Fit, adds_clearance, in_full, refit, rest_under
 from validation.diagnosis.refitting import Refits, names_of

@@ -6,7 +6,7 @@ of one size for all rotations and one for all translations that the readings are
 for (:mod:`validation.diagnosis.evidence`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -142,17 +142,16 @@ def _term(
 def added(
     campaign: Campaign, response: Responses, conditions: Conditions,
     terms: Sequence[SmallTerm], values: Sequence[NDArray],
-    changes: Mapping[str, NDArray],
 ) -> NDArray:  # fmt: skip
-    """What small unknowns add to the readings of any rows.
+    """What geometric errors and springs add to the readings of any rows.
 
     Args:
         campaign: of R rows.
         response: of its readings.
         conditions: its conditions.
-        terms: found on these rows or on others of the same robot.
+        terms: found on these rows or on others of the same robot; others than
+            geometry and springs are passed over.
         values: (k,) of each term.
-        changes: (R, 6, k) of the readings per unknown of other terms, by their names.
 
     Returns:
         (R, 6) [rad, m].
@@ -162,8 +161,7 @@ def added(
         conditions.robot.index(frame.name) for frame in campaign.robot.frames
     ])
     for term, x in zip(terms, values, strict=True):
-        if term.name in changes:
-            total += changes[term.name] @ x
+        if term.name not in {GEOMETRY, SPRINGS}:
             continue
         rows = own[term.frame]
         amount = np.broadcast_to(x, (len(conditions), len(x)))
@@ -208,6 +206,6 @@ def with_small(
                 error = frame.geometric_error + value * np.eye(6)[axis]
                 frames[i] = replace(frame, geometric_error=error)
             elif value > 0.0:
-                K = in_series(frame.joint_stiffness, int(axis), float(value))
+                K = in_series(frame.resistance, int(axis), float(value))
                 frames[i] = replace(frame, joint_stiffness=K)
     return replace(robot, frames=tuple(frames))

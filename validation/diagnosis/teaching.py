@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from assembly.measurement.conditions import Conditions
 from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.background import background
 from validation.diagnosis.candidates import Sensitivities
-from validation.diagnosis.evidence import background
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, Unexplained, learn, term_name
+from validation.diagnosis.learning import Learned, learn, term_name
 from validation.diagnosis.refit import refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
+from validation.diagnosis.remainder import Unexplained
 from validation.diagnosis.responses import responses
 from validation.diagnosis.selection import Selection, Update
 from validation.diagnosis.signatures import whiten
@@ -64,19 +65,13 @@ def taught(
     if selection.sets[0].members and selection.sets[0].rank:
         raw = selection.behind.raw(selection.fit.residual)
         stories.append((replace(selection.fit, residual=raw), selection.columns))
-    lessons = [
-        learn(
-            campaign,
-            used,
-            sensitivities,
-            Unexplained(selection.terms, fit.residual, columns),
-            update,
-            known,
-        )
-        for fit, columns in stories
-    ]
-    best = min(range(len(stories)), key=lambda k: lessons[k].cost)
-    lesson, fit = lessons[best], stories[best][0]
+    best, lesson, fit = 0, None, alone
+    for k, (story, columns) in enumerate(stories):
+        left_over = Unexplained(selection.terms, story.residual, columns)
+        new = learn(campaign, used, sensitivities, left_over, update, known)
+        if lesson is None or new.cost < lesson.cost:
+            best, lesson, fit = k, new, story
+    assert lesson is not None
     if not lesson.learned:
         return selection, ()
     behind = background(lesson.terms, lesson.prior)
@@ -87,16 +82,16 @@ def taught(
         fit.values,
         behind=behind,
     )
-    story = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
+    told = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
     if best == 0:
         nothing = selection.screen.fit(())
-        story = replace(story, sets=[nothing, *selection.sets], unknowns=len(begin))
+        told = replace(told, sets=[nothing, *selection.sets], unknowns=len(begin))
     held = with_clearance_held(conditions, selection.fit)
     before = FittedModel(held, response, selection.fit, selection.behind)
     after = FittedModel(conditions, response, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
         return selection, ()
-    return story, lesson.learned
+    return told, lesson.learned
 
 
 def _foretells(
@@ -126,11 +121,10 @@ def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]
         For every effect learned one function, or several of one kind.
     """
     behind = model.behind
-    sensitivities = Sensitivities(model.conditions, campaign.robot, model.response)
     values = behind.values(model.fit.residual)
     terms = zip(behind.terms, values, behind.deviations(), strict=True)
     known = {term.name: (x, std) for term, x, std in terms}
     return [
-        sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
+        model.sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
         for k, one in enumerate(model.learned)
     ]

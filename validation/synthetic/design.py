@@ -36,6 +36,8 @@ class CampaignDesign:
         command: ``"joints"`` or ``"pose"``, what is written as commanded.
         humidity: whether a covariate of that name is recorded [%].
         reference_point: [m] the point measured, where loads act, platform axes.
+        corners: whether half of the configurations have every drive at an end of its
+            reach.
     """
 
     configurations: int = 24
@@ -48,6 +50,7 @@ class CampaignDesign:
     command: str = "joints"
     humidity: bool = False
     reference_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    corners: bool = False
 
     def __post_init__(self) -> None:
         choices = (
@@ -142,6 +145,8 @@ def _configurations(
     reachable: list[NDArray] = []
     for _ in range(_DRAWS):
         draws = rng.uniform(-1, 1, (design.configurations, len(spans)))
+        if design.corners:
+            draws[::2] = np.sign(draws[::2])
         commanded = (home.coordinates + spans * draws).round(_DIGITS)
         target = Target(coordinates=np.where(actuated, commanded, np.nan))
         track = follow(robot, home.coordinates, target)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from validation.diagnosis.evidence import NOTHING, Evidence, background
+from validation.diagnosis.background import NOTHING, background
+from validation.diagnosis.evidence import Evidence
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
 
 CELLS = 300

@@ -18,6 +18,7 @@ from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import register
 from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
 LENGTH = 0.8
 
@@ -260,3 +261,16 @@ def test_what_finite_motions_explain_needs_no_effect_once_they_are_declared():
     assert finite.verdict == "none_needed"
     assert finite.before.normalised == pytest.approx(1.0, abs=0.4)
     assert linear.before.normalised > 10
+
+
+def test_springs_of_passive_joints_leave_their_own_motion_free():
+    """1e-7 m/N in series with a bearing that is rigid but for its turning."""
+    hinge = Frame("hinge", "base", joint="revolute")
+    robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
+    springs = SmallTerm(
+        SPRINGS, np.zeros(2, int), np.array([2, 4]), np.zeros((1, 2)),
+        np.full(2, np.nan), 0.0,
+    )  # fmt: skip
+    K = with_small(robot, [springs], [np.array([1e-3, 1e-7])]).frame("hinge")
+    stiffness = np.diag(K.joint_stiffness)
+    assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.planar_arm_for_tests import measured
-from validation.diagnosis.evidence import NOTHING
+from validation.diagnosis.background import NOTHING
 from validation.diagnosis.plausible import implausible, impossible_rows
 
 
@@ -53,3 +53,11 @@ def test_a_temperature_that_no_sensor_has_is_flagged(campaign):
     hot = replace(campaign, covariates=campaign.covariates | {"temperature": spoilt})
     assert np.flatnonzero(impossible_rows(hot)).tolist() == [5]
     assert not impossible_rows(campaign).any()
+
+
+def test_geometric_errors_of_a_fiftieth_of_the_robot_are_doubted(campaign):
+    """An arm of about 1 m: frames that are all off by 5 cm were not made like that."""
+    fit = SimpleNamespace(effects={})
+    for size, doubted in ((2e-3, 0), (5e-2, 1)):
+        behind = replace(NOTHING, scales={"geometry": (1e-3, size)})
+        assert len(implausible(campaign, fit, behind)) == doubted

@@ -1,0 +1,71 @@
+"""A robot is known where it was measured: rows beyond that are named."""
+
+import json
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot, write_robot
+from tests.campaigns_for_tests import ARM, write_campaign
+from validation.campaign.campaign_file import read_commands
+from validation.diagnosis.learned_range import beyond, learned_range
+
+HEAD = "id,q.one,q.two,cov.tilt,cov.time,meas.tx"
+ROWS = ["a,0.1,0.2,0.0,0,0", "b,0.5,0.2,0.4,9,0", "c,0.3,0.2,9.0,5,0"]
+KNOWN = 'learned_range = { "cov.tilt" = [0.0, 0.4], "q.one" = [0.1, 0.5] }\n'
+
+
+def robot_file(tmp_path):
+    path = tmp_path / "learned.toml"
+    path.write_text(KNOWN + ARM)
+    return path
+
+
+def test_the_range_of_all_that_acts_but_time_and_rows_left_out(tmp_path):
+    robot = read_robot(robot_file(tmp_path))
+    campaign = read_commands(write_campaign(tmp_path / "c", HEAD, ROWS), robot)
+    ranges = learned_range(campaign, np.array([True, True, False]))
+    assert {k: v for k, v in ranges.items() if not k.startswith("load.")} == {
+        "q.one": (0.1, 0.5), "q.two": (0.2, 0.2), "cov.tilt": (0.0, 0.4),
+    }  # fmt: skip
+    assert ranges["load.fz"] == (0.0, 0.0)
+
+
+def test_a_twentieth_of_the_range_more_is_no_matter(tmp_path):
+    robot = read_robot(robot_file(tmp_path))
+    for tilt, outside in ((0.4, 0), (0.42, 0), (0.43, 1), (-0.03, 1)):
+        rows = [f"a,0.1,0.2,{tilt},0,0", "b,0.5,0.2,0.2,9,0"]
+        folder = write_campaign(tmp_path / f"c{tilt}", HEAD, rows)
+        left = beyond(robot, read_commands(folder, robot))
+        assert [one.rows for one in left] == [1] * outside
+
+
+def test_the_file_keeps_it(tmp_path):
+    robot = read_robot(robot_file(tmp_path))
+    write_robot(robot, tmp_path / "again.toml")
+    again = read_robot(tmp_path / "again.toml")
+    assert again.learned_range == {"cov.tilt": (0.0, 0.4), "q.one": (0.1, 0.5)}
+
+
+@pytest.mark.parametrize("command", ["predict", "compensate"])
+def test_commands_say_what_leaves_it(tmp_path, run, command):
+    table = tmp_path / "new.csv"
+    table.write_text("id,q.one,q.two,cov.tilt\na,0.3,0.1,0.2\nb,0.3,0.5,0.9\n")
+    out, answer = tmp_path / "out.csv", tmp_path / "answer.json"
+    code, _, error = run("validation", command, str(robot_file(tmp_path)), str(table),
+                         "-o", str(out), "--json", str(answer))  # fmt: skip
+    assert (code, out.exists()) == (0, True)
+    assert error == (
+        "warning: cov.tilt is 0.2 to 0.9, outside 0 to 0.4 where the robot was "
+        "learned, in 1 of 2 rows\n"
+    )
+    (one,) = json.loads(answer.read_text())["beyond_learned_range"]
+    assert (one["variable"], one["learned"], one["rows"]) == ("cov.tilt", [0, 0.4], 1)
+
+
+def test_a_range_must_be_one(tmp_path, run):
+    path = tmp_path / "wrong.toml"
+    path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
+    code, _, error = run("validation", "explain", str(path))
+    assert code == 2
+    assert "cov.tilt: found [1, 0.4], expected the smaller one first" in error

@@ -1,0 +1,183 @@
+"""What a candidate is worth and foretells, against the normal distribution itself."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from assembly.files.robot_file import read_robot
+from tests.campaigns_for_tests import ARM
+from validation.campaign.campaign_file import read_commands
+from validation.diagnosis import learning
+from validation.diagnosis.candidates import Candidate, CandidatePart, Sensitivities
+from validation.diagnosis.evidence import Prior
+from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.learning import Learned, learn
+from validation.diagnosis.remainder import Remainder, Unexplained
+from validation.diagnosis.responses import responses
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.small_terms import GEOMETRY, SmallTerm
+
+ROWS = 15
+CELLS = 6 * ROWS
+SCALES = (0.3, 2.0)
+SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
+
+
+class Blocks:
+    """Sensitivities whose candidates are their columns (6 R, m) themselves."""
+
+    def changes(self, one):
+        return one.reshape(ROWS, 6, -1)
+
+    def axes(self, one):
+        return np.zeros(one.shape[1], int)
+
+
+def remainder(rng, noise=1.0, signal=0.0):
+    """Six configurations of readings: two effects, four small unknowns and noise."""
+    axis = np.array([0, 1, 3, 4])
+    J, E = rng.normal(size=(CELLS, 4)), rng.normal(size=(CELLS, 2))
+    size = np.array(SCALES)[axis // 3]
+    z = J @ (size * rng.normal(size=4)) + E @ [300.0, -200.0] + signal
+    z = z + noise * rng.normal(size=CELLS)
+    term = SmallTerm(GEOMETRY, np.arange(4), axis, J, np.full(4, np.nan), -np.inf)
+    prior = Prior((np.ones(4, bool),), {GEOMETRY: SCALES}, 0.0, 0.0)
+    campaign = SimpleNamespace(
+        cells=np.ones((ROWS, 6), bool), sigma=np.ones((ROWS, 6)),
+        configuration=np.arange(ROWS),
+    )  # fmt: skip
+    left = Unexplained([term], z, E)
+    here = Remainder(
+        campaign, Blocks(), left, np.ones(CELLS, bool), prior, noise
+    )  # fmt: skip
+    return here, z, E, (J * size) @ (J * size).T
+
+
+def test_worth_is_the_ratio_of_two_normal_densities():
+    """Effects with a nearly flat prior; of the sizes tried, the best."""
+    rng = np.random.default_rng(1)
+    B = rng.normal(size=(CELLS, 3))
+    here, z, E, small = remainder(rng, signal=B @ [0.5, -0.4, 0.2])
+    flat = np.eye(CELLS) + small + 1e6 * E @ E.T
+    norm = np.linalg.norm(B, axis=0).max()
+    with_it = max(
+        multivariate_normal.logpdf(z, cov=flat + (t / norm) ** 2 * B @ B.T)
+        for t in SIZES
+    )
+    expected = with_it - multivariate_normal.logpdf(z, cov=flat)
+    assert expected > 3
+    # what is left is less than sigma says, so that the noise is sigma
+    assert here.worths([B])[0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_worths_do_not_hang_on_company():
+    """One candidate alone and among four hundred, of which the last shows nothing."""
+    rng = np.random.default_rng(2)
+    here = remainder(rng)[0]
+    every = [rng.normal(size=(CELLS, m)) for m in rng.integers(1, 6, 400)]
+    every.append(np.zeros((CELLS, 2)))
+    worths = here.worths(every)
+    assert worths[-1] == -np.inf
+    for k in (0, 7, 399):
+        assert here.worths([every[k]])[0] == pytest.approx(worths[k], rel=1e-9)
+
+
+def test_nothing_known_can_be_worth_anything():
+    """What effects or small unknowns of any size do is no news."""
+    rng = np.random.default_rng(3)
+    here, _, E, _ = remainder(rng)
+    assert here.worths([E])[0] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_noise_beyond_sigma_makes_a_candidate_worth_less():
+    """The same readings in a sigma three times as large: a ninth of the squares."""
+    worth = []
+    for noise in (1.0, 3.0):
+        rng = np.random.default_rng(4)
+        B = rng.normal(size=(CELLS, 2))
+        here = remainder(rng, noise, signal=B @ [1.0, -1.0])[0]
+        worth.append(here.worths([B])[0])
+    assert 0 < worth[1] < worth[0] / 2
+
+
+def test_what_acts_foretells_other_rows_and_noise_does_not():
+    rng = np.random.default_rng(5)
+    B = rng.normal(size=(CELLS, 2))
+    here = remainder(rng, signal=B @ [1.0, -0.8])[0]
+    assert here.foretells(B)
+    assert not here.foretells(rng.normal(size=(CELLS, 2)))
+
+
+def test_four_functions_are_learned_at_most(monkeypatch):
+    """However many more would be worth it."""
+    monkeypatch.setattr(learning, "_School", _Endless)
+    monkeypatch.setattr(learning, "variables_of", lambda conditions: [])
+    monkeypatch.setattr(learning, "places_of", lambda robot, names: [])
+    one = Learned(None, (), 9.0)
+    monkeypatch.setattr(learning, "_best", lambda *given: one)
+    asked = SimpleNamespace(conditions=SimpleNamespace(take=lambda rows: None))
+    campaign = SimpleNamespace(robot=None)
+    lesson = learn(campaign, None, asked, None, lambda *told: None)
+    assert len(lesson.learned) == 4
+
+
+class _Endless:
+    """Rows that never become noise, and foretell whatever is asked."""
+
+    done, terms, prior, left, unknowns = False, (), None, 1.0, 0.0
+    effects = np.zeros((1, 0))
+
+    def __init__(self, *given):
+        self.learned = []
+
+    def believe(self, functions):
+        self.learned += functions
+
+    def part(self, most):
+        return SimpleNamespace(foretells=lambda candidate: True)
+
+
+@pytest.fixture
+def sensitivities(tmp_path):
+    """Twelve configurations of the planar arm."""
+    table = tmp_path / "commands.csv"
+    q = np.linspace(0.2, 1.7, 12).round(6)
+    lines = [f"m{i},{a:.6f},{1.3 * a * a:.6f}" for i, a in enumerate(q)]
+    table.write_text("\n".join(["id,q.one,q.two", *lines]) + "\n")
+    (tmp_path / "arm.toml").write_text(ARM)
+    campaign = read_commands(table, read_robot(tmp_path / "arm.toml"))
+    conditions = conditions_of(campaign)
+    return Sensitivities(conditions, campaign.robot, responses(conditions)), q
+
+
+def test_powers_are_orthonormal_over_the_rows(sensitivities):
+    """1, q, q^2, q^3, so that none stands for the one below it; T says which."""
+    s, q = sensitivities
+    shape = CandidateShape("powers", ("0", "1", "2", "3"))
+    columns, mixed = s.basis("q.one", shape)
+    np.testing.assert_allclose(columns.T @ columns / 12, np.eye(4), atol=1e-10)
+    powers = q[:, None] ** np.arange(4)
+    np.testing.assert_allclose(powers @ mixed, columns, atol=1e-8)
+
+
+def test_a_single_power_has_mean_square_one(sensitivities):
+    s, q = sensitivities
+    columns, mixed = s.basis("q.one", CandidateShape("powers", ("2",)))
+    assert mixed.shape == (1, 1)
+    assert mixed[0, 0] == pytest.approx(1 / np.sqrt(np.mean(q**4)), rel=1e-6)
+    np.testing.assert_allclose(columns[:, 0], q**2 * mixed[0, 0], rtol=1e-6)
+
+
+def test_some_rows_have_the_columns_of_all(sensitivities):
+    """Forms are normalised over all rows; moved is changes times numbers."""
+    s, _ = sensitivities
+    part = CandidatePart("one", ("rz", "tx"), "q.two")
+    one = Candidate((part,), "screw", CandidateShape("powers", ("1", "2")))
+    rows = np.array([3, 4, 9])
+    x = np.array([1.0, -2.0, 0.5, 0.25])
+    every = s.changes(one)
+    np.testing.assert_allclose(s.take(rows).changes(one), every[rows], atol=1e-15)
+    np.testing.assert_allclose(s.moved(one, x), every @ x, atol=1e-12)
+    assert s.axes(one).tolist() == [2, 2, 3, 3]

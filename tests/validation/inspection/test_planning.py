@@ -1,0 +1,95 @@
+"""Rows that tell effects apart: the criterion by closed forms, the file it writes."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot
+from tests.campaigns_for_tests import ARM
+from validation.campaign.campaign_file import read_commands
+from validation.inspection.planning import _Criterion, _told
+
+ROWS = 30
+
+
+def blocks(seed=0):
+    """Three effects of one, two and one unknown; two readings a row."""
+    rng = np.random.default_rng(seed)
+    return [rng.normal(size=(2 * ROWS, k)) for k in (1, 2, 1)]
+
+
+def test_one_unknown_against_one_by_hand():
+    """a'a - (a'b)^2 / (b'b + 1)."""
+    a, _, b = blocks()
+    apart = _Criterion(blocks(), ROWS).apart(np.arange(ROWS))
+    expected = float((a.T @ a - (a.T @ b) ** 2 / (b.T @ b + 1)).item())
+    assert apart[0, 2] == pytest.approx(expected)
+    assert np.isnan(np.diag(apart)).all()
+
+
+def test_the_slope_is_that_of_the_criterion():
+    """A row of weight w^2 added: the criterion grows by w^2 times its slope."""
+    chosen, extra, w = np.arange(12), 20, 1e-3
+    plain = _Criterion(blocks(), ROWS)
+    apart, slope = plain._value(chosen)
+    shrunk = [
+        np.vstack([X[:24], w * X[2 * extra : 2 * extra + 2], X[26:]]) for X in blocks()
+    ]
+    more = _Criterion(shrunk, ROWS).apart(np.arange(13))
+    assert (_told(more) - _told(apart)) / w**2 == pytest.approx(slope[extra], rel=1e-4)
+
+
+def test_exchanges_tell_more_and_take_no_row_twice():
+    criterion = _Criterion(blocks(), ROWS)
+    start = np.arange(10)
+    chosen = criterion.exchanged(start)
+    assert _told(criterion.apart(chosen)) > 1.02 * _told(criterion.apart(start))
+    assert len(set(chosen.tolist())) == 10
+    # no single exchange of any two rows is worth more than a hundredth
+    best = _told(criterion.apart(chosen))
+    for place in range(10):
+        for row in np.setdiff1d(np.arange(ROWS), chosen):
+            other = chosen.copy()
+            other[place] = row
+            assert _told(criterion.apart(other)) < 1.01 * best
+
+
+def test_the_command_writes_a_campaign_to_be_measured(tmp_path, run):
+    robot = tmp_path / "arm.toml"
+    robot.write_text(ARM)
+    folder, answer = tmp_path / "plan", tmp_path / "plan.json"
+    code, text, _ = run("validation", "plan", str(robot), "--rows", "12",
+                        "-o", str(folder), "--json", str(answer))  # fmt: skip
+    assert code == 0
+    assert "12 rows" in text
+    with (folder / "measurements.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 12
+    assert {row["meas.tx"] for row in rows} == {""}
+    time = [float(row["cov.time"]) for row in rows]
+    assert time == sorted(time)
+    again = read_commands(folder, read_robot(robot))
+    assert (len(again), again.cells.any()) == (12, False)
+    pairs = json.loads(answer.read_text())["pairs"]
+    told = {k: sum(np.log1p(p[k]) for p in pairs) for k in ("planned", "random")}
+    assert told["planned"] > told["random"]
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        ("--rows", "7", "--rows: found 7, expected at least 8"),
+        ("--position", "0", "--position: found 0, expected > 0"),
+        ("--temperature", "hot", 'temperature: found "hot", expected swing'),
+    ],
+)
+def test_what_cannot_be_planned_is_said(tmp_path, run, option, value, says):
+    robot = tmp_path / "arm.toml"
+    robot.write_text(ARM)
+    code, _, error = run("validation", "plan", str(robot), option, value,
+                         "-o", str(tmp_path / "plan"))  # fmt: skip
+    assert code == 2
+    assert says in error
+    assert not (tmp_path / "plan").exists()

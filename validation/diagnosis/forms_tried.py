@@ -1,0 +1,108 @@
+"""Forms in which a candidate may depend on its variable, general ones first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.variables import variable
+from assembly.model.robot import Robot
+
+KNOTS = 7
+MANY = 150  # rows from which many waves a turn are looked for
+
+
+@dataclass(frozen=True)
+class CandidateShape:
+    """A form with the names of its columns.
+
+    Attributes:
+        form: a name of :data:`assembly.effects.forms.FORMS`.
+        names: of its columns.
+        given: numbers in which it is not linear.
+    """
+
+    form: str
+    names: tuple[str, ...]
+    given: tuple[tuple[str, float], ...] = ()
+
+
+def _waves(*orders: int) -> CandidateShape:
+    return CandidateShape(
+        "waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
+    )
+
+
+def _powers(*powers: int) -> CandidateShape:
+    return CandidateShape("powers", tuple(str(k) for k in powers))
+
+
+REVERSAL = CandidateShape("reversal", ("0",))
+
+
+def first_shapes(robot: Robot, name: str) -> list[CandidateShape]:
+    """Forms general enough to show whether a variable counts at all."""
+    if name == "approach":
+        return [_powers(1)]
+    if is_angle(robot, name):
+        return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
+    if name.startswith("q."):
+        return [_powers(0, 1, 2, 3), REVERSAL]
+    return [_powers(0, 1, 2, 3)]
+
+
+def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
+    """Every form that is tried where a variable counts, those with a name first."""
+    x = variable(conditions, name)
+    low, high = float(x.min()), float(x.max())
+    if name == "approach":
+        return [_powers(1)]
+    shapes = [_powers(1), _powers(2), _powers(3), _powers(0, 1), _powers(0, 1, 2),
+              _powers(0, 1, 2, 3)]  # fmt: skip
+    if name.startswith("q."):
+        shapes.append(REVERSAL)
+    if is_angle(conditions.robot, name):
+        shapes += [_waves(k) for k in range(1, 9)]
+        shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]
+        if len(conditions) >= MANY:
+            shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
+        if kind == "compliance":
+            shapes += [
+                CandidateShape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))
+                for k in range(1, 5)
+            ]
+    if name in {"time", "cov.time"}:
+        shapes += [
+            CandidateShape(
+                "slow_wave", ("sine", "cosine"), (("period", (high - low) / k),)
+            )
+            for k in (0.5, 1, 1.5, 2, 3, 4, 6)
+        ]
+    if not name.startswith(("load", "position")):
+        levels = np.quantile(x, np.linspace(0.1, 0.9, 9))
+        shapes += [
+            CandidateShape("step", ("size",), (("at", float(v)),))
+            for v in np.unique(levels)
+        ]
+    if (
+        name.startswith("cov.")
+        and np.isfinite(conditions.time).all()
+        and np.ptp(conditions.time) > 0
+    ):
+        span = float(np.ptp(conditions.time))
+        shapes += [
+            CandidateShape("lag", ("gain", "start"), (("time_constant", part * span),))
+            for part in (0.02, 0.05, 0.1, 0.2, 0.5)
+        ]
+    if len(np.unique(x)) > KNOTS:
+        ends = (("first", low), ("last", high))
+        shapes.append(
+            CandidateShape("spline", tuple(str(k + 1) for k in range(KNOTS)), ends)
+        )
+    return shapes
+
+
+def is_angle(robot: Robot, name: str) -> bool:
+    """Whether a variable is the coordinate of a joint that turns."""
+    kind, _, rest = name.partition(".")
+    return kind == "q" and robot.frame(rest).joint == "revolute"

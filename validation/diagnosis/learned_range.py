@@ -1,0 +1,108 @@
+"""Where a machine was measured when its robot file was made, and rows beyond that.
+
+A function of a covariate, and any other effect, is known where that covariate has been.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects.places import drives
+from assembly.model.robot import Robot
+from validation.campaign.campaign import LOAD, Campaign
+
+_MARGIN = 0.05  # of a range: so far it is continued without a word
+_SAME = 1e-3  # of a value: so far one that never varied is the same
+_OWN = ("time",)  # every session has its own
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """A variable that leaves the range in which a robot was learned.
+
+    Attributes:
+        variable: its public name.
+        learned: least and largest value.
+        now: least and largest in the rows looked at.
+        rows: how many of these are outside.
+        count: number of rows.
+    """
+
+    variable: str
+    learned: tuple[float, float]
+    now: tuple[float, float]
+    rows: int
+    count: int
+
+    def table(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            "variable": self.variable, "learned": list(self.learned),
+            "now": list(self.now), "rows": self.rows,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        (low, high), (least, most) = self.learned, self.now
+        return (
+            f"{self.variable} is {least:g} to {most:g}, outside {low:g} to {high:g} "
+            f"where the robot was learned, in {self.rows} of {self.count} rows"
+        )
+
+
+def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
+    """Least and largest value of all that acts in a campaign, but time.
+
+    Args:
+        campaign: of R rows.
+        rows: mask (R,) of those that were learned from.
+
+    Returns:
+        By public name: drives, components of the load, covariates.
+    """
+    ranges = {}
+    for name, values in _variables(campaign).items():
+        some = values[rows]
+        if len(some) and np.isfinite(some).all():
+            ranges[name] = (float(some.min()), float(some.max()))
+    return ranges
+
+
+def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
+    """What leaves the range in which a robot was learned.
+
+    Args:
+        robot: whose file says that range; nothing is found where it says none.
+        campaign: rows of it, measured or not.
+
+    Returns:
+        One for each variable with a value outside by more than a twentieth of the
+        range.
+    """
+    left = []
+    variables = _variables(campaign)
+    for name, (low, high) in robot.learned_range.items():
+        values = variables.get(name, np.zeros(0))
+        values = values[np.isfinite(values)]
+        margin = _MARGIN * (high - low) + _SAME * max(abs(low), abs(high))
+        outside = (values < low - margin) | (values > high + margin)
+        if outside.any():
+            now = float(values.min()), float(values.max())
+            rows = int(outside.sum())
+            left.append(Beyond(name, (low, high), now, rows, len(values)))
+    return tuple(left)
+
+
+def _variables(campaign: Campaign) -> dict[str, NDArray]:
+    """(R,) of everything that acts, by public name."""
+    robot = campaign.robot
+    variables = {
+        f"q.{name}": campaign.coordinates[:, robot.index(name)]
+        for name in drives(robot)
+    }
+    variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
+    for name, values in campaign.covariates.items():
+        if name not in _OWN:
+            variables["approach" if name == "approach" else f"cov.{name}"] = values
+    return variables

@@ -1,0 +1,288 @@
+r"""Rows of a campaign that tell candidate effects apart, before anything is measured.
+
+Of many rows that could be measured, those are chosen by exchange for which
+
+    sum over e, f of ln(1 + l_ef),
+    l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
+
+is largest: l_ef is the mean non-centrality of effect e where effect f is fitted in its
+place (Atkinson and Fedorov's criterion, averaged over a normal prior), S the sums over
+the rows of products of signatures.  Its slope in the weight of a row is known for all
+rows at once, so that rows of the least slope are exchanged for those of the largest.
+
+Sources:
+    Atkinson, Fedorov (1975), The design of experiments for discriminating between two
+    rival models, Biometrika 62, 57.
+    Fedorov (1972), Theory of Optimal Experiments, section 3.2 (exchange).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import home_posture
+from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.model.robot import Robot
+from forcefit.inputs.errors import BadInput
+from validation.campaign.campaign import Campaign, number_rows
+from validation.inspection.design_signatures import design_signatures
+from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
+from validation.synthetic.generator import Synthetic
+
+_POOL = 600  # rows to choose from
+_TRIED = 4  # rows of the least and of the largest slope that are tried together
+_BETTER = 1e-3  # in the criterion
+_AVERAGE = 20  # draws of random rows that the plan is compared with
+_PACE = 60.0  # [s] a row takes
+_SWING = 2400.0  # [s] in which a machine warms and cools
+_FEWEST = 8  # rows and configurations: fewer cannot be judged by rows kept aside
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """Rows to be measured.
+
+    Attributes:
+        robot: declared.
+        plan: in the order of measuring.
+        design: what may be varied how far.
+        sigma: [rad, m] of the device.
+        effects: names of those compared.
+        apart: (e, e) [-] by row: mean non-centrality of an effect that shows by one
+            sigma a reading, where the column's is fitted in its place.
+        random: (e, e) the same of as many rows drawn at random, on average.
+    """
+
+    robot: Robot
+    plan: CampaignPlan
+    design: CampaignDesign
+    sigma: tuple[float, float]
+    effects: tuple[str, ...]
+    apart: NDArray
+    random: NDArray
+
+
+def plan_rows(
+    robot: Robot, rows: int, design: CampaignDesign, sigma: tuple[float, float],
+    seed: int = 0,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Planned:  # fmt: skip
+    """Choose rows that tell the library's effects apart.
+
+    Args:
+        robot: declared.
+        rows: how many.
+        design: what may be varied how far; configurations to choose from.
+        sigma: [rad, m] of the device.
+        seed: of the rows to choose from.
+        progress: told how many effects' signatures are known, and of how many.
+
+    Returns:
+        The rows.
+
+    Raises:
+        BadInput: fewer rows than can be judged, or hardly any configuration closes.
+    """
+    if rows < _FEWEST:
+        raise BadInput(f"--rows: found {rows}, expected at least {_FEWEST}")
+    rng = np.random.default_rng(seed)
+    count = max(_POOL, 4 * rows)
+    pool = _pool(robot, replace(design, rows=count, corners=True), rows, rng)
+    # where declared clearances rest is found row by row, and hardly matters here
+    tight = without_joint_clearances(robot)
+    campaign = rows_as_campaign(tight, pool, design, sigma)
+    columns = {
+        name: _alike(X)
+        for name, X in design_signatures(campaign, progress).columns.items()
+        if np.any(X)
+    }
+    names = tuple(columns)
+    criterion = _Criterion([columns[name] for name in names], count)
+    chosen = criterion.exchanged(rng.permutation(count)[:rows])
+    draws = [rng.permutation(count)[:rows] for _ in range(_AVERAGE)]
+    return Planned(
+        robot=robot,
+        plan=_ordered(pool, chosen),
+        design=design,
+        sigma=sigma,
+        effects=names,
+        apart=criterion.apart(chosen),
+        random=np.mean([criterion.apart(drawn) for drawn in draws], axis=0),
+    )
+
+
+def _pool(
+    robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
+) -> CampaignPlan:
+    """Rows to choose from, in the time that the rows wanted take."""
+    # the machine warms and cools slowly: rows at one time have one temperature
+    plan = plan_campaign(robot, design, rng)
+    time = np.array([row.covariates["time"] for row in plan.rows])
+    time = (time % (_PACE * wanted)).round(1)
+    temperature = np.array([row.covariates["temperature"] for row in plan.rows])
+    low, high = temperature.min(), temperature.max()
+    turns = 0.5 + np.round(wanted * _PACE / _SWING)
+    swing = 0.5 - 0.5 * np.cos(2 * np.pi * turns * time / (_PACE * wanted))
+    warm = (low + (high - low) * swing).round(2)
+    rows = tuple(
+        replace(row, covariates={**row.covariates, "time": t, "temperature": T})
+        for row, t, T in zip(plan.rows, time.tolist(), warm.tolist(), strict=True)
+    )
+    return replace(plan, rows=rows)
+
+
+def rows_as_campaign(
+    robot: Robot, plan: CampaignPlan, design: CampaignDesign,
+    sigma: tuple[float, float],
+) -> Campaign:  # fmt: skip
+    """A plan as a campaign that read nothing but zeros.
+
+    Args:
+        robot: declared.
+        plan: its rows.
+        design: by which they were drawn.
+        sigma: [rad, m] of the device.
+
+    Returns:
+        The campaign.
+    """
+    asked = np.array([list(row.coordinates.values()) for row in plan.rows])
+    target = Target(coordinates=asked)
+    track = follow(robot, home_posture(robot).coordinates, target)
+    count, loads = len(plan.rows), np.array([row.load for row in plan.rows])
+    return Campaign(
+        name="plan", robot=robot, ids=tuple(f"m{i + 1:03d}" for i in range(count)),
+        coordinates=track.coordinates, transforms=track.transforms,
+        mismatch=track.mismatch, commanded=design.command, loads=loads,
+        covariates={
+            name: np.array([row.covariates[name] for row in plan.rows])
+            for name in plan.rows[0].covariates
+        },
+        measured=np.zeros((count, 6)), sigma=np.tile(np.repeat(sigma, 3), (count, 1)),
+        reference_point=np.array(design.reference_point), registration="known",
+        configuration=plan.configuration,
+        repeat=number_rows(plan.configuration, loads),
+    )  # fmt: skip
+
+
+def _alike(columns: NDArray) -> NDArray:
+    """Columns of an effect that shows by one sigma a reading, all unknowns together."""
+    size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
+    return columns / size
+
+
+def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
+    """Rows in the order of measuring."""
+    time = [plan.rows[i].covariates["time"] for i in chosen]
+    order = chosen[np.argsort(time, kind="stable")]
+    return CampaignPlan(
+        tuple(plan.rows[i] for i in order), plan.configuration[order],
+        plan.commands[order], plan.columns,
+    )  # fmt: skip
+
+
+class _Criterion:
+    """How well rows tell effects apart, and what every other row would add."""
+
+    def __init__(self, blocks: list[NDArray], rows: int) -> None:
+        begin = np.cumsum([0, *(X.shape[1] for X in blocks)])
+        self._own = [slice(a, b) for a, b in zip(begin, begin[1:], strict=False)]
+        self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
+
+    def apart(self, chosen: NDArray) -> NDArray:
+        """(e, e) mean non-centrality of one effect where another is fitted."""
+        return self._value(chosen)[0]
+
+    def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
+        """The same, and (rows,) slope of the criterion in the weight of every row."""
+        X = self._X[chosen].reshape(-1, self._X.shape[2])
+        S = X.T @ X
+        G, apart = np.zeros_like(S), np.full((len(self._own),) * 2, np.nan)
+        for j, f in enumerate(self._own):
+            inverse = np.linalg.inv(S[f, f] + np.eye(f.stop - f.start))
+            for i, e in enumerate(self._own):
+                if i == j:
+                    continue
+                B = inverse @ S[f, e]
+                k = e.stop - e.start
+                apart[i, j] = (np.trace(S[e, e]) - np.sum(S[f, e] * B)) / k
+                weight = 1 / (1 + apart[i, j]) / k
+                G[e, e] += weight * np.eye(k)
+                G[f, f] += weight * B @ B.T
+                G[f, e] -= weight * B
+                G[e, f] -= weight * B.T
+        slope = np.einsum("rck,rck->r", self._X @ G, self._X)
+        return apart, slope
+
+    def exchanged(self, start: NDArray) -> NDArray:
+        """Rows exchanged one for one while that tells more."""
+        chosen = start.copy()
+        apart, slope = self._value(chosen)
+        best, going = _told(apart), True
+        while going:
+            going = False
+            outside = np.setdiff1d(np.arange(len(slope)), chosen)
+            new = outside[np.argsort(-slope[outside])[:_TRIED]]
+            old = np.argsort(slope[chosen])[:_TRIED]
+            for place, row in product(old, new):
+                other = chosen.copy()
+                other[place] = row
+                trial = self._value(other)
+                if _told(trial[0]) > best + _BETTER:
+                    chosen, slope, best = other, trial[1], _told(trial[0])
+                    going = True
+                    break
+        return chosen
+
+
+def _told(apart: NDArray) -> float:
+    """The criterion."""
+    return float(np.nansum(np.log1p(apart)))
+
+
+def table(planned: Planned) -> dict[str, Any]:
+    """A plan for machines: pairs of effects, the hardest to tell apart first."""
+    names = planned.effects
+    pairs = [
+        {
+            "effect": names[i], "fitted": names[j],
+            "planned": float(planned.apart[i, j]),
+            "random": float(planned.random[i, j]),
+        }
+        for i in range(len(names)) for j in range(len(names)) if i != j
+    ]  # fmt: skip
+    return {
+        "rows": len(planned.plan.rows),
+        "configurations": len(set(planned.plan.configuration.tolist())),
+        "pairs": sorted(pairs, key=lambda pair: pair["planned"]),
+    }
+
+
+def text(planned: Planned) -> str:
+    """The same for people: the five hardest pairs."""
+    shown = table(planned)
+    lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
+    lines.append("hardest to tell apart, with as many random rows in brackets [sigma]:")
+    for pair in shown["pairs"][:5]:
+        sizes = [np.sqrt(pair[key]) for key in ("planned", "random")]
+        lines.append(
+            f"  {pair['effect']} where {pair['fitted']} is fitted: "
+            f"{sizes[0]:.2g} ({sizes[1]:.2g})"
+        )
+    return "\n".join(lines)
+
+
+def unmeasured(planned: Planned) -> Synthetic:
+    """A plan as a campaign whose readings are all missing, to be written and filled."""
+    missing = np.full((len(planned.plan.rows), 6), np.nan)
+    return Synthetic(
+        robot=planned.robot, plan=planned.plan,
+        reference_point=np.array(planned.design.reference_point),
+        registration="known", sigma=np.repeat(planned.sigma, 3),
+        readings=missing, exact=missing, added=missing, effects=(), strength={},
+    )  # fmt: skip
