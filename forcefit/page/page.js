@@ -42,7 +42,7 @@
       x: scaled(t.x, factor(x)), y: scaled(t.y, factor(y)),
       error_x: error(t.error_x, x), error_y: error(t.error_y, y) })),
       { height: spec.height, xaxis: axisLayout(x), yaxis: axisLayout(y),
-        barmode: spec.barmode || "overlay",
+        barmode: spec.barmode,
         showlegend: spec.traces.filter(t => t.name).length > 1 }));
   }
 

@@ -12,7 +12,6 @@ plotly.js draws; it is inside the page, compressed, and nothing is fetched.
 import base64
 import hashlib
 import html
-import io
 import json
 import platform
 import sys
@@ -160,26 +159,6 @@ def results_in(text: str, where: str) -> dict[str, Any]:
     if not isinstance(results, dict):
         raise BadInput(f"{where}: found a JSON list or value, expected results")
     return results
-
-
-def picture(figure: Any, caption: str) -> str:
-    """A matplotlib figure inside the page, sharp at any size.
-
-    Args:
-        figure: of matplotlib.
-        caption: below it.
-
-    Returns:
-        HTML.
-    """
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    data = base64.b64encode(buffer.getvalue()).decode()
-    text = html.escape(caption)
-    return (
-        f"<figure><img alt='{text}' src='data:image/png;base64,{data}'>"
-        f"<figcaption>{text}</figcaption></figure>"
-    )
 
 
 def section(title: str, *pieces: str) -> str:
