@@ -28,6 +28,7 @@ from forcefit.page.charts import embedded
 from forcefit.page.tables import Value, inline, table
 
 _PACKAGES = ("numpy", "scipy", "numba", "clarabel", "cvxpy", "exudyn")
+_DIGITS = 300  # of the longest integer that a float holds, nearly
 _BUTTONS = (
     "<div class=bar><button type=button id=units>SI units</button>"
     "<button type=button id=print>Print</button></div>"
@@ -152,13 +153,18 @@ def results_in(text: str, where: str) -> dict[str, Any]:
             raise BadInput(f"{where}: found a page without results of forcefit")
         text = rest.partition("</script>")[0]
     try:
-        results = json.loads(text)
+        results = json.loads(text, parse_int=_whole)
     except ValueError:
         expected = "a report of forcefit or the JSON file of a command"
         raise BadInput(f"{where}: found other text, expected {expected}") from None
     if not isinstance(results, dict):
         raise BadInput(f"{where}: found a JSON list or value, expected results")
     return results
+
+
+def _whole(text: str) -> int | float:
+    """An integer of JSON; one beyond all floats is infinite."""
+    return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def section(title: str, *pieces: str) -> str:

@@ -151,3 +151,7 @@ def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
 def test_what_holds_no_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):
         results_in(text, "x")
+
+
+def test_an_integer_that_no_float_holds_is_infinite():
+    assert results_in(f'{{"a": {"9" * 400}, "b": 3}}', "x") == {"a": np.inf, "b": 3}
