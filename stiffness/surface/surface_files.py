@@ -113,19 +113,22 @@ def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         gmsh.open(str(path))
-        _keep(gmsh.model, path, solid)
+        sides = _sides(gmsh.model, path, solid)
         gmsh.model.mesh.generate(2)
         tags, points, _ = gmsh.model.mesh.getNodes()
-        corners = gmsh.model.mesh.getElementsByType(2)[1]
+        corners = np.concatenate([
+            gmsh.model.mesh.getElementsByType(2, side)[1] for side in sides
+        ])
     finally:
         gmsh.finalize()
+    used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
     index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
     index[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3), index[corners.astype(np.int64)].reshape(-1, 3)
+    return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
 
 
-def _keep(model: Any, path: Path, solid: str) -> None:
-    """Remove all solids of gmsh's model but one, which must be named if others are."""
+def _sides(model: Any, path: Path, solid: str) -> list[int]:
+    """Faces of the solid that is meant, which must be named if there are several."""
     solids = dict[str, int]()
     for _, tag in model.getEntities(3):
         own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
@@ -138,7 +141,6 @@ def _keep(model: Any, path: Path, solid: str) -> None:
             f"{path}: found {len(solids)} solids ({names}), expected which one, such "
             f"as {path.name}#{next(iter(solids))}"
         )
-    others = [(3, tag) for name, tag in solids.items() if solid and name != solid]
-    if others:
-        model.occ.remove(others, recursive=True)
-        model.occ.synchronize()
+    if not solid:  # one, or faces that belong to none
+        return [tag for _, tag in model.getEntities(2)]
+    return [tag for _, tag in model.getBoundary([(3, solids[solid])], oriented=False)]
