@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
+from validation.exchange.bag import is_bag, read_bag
 from validation.exchange.commands_table import Commands, read_commands
 from validation.exchange.device_frame import (
     DeviceFrame,
@@ -86,7 +87,7 @@ def import_readings(
     """Make a campaign of a device's files.
 
     Args:
-        files: exports of the device.
+        files: exports of the device, or ROS bags of what it read.
         targets: what was measured on (:mod:`validation.exchange.targets_file`).
         commands: what was commanded (:mod:`validation.exchange.commands_table`).
         folder: to be written; it must be absent or empty.
@@ -102,7 +103,15 @@ def import_readings(
     check_new_folder(folder)
     declared = read_targets(targets)
     commands_read = read_commands(commands, declared.robot, declared.writing)
-    readings = [r for file in files for r in read_device_table(file, declared.writing)]
+    readings = [
+        reading
+        for file in files
+        for reading in (
+            read_bag(file)
+            if is_bag(file)
+            else read_device_table(file, declared.writing)
+        )
+    ]
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, commands_read, declared.places, declared.window)
