@@ -103,15 +103,10 @@ def import_readings(
     check_new_folder(folder)
     declared = read_targets(targets)
     commands_read = read_commands(commands, declared.robot, declared.writing)
-    readings = [
-        reading
-        for file in files
-        for reading in (
-            read_bag(file)
-            if is_bag(file)
-            else read_device_table(file, declared.writing)
-        )
-    ]
+    readings: list[Reading] = []
+    for file in files:
+        writing = declared.writing
+        readings += read_bag(file) if is_bag(file) else read_device_table(file, writing)
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, commands_read, declared.places, declared.window)
