@@ -9,6 +9,7 @@ asked for are what it was made from, and made again when one of them changed.
 import csv
 import hashlib
 import json
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -126,7 +127,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
     links: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
         surface = Path(root.file).parent / table.text("surface")
-        if not named_solid(surface)[0].is_file():
+        if not os.path.isfile(named_solid(surface)[0]):
             raise table.bad("surface", f"found no file {surface}, expected a surface")
         link = _link(table, surface, accuracy)
         for key in ("base", "tip"):
@@ -203,7 +204,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
             )
         cells = dict(zip(head, (cell.strip() for cell in row), strict=True))
         surface = file.parent / cells["surface"]
-        if not named_solid(surface)[0].is_file():
+        if not os.path.isfile(named_solid(surface)[0]):
             raise BadInput(f"{place}: found no file {surface}, expected a surface")
         sizes = {name: _size(place, name, cells[name]) for name in names}
         ends = {}

@@ -4,6 +4,7 @@ A rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by it
 and its frame, its time is the message's stamp, lengths are metres.
 """
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ _MESSAGES = {
 def is_bag(path: Path | str) -> bool:
     """Whether a path is a bag: a folder with ``metadata.yaml``, or a ``.bag`` file."""
     path = Path(path)
-    return path.suffix.lower() == ".bag" or (path / "metadata.yaml").is_file()
+    return path.suffix.lower() == ".bag" or os.path.isfile(path / "metadata.yaml")
 
 
 def read_bag(path: Path | str) -> list[Reading]:
