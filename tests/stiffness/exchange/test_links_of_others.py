@@ -349,3 +349,10 @@ def test_numbers_whose_products_are_none_are_refused(run, tmp_path):
     assert status == 2
     assert "numbers above 1e100" in err
     assert not (tmp_path / "rod.mtx").exists()
+
+
+def test_a_matrix_of_no_link_s_size_is_refused(tmp_path):
+    path = tmp_path / "rod.npy"
+    np.save(path, 1e200 * np.eye(12))
+    with pytest.raises(BadInput, match="not finite, or above 1e100"):
+        import_link(path)

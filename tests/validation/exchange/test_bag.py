@@ -91,3 +91,7 @@ def test_without_rosbags_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
     with pytest.raises(BadInput, match=r"install forcefit\[ros\], or export"):
         read_bag(tmp_path / "lab.bag")
+
+
+def test_a_name_that_no_file_can_have_is_no_bag():
+    assert not is_bag("x" * 300)
