@@ -118,49 +118,6 @@ def test_every_table_of_a_page_is_toml():
                 tomllib.loads(text)
 
 
-FOUND = """
-[[effect]]
-name = "encoder_offset"
-parameters = { joint2 = 1e-3 }
-[[effect]]
-name = "function"
-where = "joint2"
-components = ["rz"]
-variables = ["q.joint2"]
-form = "waves"
-parameters = { "1.sine" = 1.2e-4, "1.cosine" = -3e-5 }
-"""
-CRANK = """
-name = "crank"
-platform = "tip"
-[[frame]]
-name = "drive"
-parent = "base"
-joint = "revolute"
-actuated = true
-joint_stiffness = [inf, inf, 1e5, inf, inf, inf]
-[[frame]]
-name = "tip"
-parent = "drive"
-translation = [0.3, 0, 0]
-"""
-
-
-def test_every_table_of_a_page_is_toml():
-    for page in PAGES.values():
-        for language, _, text in blocks(page):
-            if language == "toml":
-                tomllib.loads(text)
-
-
-def test_the_robot_of_the_page_about_robot_files_stands(tmp_path):
-    titled("robot_files", tmp_path)
-    posture = ff.place_robot(ff.load_robot(tmp_path / "robot.toml"))
-    right, left = (posture.robot.index(name) for name in ("right.tip", "left.tip"))
-    gap = posture.transforms[right, :3, 3] - posture.transforms[left, :3, 3]
-    assert np.abs(gap).max() < 1e-9
-
-
 # the files that pages speak of -------------------------------------------------------
 def arm(folder, run):
     """A machine with an effect, as a campaign and as a robot file; targets for it."""
