@@ -1,7 +1,8 @@
 """Gives every reader and every command's options what nobody should, and counts.
 
-Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]``. Each
-input is a sound command of ``fuzz_seeds.py`` with its files or its words changed by
+Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
+[--foreign]``. Each input is a sound command of ``fuzz_seeds.py``, or of
+``fuzz_foreign.py``, with its files or its words changed by
 ``fuzz_mutations.py``, run in a process forked from one that has imported and compiled
 everything. Input i of a seed is always the same; ``--only I`` shows one.
 
@@ -29,6 +30,7 @@ import traceback
 from collections import Counter
 from pathlib import Path
 from random import Random
+from typing import NamedTuple
 
 from forcefit.commands import app as forcefit_command
 
@@ -36,6 +38,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import typer  # noqa: E402
+from fuzz_foreign import FOREIGN, MADE_FOREIGN, write_foreign  # noqa: E402
 from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
 
@@ -49,6 +52,14 @@ _OURS = re.compile(
     r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
     r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
 )
+
+
+class Asked(NamedTuple):
+    """Inputs are numbered; a number is the same input whenever these are the same."""
+
+    seed: int
+    options: dict[str, list[tuple[str, bool]]]
+    commands: list[tuple[int, str]]
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
@@ -69,11 +80,12 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
     return faults
 
 
-def prepare(folder: Path, warm: bool) -> None:
-    """Sound files of all kinds; if asked each sound command once, which compiles."""
+def prepare(folder: Path, commands: list[str]) -> None:
+    """Sound files of all kinds; each of the sound commands once, which compiles."""
     write_seeds(folder)
+    write_foreign(folder)
     os.chdir(folder)
-    for command in MADE:
+    for command in [*MADE, *MADE_FOREIGN]:
         status, _, err = run(shlex.split(command))
         assert status == 0, f"{command}: {status}\n{err}"
     for command in KILLED:
@@ -92,7 +104,7 @@ def prepare(folder: Path, warm: bool) -> None:
     }  # fmt: skip
     for name in ("notes.json", "notes.png", "notes.nc"):
         shutil.copy(folder / "notes.txt", folder / name)
-    for _, command in COMMANDS if warm else ():
+    for command in commands:
         with tempfile.TemporaryDirectory() as other:
             shutil.copytree(folder, other, dirs_exist_ok=True)
             os.chdir(other)
@@ -144,14 +156,15 @@ def run(words: list[str]) -> tuple[object, str, str]:
     return status, *messages
 
 
-def changed(number: int, seed: int, options: dict) -> tuple[list[str], list[str]]:
+def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
     """The words of an input, in the current folder, whose files it changes."""
-    random = Random(f"{seed}:{number}")
-    weights, commands = zip(*COMMANDS, strict=True)
+    random = Random(f"{asked.seed}:{number}")
+    weights, commands = zip(*asked.commands, strict=True)
     words = shlex.split(random.choices(commands, weights)[0])
     files = [Path(word.partition("#")[0]) for word in words]
     files = [path for path in files if path.exists()]
     files += [Path(f"{word}.journal") for word in words]
+    files += [path.with_suffix(".yaml") for path in files if path.suffix == ".urdf"]
     inside = [p for path in files if path.is_dir() for p in sorted(path.iterdir())]
     files = [path for path in [*files, *inside] if path.is_file()]
     if "study" in words[0] or "arm.toml" in words:
@@ -166,8 +179,8 @@ def changed(number: int, seed: int, options: dict) -> tuple[list[str], list[str]
         done.append(f"{path}: {change_file(path, random)}")
     if not done or random.random() < 0.1:
         name = " ".join(words[:3]) if words[1] == "library" else " ".join(words[:2])
-        name = "study" if words[0] == "study" else name
-        words = change_words(words, options.get(name, []), random)
+        name = words[0] if words[0] in {"study", "convert"} else name
+        words = change_words(words, asked.options.get(name, []), random)
         done.append("words")
     return words, done
 
@@ -241,12 +254,14 @@ def is_whole(name: str, content: bytes) -> bool:
         ".pdf": (b"%PDF", b"%%EOF\n"), ".html": (b"<!doctype", b"</html>\n"),
         ".toml": (b"", b"\n"), ".csv": (b"", b"\n"), ".nc": (b"\x89HDF", b""),
         ".jpg": (b"\xff\xd8", b"\xff\xd9"), ".tif": (b"II", b""), ".bmp": (b"BM", b""),
+        ".urdf": (b"<", b">\n"), ".xml": (b"<", b">\n"), ".yaml": (b"", b"\n"),
+        "": (b"", b"\n"), ".pch": (b"", b"\n"), ".mtx": (b"", b"\n"),
     }  # fmt: skip
     first, last = ends.get(path.suffix.lower(), (None, b""))
     return first is not None and content.startswith(first) and content.endswith(last)
 
 
-def one(number: int, seed: int, options: dict, seeds: Path) -> dict:
+def one(number: int, asked: Asked, seeds: Path) -> dict:
     """One input, from its files to what is wrong with it."""
     place = Path(tempfile.mkdtemp(dir=f"{seeds}.inputs"))
     folder_of_run, temporary = place / "here", place / "tmp"
@@ -254,7 +269,7 @@ def one(number: int, seed: int, options: dict, seeds: Path) -> dict:
     (folder_of_run / "empty").mkdir()
     temporary.mkdir()
     os.chdir(folder_of_run)
-    words, done = changed(number, seed, options)
+    words, done = changed(number, asked)
     before = snapshot()
     stopped: list[bool] = []
 
@@ -284,18 +299,18 @@ def one(number: int, seed: int, options: dict, seeds: Path) -> dict:
             "stopped": bool(stopped), "took": took, "wrong": wrong}  # fmt: skip
 
 
-def tell(numbers: list[int], seed: int, options: dict, seeds: Path, say: int) -> None:
+def tell(numbers: list[int], asked: Asked, seeds: Path, say: int) -> None:
     """In a child: inputs one after the other, each result into a pipe."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with os.fdopen(say, "wb") as file:
         for number in numbers:
-            content = pickle.dumps(one(number, seed, options, seeds))
+            content = pickle.dumps(one(number, asked, seeds))
             file.write(_HEAD.pack(len(content)) + content)
             file.flush()
 
 
-def batch(numbers: list[int], seed: int, options: dict, seeds: Path) -> list:
+def batch(numbers: list[int], asked: Asked, seeds: Path) -> list:
     """Inputs in a forked process, or in several if one dies of an input."""
     results = []
     while numbers:
@@ -303,7 +318,7 @@ def batch(numbers: list[int], seed: int, options: dict, seeds: Path) -> list:
         child = os.fork()
         if not child:
             try:
-                tell(numbers, seed, options, seeds, say)
+                tell(numbers, asked, seeds, say)
                 os._exit(0)
             except BaseException:
                 traceback.print_exc()
@@ -340,7 +355,8 @@ def main() -> int:
     parser.add_argument("count", nargs="?", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+")
-    asked = parser.parse_args()
+    parser.add_argument("--foreign", action="store_true", help="other programs' files")
+    given = parser.parse_args()
 
     def too_late(*_):
         raise TimeoutError
@@ -352,18 +368,19 @@ def main() -> int:
         os.environ["FORCEFIT_CACHE"] = f"{folder}.cache"
         Path(f"{folder}.inputs").mkdir()
         os.environ.pop("DISPLAY", None)
-        prepare(seeds, asked.only is None)
-        options = options_of()
-        if asked.only is not None:
-            for number, faults in batch(asked.only, asked.seed, options, seeds):
+        commands = FOREIGN if given.foreign else COMMANDS
+        prepare(seeds, [] if given.only else [command for _, command in commands])
+        asked = Asked(given.seed, options_of(), commands)
+        if given.only is not None:
+            for number, faults in batch(given.only, asked, seeds):
                 print(number, shlex.join(faults["words"]), faults["done"], sep="\n")
                 print(faults["out"][-2000:], faults["err"], sep="\n")
                 print(faults["status"], faults["wrong"])
             return 0
         began = time.monotonic()
-        for first in range(0, asked.count, BATCH):
-            numbers = list(range(first, min(first + BATCH, asked.count)))
-            for number, faults in batch(numbers, asked.seed, options, seeds):
+        for first in range(0, given.count, BATCH):
+            numbers = list(range(first, min(first + BATCH, given.count)))
+            for number, faults in batch(numbers, asked, seeds):
                 counts["inputs"] += 1
                 counts[f"exit status {faults['status']}"] += 1
                 counts["stopped by Ctrl-C"] += faults["stopped"]

@@ -43,6 +43,10 @@ PIECES = [
     b"\n\n",
     b"#", b"\xef\xbb\xbf", b"\xe2\x80\xa8", b"{", b"-", b"e", b";", b"\xf0\x9f\xa4",
 ]  # fmt: skip
+TEXT = {
+    ".toml", ".csv", ".json", ".obj", ".urdf", ".xml", ".sdf", ".yaml", ".mtx", ".pch",
+    ".txt",
+}  # fmt: skip
 _TOKEN = re.compile(r"-?\d[\d.eE+_-]*|\"[^\"\n]*\"|\w+")
 
 
@@ -58,7 +62,7 @@ def change_file(path: Path, random: Random) -> str:
     """
     content = path.read_bytes()
     ways = [_bytes, _bytes, _cut]
-    if path.suffix in {".toml", ".csv", ".json", ".obj"}:
+    if path.suffix in TEXT:
         ways += [_token, _token, _lines, _rename]
     if path.suffix in {".toml", ".json"}:
         ways += [_tree] * 4

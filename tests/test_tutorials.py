@@ -2,7 +2,7 @@
 
 Of a page, in its order: a block with a title is a file; ``sh`` is run; ``output`` are
 lines of which each begins or is part of a line the commands before it printed;
-``python`` blocks are one session.  Blocks of ``python`` on other pages run too.
+``python`` blocks are one session.
 """
 
 import json
@@ -18,9 +18,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```', re.M | re.S)
 TUTORIALS = sorted(path.stem for path in (DOCS / "tutorials").glob("*.md"))
-# beside tutorials: pages whose Python needs nothing that is not there
-PAGES = ("reports", "platform_stiffness")
-FOLLOWED = ("platform_stiffness",)  # beside tutorials: pages all of whose blocks run
+FOLLOWED = ("platform_stiffness",)  # beside them: pages whose answers are compared
 
 
 def blocks(page):
@@ -96,13 +94,3 @@ def test_the_measuring_protocol_s_files_are_a_campaign(tmp_path):
     follow(tmp_path / "page.md", tmp_path / "lab")
     inspected = json.loads((tmp_path / "lab" / "inspected.json").read_text())
     assert inspected["rows"] == 5  # points that were read
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_the_python_of_a_page_runs(tmp_path, name):
-    python = [text for language, _, text in blocks(DOCS / f"{name}.md")
-              if language == "python"]  # fmt: skip
-    assert python
-    session = {}
-    for text in python:
-        exec(compile(text, name, "exec"), session)

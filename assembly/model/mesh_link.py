@@ -73,9 +73,10 @@ def solved_mesh(
     from stiffness.fem.material import Material
     from stiffness.surface.interface import parse_interface
     from stiffness.surface.surface import read_surface
+    from stiffness.surface.surface_files import named_solid
 
     try:
-        stamp = link.surface.stat().st_mtime_ns
+        stamp = named_solid(link.surface)[0].stat().st_mtime_ns
     except OSError as error:
         raise BadInput(
             f"{place}: surface {link.surface} cannot be read: {error.strerror}"

@@ -1,6 +1,6 @@
 """Pages of draws and of tolerances: yields, what governs them, what to tighten."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,14 +32,16 @@ _TOLERANCES_ASSUMED = (
 
 
 def draws_page(
-    summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance
-) -> str:
+    summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance,
+    robot: str = "",
+) -> str:  # fmt: skip
     """The page of an experiment.
 
     Args:
         summary: of :func:`assembly.statistics.summary.summarise`, with ``robot``.
         data: the draws.
         provenance: command and files.
+        robot: HTML of :func:`assembly.statistics.scenes.drawn_robot`.
 
     Returns:
         HTML, which needs no other file.
@@ -58,6 +60,7 @@ def draws_page(
             f"play {summary['play']}: {summary['play_means']}.",
             body=[
                 section("How often", _yields(summary)),
+                section("One of the worst", robot) if robot else "",
                 section("How large", _quantities(summary), _histograms(summary, data)),
                 _importance(summary),
             ],
@@ -207,12 +210,15 @@ def _importance(summary: Mapping[str, Any]) -> str:
     return section("What governs it", *pieces) if pieces else ""
 
 
-def tolerances_page(results: Mapping[str, Any], provenance: Provenance) -> str:
+def tolerances_page(
+    results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
+) -> str:
     """The page of ``assembly tolerances``.
 
     Args:
         results: with ``present``, ``allocation`` or both.
         provenance: command and files.
+        pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
 
     Returns:
         HTML, which needs no other file.
@@ -229,6 +235,7 @@ def tolerances_page(results: Mapping[str, Any], provenance: Provenance) -> str:
         )
         tiles += _present_tiles(present)
         body.append(_present_section(present))
+        body += [section("Where it is tight", *pictures)] if any(pictures) else []
     if allocation is not None:
         check = allocation["verification"]
         good = (check or {}).get("verdict") != "contradicted"

@@ -77,8 +77,8 @@ def present_errors(
         progress: called with postures done and their number.
 
     Returns:
-        The largest margin and where; the factor on all errors at which it is 1; slopes
-        of the margin and of the energy there, by error, the steepest first.
+        The margins, the largest and where; the factor on all errors at which it is 1;
+        slopes of the margin and of the energy there, by error, the steepest first.
     """
     margins = []
     for i, posture in enumerate(postures):
@@ -104,6 +104,7 @@ def present_errors(
         "postures": len(postures),
         "compliant": compliant,
         "largest_margin": margin,
+        "margins": values,
         "at": posture.pose(),
         "factor_on_errors": 1.0 / margin if margin > 0 else float("inf"),
         "energy_there": energy,

@@ -8,7 +8,7 @@ import typer
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
-from forcefit.inputs.writing import check_json, write_json
+from forcefit.inputs.writing import check_json, check_new_folder, write_json
 
 DEFAULT_STRENGTH = 5.0  # [-] sigmas
 
@@ -100,7 +100,6 @@ def generate(
     from validation.synthetic.draws import NotApplicable
     from validation.synthetic.generator import (
         Noise,
-        check_folder,
         generate_campaign,
         write_campaign,
     )
@@ -126,7 +125,7 @@ def generate(
         reference_point=(x, y, z),
     )
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
-    check_folder(folder)
+    check_new_folder(folder)
     check_json(str(truth))
     if folder.resolve() in truth.resolve().parents:
         raise BadInput(

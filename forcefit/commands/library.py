@@ -51,6 +51,7 @@ def list_entries(folder: Folder, json: JsonOption = None) -> None:
 def look_up_entry(
     folder: Folder,
     at: Annotated[list[str], typer.Option(help="Such as radius=0.02,length=0.4.")],
+    family: Annotated[str, typer.Option(help="Of parts by their surface.")] = "",
     json: JsonOption = None,
 ) -> None:
     """K_E between a library's entries, interpolated, with its error."""
@@ -60,7 +61,7 @@ def look_up_entry(
     from stiffness.report.results import matrix_text
 
     wanted = parse_assignments(at, "--at")
-    K, error = look_up(read_library(folder), wanted)
+    K, error = look_up(read_library(folder), wanted, family)
     worst = float(scaled(error, K).max())
     results = {"parameters": wanted, "stiffness": K, "relative_error_estimate": worst}
     write_json(results, json)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.options import JsonOption
-from forcefit.inputs.writing import check_writable, write_bytes, write_json
+from forcefit.inputs.writing import Kind, check_writable, write_bytes, write_json
 
 Length = Annotated[str, typer.Option(help="Of lengths: m, cm, mm, um, inch; N, rad.")]
 
@@ -73,5 +73,7 @@ def export(
 
     stiffness, offset = read_link_results(file)
     content = link_file(stiffness, offset, to, unit)
-    check_writable(output)
+    # a matrix of the same format may be replaced, nothing else
+    endings, begins = (output.suffix.lower(),), (content[:8].lower(),)
+    check_writable(output, Kind(f"a matrix for {to}", endings, begins))
     write_bytes(content, output)

@@ -142,8 +142,10 @@ def statistics(
     write_json(summary, json)
     if report is not None:
         from assembly.statistics.report import draws_page
+        from assembly.statistics.scenes import drawn_robot
 
-        write_text(draws_page(summary, data, provenance(robot, errors)), report)
+        scene = drawn_robot(experiment, data)
+        write_text(draws_page(summary, data, provenance(robot, errors), scene), report)
     held.close()
     if json != "-":
         print(summary_text(summary))
@@ -259,8 +261,12 @@ def tolerances(
     write_json(results, json)
     if report is not None:
         from assembly.statistics.report import tolerances_page
+        from assembly.statistics.scenes import margin_map, tightest_robot
 
-        write_text(tolerances_page(results, provenance(robot, plan)), report)
+        drawings = (margin_map, tightest_robot) if "present" in results else ()
+        pictures = [draw(postures, results["present"]) for draw in drawings]
+        source = provenance(robot, plan)
+        write_text(tolerances_page(results, source, pictures), report)
     held.close()
     if json != "-":
         print("\n".join(texts))

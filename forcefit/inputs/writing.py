@@ -150,6 +150,48 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
         raise BadInput(unwritable(path, error)) from None
 
 
+def check_new_folder(folder: Path | str) -> None:
+    """Refuse a folder that files cannot be written to, before the work.
+
+    Args:
+        folder: new, or empty.
+
+    Raises:
+        BadInput: it holds something already, or cannot be written.
+    """
+    folder = Path(folder)
+    check_writable(folder.parent / f"{folder.name}.new")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadInput(f"{folder}: found something there, expected a new folder")
+
+
+@contextmanager
+def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
+    """A folder that appears with all its files, or not at all.
+
+    Args:
+        folder: new, or empty.
+
+    Yields:
+        Where to write its files.
+
+    Raises:
+        BadInput: it holds something already, or cannot be written.
+    """
+    folder = Path(folder)
+    check_new_folder(folder)
+    part = folder.with_name(folder.name + ".part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        part.mkdir()
+        yield part
+        part.replace(folder)
+    except OSError as error:
+        raise BadInput(unwritable(folder, error)) from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
 def write_text(text: str, path: Path | str) -> None:
     r"""Write a text file whole or not at all.
 

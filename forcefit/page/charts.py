@@ -71,7 +71,10 @@ def label(name: str) -> str:
     return html.escape(name, quote=False)
 
 
-def chart(traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str) -> str:
+def chart(
+    traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str,
+    bars: str = "overlay",
+) -> str:  # fmt: skip
     """A chart of plotly traces, their data in SI.
 
     Args:
@@ -79,16 +82,18 @@ def chart(traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str) -
         x: the horizontal axis.
         y: the vertical axis.
         caption: below it.
+        bars: that share a place: ``"overlay"`` or ``"stack"``.
 
     Returns:
         HTML, drawn when the page is opened.
     """
     axes = {"x": _axis(x, [t["x"] for t in traces]),
             "y": _axis(y, [t["y"] for t in traces])}  # fmt: skip
-    bars = any(t["type"] == "bar" and t.get("orientation") == "h" for t in traces)
-    rows = max((len(t["y"]) for t in traces), default=0) if bars else 0
-    height = 110 + 26 * rows if bars else 340
-    return _figure({"traces": traces, "axes": axes, "height": height}, "chart", caption)
+    lying = any(t["type"] == "bar" and t.get("orientation") == "h" for t in traces)
+    rows = max((len(t["y"]) for t in traces), default=0) if lying else 0
+    height = 110 + 26 * rows if lying else 340
+    spec = {"traces": traces, "axes": axes, "height": height, "barmode": bars}
+    return _figure(spec, "chart", caption)
 
 
 def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) -> str:

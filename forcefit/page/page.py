@@ -10,10 +10,8 @@ plotly.js draws; it is inside the page, compressed, and nothing is fetched.
 """
 
 import base64
-import gzip
 import hashlib
 import html
-import io
 import json
 import platform
 import sys
@@ -29,7 +27,8 @@ from forcefit.inputs.errors import BadInput
 from forcefit.page.charts import embedded
 from forcefit.page.tables import Value, inline, table
 
-_PACKAGES = ("numpy", "scipy", "numba", "clarabel", "cvxpy", "exudyn", "plotly")
+_PACKAGES = ("numpy", "scipy", "numba", "clarabel", "cvxpy", "exudyn")
+_DIGITS = 300  # of the longest integer that a float holds, nearly
 _BUTTONS = (
     "<div class=bar><button type=button id=units>SI units</button>"
     "<button type=button id=print>Print</button></div>"
@@ -114,10 +113,7 @@ def page(content: Page) -> str:
     Returns:
         HTML; the results are inside it as JSON, SI, in full.
     """
-    here = files("forcefit.page")
-    style, script = (
-        here.joinpath(name).read_text("utf-8") for name in ("page.css", "page.js")
-    )
+    style, script = (_part(name).decode() for name in ("page.css", "page.js"))
     title = html.escape(content.title)
     kind = "good" if content.good else "bad"
     parts = [
@@ -157,7 +153,7 @@ def results_in(text: str, where: str) -> dict[str, Any]:
             raise BadInput(f"{where}: found a page without results of forcefit")
         text = rest.partition("</script>")[0]
     try:
-        results = json.loads(text)
+        results = json.loads(text, parse_int=_whole)
     except ValueError:
         expected = "a report of forcefit or the JSON file of a command"
         raise BadInput(f"{where}: found other text, expected {expected}") from None
@@ -166,24 +162,9 @@ def results_in(text: str, where: str) -> dict[str, Any]:
     return results
 
 
-def picture(figure: Any, caption: str) -> str:
-    """A matplotlib figure inside the page, sharp at any size.
-
-    Args:
-        figure: of matplotlib.
-        caption: below it.
-
-    Returns:
-        HTML.
-    """
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    data = base64.b64encode(buffer.getvalue()).decode()
-    text = html.escape(caption)
-    return (
-        f"<figure><img alt='{text}' src='data:image/png;base64,{data}'>"
-        f"<figcaption>{text}</figcaption></figure>"
-    )
+def _whole(text: str) -> int | float:
+    """An integer of JSON; one beyond all floats is infinite."""
+    return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def section(title: str, *pieces: str) -> str:
@@ -246,13 +227,16 @@ def _digest(path: Path) -> str:
 
 @cache
 def _plotly() -> str:
-    """plotly.js, compressed and as text; a browser unpacks it in 0.2 s.
+    """plotly.js with the traces that pages draw, compressed and as text.
 
-    Whole it would be 4.9 MB of each page.  The date is left out of it, so that the same
-    results give the same page.
+    ``plotly/build.mjs`` makes it.  A browser unpacks it in 0.1 s.
 
     Returns:
         base64 of a gzip file.
     """
-    code = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    return base64.b64encode(gzip.compress(code, 9, mtime=0)).decode()
+    return base64.b64encode(_part("plotly/plotly.min.js.gz")).decode()
+
+
+def _part(name: str) -> bytes:
+    """A file that comes with this chapter."""
+    return files("forcefit.page").joinpath(*name.split("/")).read_bytes()

@@ -57,4 +57,5 @@ def number_text(value: float, unit: str = "", digits: int = 4) -> str:
         return "none"
     if math.isinf(value):
         return "unbounded"
-    return f"{value:.{digits}g} {unit}".rstrip()
+    # minus zero is zero
+    return f"{value + 0.0:.{digits}g} {unit}".rstrip()

@@ -41,6 +41,9 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
+    # their products must be numbers
+    if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
+        raise BadInput(f"{path}: found numbers above 1e100, expected a link's, in SI")
     return K, offset
 
 

@@ -93,8 +93,8 @@ def _checked(
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
-    if not np.isfinite(matrix.data).all():
-        raise BadInput(f"{path}: found a number that is not finite")
+    if not (np.abs(matrix.data) < 1e100).all():  # products of them are numbers
+        raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
     if freedoms is None and n % 6:
         raise BadInput(
             f"{path}: found {n} rows without names, expected six for each node, or a "

@@ -17,6 +17,7 @@ from stiffness.link import LinkStiffness, check_definite, inverted
 from stiffness.screws import screw_map, skew
 
 _BALANCED = 1e-5  # of its scale: what text of seven digits leaves
+_FARTHEST = 1e6  # [m] of a base from its tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
@@ -66,6 +67,11 @@ def link_of_both_ends(
     offset = own_offset
     if base is not None and tip is not None:
         offset = np.asarray(base, dtype=float) - np.asarray(tip, dtype=float)
+    if not (np.abs(offset) < _FARTHEST).all():
+        raise BadInput(
+            f"{who}: its base would stand {np.abs(offset).max():.3g} m from its tip; "
+            "is it held elsewhere, or are order and unit others?"
+        )
     ideal = both_ends(K, offset)
     size = np.sqrt(np.abs(np.diag(ideal)))
     gap = np.abs(K12 - ideal) / np.outer(size, size)

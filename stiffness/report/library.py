@@ -133,7 +133,7 @@ def read_library(path: Path | str) -> list[Entry]:
 
 
 def look_up(
-    entries: Sequence[Entry], wanted: Mapping[str, float]
+    entries: Sequence[Entry], wanted: Mapping[str, float], family: str = ""
 ) -> tuple[NDArray, NDArray]:
     """Stiffness at wanted parameters, interpolated between a grid's entries.
 
@@ -145,19 +145,18 @@ def look_up(
         entries: a full grid.
         wanted: a value of every parameter; of one that has a single value in the grid
             it may be left out.
+        family: of parts by their surface; without one the grid of a shape, or the only
+            family there is.
 
     Returns:
-        (6, 6) stiffness, and (6, 6) the sizes of its error: what one neighbour fewer
-        along each axis changes, and the entries' own errors.
+        (6, 6) stiffness, and (6, 6) the sizes of its error: what it changes to leave
+        out the farthest entry used along each axis, and the entries' own errors.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries
             do not fill a grid.
     """
-    # parts given by their surface are beside any grid
-    entries = [entry for entry in entries if "surface" not in entry.about]
-    if not entries:
-        raise BadInput("look-up: found only entries of surfaces, expected a grid")
+    entries = _grid_of(entries, family)
     names = list(entries[0].parameters)
     for name in wanted:
         if name not in names:
@@ -187,6 +186,23 @@ def look_up(
     own = max(np.abs(scaled(e.stiffness_error, e.stiffness)).max() for e in entries)
     scale = np.sqrt(np.outer(np.diag(best), np.diag(best)))
     return best, error + own * scale
+
+
+def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
+    """The entries of a family, or of the grid of a shape."""
+    # parts by themselves are beside any grid
+    families = sorted({e.about["family"] for e in entries if e.about.get("family")})
+    grid = [entry for entry in entries if "surface" not in entry.about]
+    if family and family not in families:
+        raise BadInput(f'look-up: no family "{family}"{nearest(family, families)}')
+    if not family and not grid and len(families) > 1:
+        raise BadInput(f"look-up: found families {', '.join(families)}, expected one")
+    if family or (not grid and families):
+        wanted = family or families[0]
+        return [entry for entry in entries if entry.about.get("family") == wanted]
+    if not grid:
+        raise BadInput("look-up: found only entries of surfaces, expected a grid")
+    return grid
 
 
 def _interpolated(

@@ -215,6 +215,8 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
         request = wanted.request()
         link, parameters = wanted.solve(), wanted.parameters
         about = {"surface": wanted.surface.name, "request": request}
+        if wanted.family:
+            about["family"] = wanted.family
     else:
         link, geometry = _solve_point(spec, wanted)
         parameters, about = wanted, {"shape": spec.shape, "geometry": geometry}

@@ -1,20 +1,27 @@
-"""Library entries of parts given by their surface: one link, not a family.
+"""Library entries of parts given by their surface: single ones, and families.
+
+A family is a table of files and their sizes, between which ``look_up`` interpolates.
 
 Such an entry is kept as long as the surface file's content and everything else that was
 asked for are what it was made from, and made again when one of them changed.
 """
 
+import csv
 import hashlib
 import json
+import os
 import re
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from forcefit.inputs.table import BadInput, Table, describe, quoted
+from forcefit.inputs.errors import LARGEST
+from forcefit.inputs.table import BadInput, Table, describe, quoted, read_text
 from stiffness.link import LinkStiffness
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import UNITS
+from stiffness.surface.surface_files import named_solid
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
@@ -34,6 +41,8 @@ class SurfaceLink:
         unit: of the surface file.
         interface: one of :data:`stiffness.fem.condensation.KINDS`.
         accuracy: [1] asked of every entry of K.
+        family: of parts that differ in their sizes, empty for a part by itself.
+        sizes: [m] of a part of a family, by name.
     """
 
     name: str
@@ -46,11 +55,13 @@ class SurfaceLink:
     unit: str = "m"
     interface: str = "rigid"
     accuracy: float = 0.005
+    family: str = ""
+    sizes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The material, as entries of a grid state it."""
-        given = {"young": self.young, "poisson": self.poisson}
+        """Sizes and material, as entries of a grid state them."""
+        given = dict(self.sizes) | {"young": self.young, "poisson": self.poisson}
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
@@ -62,13 +73,18 @@ class SurfaceLink:
         Raises:
             BadInput: the surface file cannot be read.
         """
+        file, solid = named_solid(self.surface)
         try:
-            content = self.surface.read_bytes()
+            content = file.read_bytes()
         except OSError as error:
             raise BadInput(
                 f"{self.surface}: cannot be read: {error.strerror}"
             ) from None
         given = {k: v for k, v in asdict(self).items() if k not in {"name", "surface"}}
+        if not self.family:  # a part by itself
+            del given["family"], given["sizes"]
+        if solid:
+            given["solid"] = solid
         return given | {"surface_digest": hashlib.sha256(content).hexdigest()}
 
     def solve(self) -> LinkStiffness:
@@ -96,7 +112,7 @@ class SurfaceLink:
 
 
 def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
-    """The tables ``[[link]]`` of a build file.
+    """The tables ``[[link]]`` and ``[[family]]`` of a build file.
 
     Args:
         root: the file's table.
@@ -108,40 +124,120 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
     Raises:
         BadInput: a rule is broken, a file is missing, or a name stands there twice.
     """
-    from stiffness.fem.condensation import KINDS
-
     links: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
-        name = table.text("name")
-        if not _NAME.fullmatch(name):
-            expected = "letters, digits, dots, - and _, a letter or digit first"
-            raise table.bad("name", f"found {describe(name)}, expected {expected}")
-        if name in links:
-            raise table.bad("name", f"found {quoted(name)} twice, expected other names")
         surface = Path(root.file).parent / table.text("surface")
-        if not surface.is_file():
+        if not os.path.isfile(named_solid(surface)[0]):
             raise table.bad("surface", f"found no file {surface}, expected a surface")
-        links[name] = SurfaceLink(
-            name=name,
-            surface=surface,
-            base=_interface(table, "base"),
-            tip=_interface(table, "tip"),
-            young=table.number("young", "Pa", above=0.0),
-            poisson=table.number("poisson", "-", above=-1.0, below=0.5),
-            density=table.number("density", "kg/m^3", 0.0, least=0.0),
-            unit=table.choice("unit", UNITS, "m"),
-            interface=table.choice("interface", KINDS, "rigid"),
-            accuracy=table.number("accuracy", "1", accuracy, least=1e-5, below=0.5),
-        )
-        table.finish()
+        link = _link(table, surface, accuracy)
+        for key in ("base", "tip"):
+            parse_interface(getattr(link, key), f"{table.file}: {table.place}.{key}")
+        _add(links, link, table)
+    for table in root.tables("family"):
+        file = Path(root.file).parent / table.text("table")
+        common = _link(table, file, accuracy)
+        for link in family_of(common, file):
+            _add(links, link, table)
     return tuple(links.values())
 
 
-def _interface(table: Table, key: str) -> Any:
-    """An interface as written, its syntax checked."""
-    value = table.require(key, 'an interface such as "z=0.452"')
-    parse_interface(value, f"{table.file}: {table.place}.{key}")
+def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
+    """One more link, of a name that none has."""
+    if link.name in links:
+        found = f"found {quoted(link.name)} twice, expected other names"
+        raise table.bad("name", found)
+    links[link.name] = link
+
+
+def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
+    """What tables of a link and of a family have in common."""
+    from stiffness.fem.condensation import KINDS
+
+    name = table.text("name")
+    if not _NAME.fullmatch(name):
+        expected = "letters, digits, dots, - and _, a letter or digit first"
+        raise table.bad("name", f"found {describe(name)}, expected {expected}")
+    link = SurfaceLink(
+        name=name,
+        surface=surface,
+        base=table.require("base", 'an interface such as "z=0"'),
+        tip=table.require("tip", 'an interface such as "z=0.452"'),
+        young=table.number("young", "Pa", above=0.0),
+        poisson=table.number("poisson", "-", above=-1.0, below=0.5),
+        density=table.number("density", "kg/m^3", 0.0, least=0.0),
+        unit=table.choice("unit", UNITS, "m"),
+        interface=table.choice("interface", KINDS, "rigid"),
+        accuracy=table.number("accuracy", "1", accuracy, least=1e-5, below=0.5),
+    )
+    table.finish()
+    return link
+
+
+def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
+    """Parts of one kind: a CSV table of their files and sizes.
+
+    Args:
+        common: what all have in common, by the family's name; its interfaces may name
+            sizes in braces, such as ``"z={length}"``.
+        file: a column ``surface``, from the table's folder, and one for each size [m].
+
+    Returns:
+        A link for each row.
+
+    Raises:
+        BadInput: the table, a file or an interface is not proper.
+    """
+    rows = list(csv.reader(read_text(file).splitlines()))
+    head = [cell.strip() for cell in rows[0]] if rows else []
+    names = [name for name in head if name != "surface"]
+    if "surface" not in head or not names or len(set(head)) != len(head):
+        raise BadInput(
+            f"{file}: line 1: found {describe(','.join(head))}, expected surface and "
+            "the name of each size, once"
+        )
+    links = []
+    for number, row in enumerate(rows[1:], 2):
+        place = f"{file}: line {number}"
+        if len(row) != len(head):
+            raise BadInput(
+                f"{place}: found {len(row)} cells, expected {len(head)}, as the header"
+            )
+        cells = dict(zip(head, (cell.strip() for cell in row), strict=True))
+        surface = file.parent / cells["surface"]
+        if not os.path.isfile(named_solid(surface)[0]):
+            raise BadInput(f"{place}: found no file {surface}, expected a surface")
+        sizes = {name: _size(place, name, cells[name]) for name in names}
+        ends = {}
+        for key in ("base", "tip"):
+            ends[key] = _filled(getattr(common, key), sizes)
+            parse_interface(ends[key], f"{place}: {key}")
+        own = "-".join(f"{name}{value:.9g}" for name, value in sizes.items())
+        links.append(replace(common, name=f"{common.name}-{own}", surface=surface,
+                             family=common.name, sizes=sizes, **ends))  # fmt: skip
+    if not links:
+        raise BadInput(f"{file}: no rows, expected one for each part")
+    return links
+
+
+def _size(place: str, name: str, cell: str) -> float:
+    """[m] of a cell."""
+    try:
+        value = float(cell)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value < LARGEST:
+        expected = "a length above 0 [m]"
+        raise BadInput(f"{place}, {name}: found {describe(cell)}, expected {expected}")
     return value
+
+
+def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
+    """An interface with its sizes put in."""
+    if not isinstance(interface, str):
+        return interface
+    for name, value in sizes.items():
+        interface = interface.replace(f"{{{name}}}", repr(value))
+    return interface
 
 
 def is_current(file: Path, link: SurfaceLink) -> bool:

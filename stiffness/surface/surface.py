@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from stiffness.surface.surface_files import STEP, named_solid, read_triangles
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
@@ -107,7 +108,8 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
     """Read a surface and refuse one that bounds no solid.
 
     Args:
-        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed.
+        path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP where gmsh is installed; of several
+            solids in a STEP file one, ``part.step#name``.
         unit: of the file's coordinates: m, cm, mm, um or inch; a STEP file states its
             own, which counts.
 
@@ -120,14 +122,14 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
     """
     if unit not in UNITS:
         raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
-    path = Path(path)
-    points, triangles = _read_triangles(path)
-    if path.suffix.lower() in {".step", ".stp"}:
+    file, solid = named_solid(path)
+    points, triangles = _read_triangles(file, solid)
+    if file.suffix.lower() in STEP:
         unit = "m"
     return check_surface(points * UNITS[unit], triangles, str(path), unit)
 
 
-def _read_triangles(path: Path) -> tuple[NDArray, NDArray]:
+def _read_triangles(path: Path, solid: str) -> tuple[NDArray, NDArray]:
     """Points and triangles of a file, in its unit."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
@@ -138,9 +140,7 @@ def _read_triangles(path: Path) -> tuple[NDArray, NDArray]:
                 raise BadInput(f"{path}: the file is empty")
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
-    from stiffness.surface.surface_files import read_triangles
-
-    return read_triangles(path)
+    return read_triangles(path, solid)
 
 
 def check_surface(

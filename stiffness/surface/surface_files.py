@@ -2,22 +2,40 @@
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.table import BadInput, nearest, quoted
 
+STEP = (".step", ".stp")
 _FACETS = 48  # of a full circle, in STEP
 
 
-def read_triangles(path: Path | str) -> tuple[NDArray, NDArray]:
+def named_solid(path: Path | str) -> tuple[Path, str]:
+    """A surface file, and which of the solids of a STEP file is meant.
+
+    Args:
+        path: of a file, or ``part.step#name``.
+
+    Returns:
+        The file, and the name; empty where none is given.
+    """
+    file, mark, name = str(path).rpartition("#")
+    if mark and Path(file).suffix.lower() in STEP:
+        return Path(file), name
+    return Path(path), ""
+
+
+def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]:
     """Points and triangles of a surface file, in the file's unit; STEP in metres.
 
     Args:
         path: an existing file of a known kind.
+        solid: of a STEP file with several, by its name.
 
     Returns:
         (n, 3) points and (m, 3) indices of points.
@@ -28,7 +46,9 @@ def read_triangles(path: Path | str) -> tuple[NDArray, NDArray]:
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    read = {".msh": _msh, ".step": _step, ".stp": _step}.get(suffix, _with_vtk)
+    read = {".msh": _msh}.get(suffix, _with_vtk)
+    if suffix in STEP:
+        read = partial(_step, solid=solid)
     try:
         points, faces = read(path)
     except BadInput:
@@ -77,8 +97,8 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
     return _boundary(pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 
 
-def _step(path: Path) -> tuple[NDArray, NDArray]:
-    """STEP cut into fine triangles, in metres by the file's own unit."""
+def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
+    """A solid of a STEP file cut into fine triangles, in metres by its own unit."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -93,11 +113,34 @@ def _step(path: Path) -> tuple[NDArray, NDArray]:
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         gmsh.open(str(path))
+        sides = _sides(gmsh.model, path, solid)
         gmsh.model.mesh.generate(2)
         tags, points, _ = gmsh.model.mesh.getNodes()
-        corners = gmsh.model.mesh.getElementsByType(2)[1]
+        corners = np.concatenate([
+            gmsh.model.mesh.getElementsByType(2, side)[1] for side in sides
+        ])
     finally:
         gmsh.finalize()
+    used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
     index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
     index[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3), index[corners.astype(np.int64)].reshape(-1, 3)
+    return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
+
+
+def _sides(model: Any, path: Path, solid: str) -> list[int]:
+    """Faces of the solid that is meant, which must be named if there are several."""
+    solids = dict[str, int]()
+    for _, tag in model.getEntities(3):
+        own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
+        solids[own if own not in solids else f"{own}-{tag}"] = tag
+    if solid and solid not in solids:
+        raise BadInput(f"{path}: no solid {quoted(solid)}{nearest(solid, solids)}")
+    if not solid and len(solids) > 1:
+        names = ", ".join(list(solids)[:20])
+        raise BadInput(
+            f"{path}: found {len(solids)} solids ({names}), expected which one, such "
+            f"as {path.name}#{next(iter(solids))}"
+        )
+    if not solid:  # one, or faces that belong to none
+        return [tag for _, tag in model.getEntities(2)]
+    return [tag for _, tag in model.getBoundary([(3, solids[solid])], oriented=False)]

@@ -72,8 +72,10 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats = np.sqrt(squares / between) if between else np.nan
     against = 1.0
     if between and freedom > between:
-        # what repeats do not share with the rest: lack of fit over pure error
-        ratio = ((rss - squares) / (freedom - between)) / (squares / between)
+        # what repeats do not share with the rest: lack of fit over pure error, which
+        # is nothing where a device rounds and repeats are equal
+        excess, pure = (rss - squares) / (freedom - between), squares / between
+        ratio = excess / pure if pure else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
     return LackOfFit(
         float(np.sqrt(rss / freedom)), freedom, float(chi2.sf(rss, freedom)),
@@ -114,8 +116,8 @@ def _repeats(
         return 0.0, 0
     order = np.argsort(group, kind="stable")
     _, start, count = np.unique(group[order], return_index=True, return_counts=True)
-    sums = np.add.reduceat(residual[order], start)
-    squares = np.add.reduceat(residual[order] ** 2, start) - sums**2 / count
+    mean = np.add.reduceat(residual[order], start) / count
+    squares = np.add.reduceat((residual[order] - np.repeat(mean, count)) ** 2, start)
     return float(squares[count > 1].sum()), int((count[count > 1] - 1).sum())
 
 

@@ -19,6 +19,7 @@ from forcefit.inputs.table import read_text
 from validation.campaign.dialect import parse_number
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254}
+LARGEST = 1e12  # of any number of a table
 DATES = ("day_first", "month_first")
 _NAMES = {"name", "point", "pointid", "pointname", "target", "id", "label", "group",
           "groupname", "collection", "collectionname", "targetname"}  # fmt: skip
@@ -207,7 +208,7 @@ def _number(
 ) -> float:
     """A finite number of a cell."""
     value = parse_number(cell, writing.decimal)
-    if abs(value) <= 1e12:
+    if abs(value) <= LARGEST:
         return value
     other = "," if writing.decimal == "." else "."
     hint = ""

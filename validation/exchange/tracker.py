@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
-from forcefit.inputs.writing import write_text
+from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
+from validation.exchange.bag import is_bag, read_bag
 from validation.exchange.commands_table import Commands, read_commands
 from validation.exchange.device_frame import (
     DeviceFrame,
@@ -86,7 +87,7 @@ def import_readings(
     """Make a campaign of a device's files.
 
     Args:
-        files: exports of the device.
+        files: exports of the device, or ROS bags of what it read.
         targets: what was measured on (:mod:`validation.exchange.targets_file`).
         commands: what was commanded (:mod:`validation.exchange.commands_table`).
         folder: to be written; it must be absent or empty.
@@ -99,23 +100,21 @@ def import_readings(
             readings would be left out; nothing is written then.
     """
     folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise BadInput(f"{folder}: found something there, expected a new folder")
+    check_new_folder(folder)
     declared = read_targets(targets)
     commands_read = read_commands(commands, declared.robot, declared.writing)
-    readings = [r for file in files for r in read_device_table(file, declared.writing)]
+    readings: list[Reading] = []
+    for file in files:
+        writing = declared.writing
+        readings += read_bag(file) if is_bag(file) else read_device_table(file, writing)
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, commands_read, declared.places, declared.window)
     imported = _campaign(declared, commands_read, joined, folder, len(readings))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise BadInput(f"{folder}: cannot be made: {reason}") from None
     rows = [",".join(row) for row in (imported.header, *imported.cells)]
-    write_text("\n".join(rows) + "\n", folder / "measurements.csv")
-    write_text(imported.declaration, folder / "campaign.toml")
+    with whole_folder(folder) as part:
+        write_text("\n".join(rows) + "\n", part / "measurements.csv")
+        write_text(imported.declaration, part / "campaign.toml")
     return imported
 
 

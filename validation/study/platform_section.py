@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from assembly.report.platform_stiffness import DIRECTIONS, plot_shares, share_rows
-from forcefit.page.page import picture
+from assembly.report.platform_stiffness import DIRECTIONS, share_rows
+from forcefit.page.charts import Axis, chart, label
 from forcefit.page.tables import table
 from stiffness.screws import SCREW
 
@@ -47,5 +47,15 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         "<p>Which part gives way: shares in the compliance along each axis [%], the "
         "largest first.</p>"
         + table(["part", *DIRECTIONS], blame)
-        + picture(plot_shares(stiffness), "Shares of links and joints.")
+        + _chart(dict(shares))
     )
+
+
+def _chart(shares: dict[str, list[float]]) -> str:
+    """The largest shares, a bar for each direction."""
+    traces = [
+        {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row}
+        for name, row in shares.items()
+    ]
+    share = Axis("share of the compliance", options={"tickformat": ".0%"})
+    return chart(traces, Axis(""), share, "The parts of the table.", bars="stack")

@@ -20,6 +20,7 @@ from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.surface.surface import UNITS
+from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales
 
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
@@ -117,7 +118,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
     """The files that a study is made of, each once."""
     robot = path.parent / root.text("robot")
-    surfaces = (Path(mesh.surface) for mesh in meshes.values())
+    surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
         dict.fromkeys([path, *([robot] if robot.is_file() else []), *surfaces])
     )

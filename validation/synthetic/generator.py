@@ -9,7 +9,6 @@ The folder written holds what a measuring machine would hand over.  What was hid
 kept apart from it, in the layout of the practice campaigns' truth.
 """
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
-from forcefit.inputs.writing import check_writable, unwritable, write_text
+from forcefit.inputs.writing import whole_folder, write_text
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row
@@ -251,21 +250,6 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
 
 
-def check_folder(folder: Path | str) -> None:
-    """Refuse a folder that a campaign cannot be written to, before the work.
-
-    Args:
-        folder: new, or empty.
-
-    Raises:
-        BadInput: it holds something already, or cannot be written.
-    """
-    folder = Path(folder)
-    check_writable(folder.parent / f"{folder.name}.new")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise BadInput(f"{folder}: found something there, expected a new folder")
-
-
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
     """Write campaign.toml, measurements.csv and robot.toml, all or none of them.
 
@@ -276,20 +260,10 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
     Raises:
         BadInput: the folder holds something already or cannot be written.
     """
-    folder = Path(folder)
-    check_folder(folder)
-    part = folder.with_name(folder.name + ".part")
-    shutil.rmtree(part, ignore_errors=True)
-    try:
-        part.mkdir()
+    with whole_folder(folder) as part:
         write_robot(campaign.robot, part / "robot.toml")
         write_text(_toml(campaign), part / "campaign.toml")
         write_text(_table(campaign), part / "measurements.csv")
-        part.replace(folder)
-    except OSError as error:
-        raise BadInput(unwritable(folder, error)) from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _toml(campaign: Synthetic) -> str:

@@ -3,9 +3,17 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import place_robot
+from assembly.model.error_distributions import read_sources
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
+from assembly.statistics.tolerances import grid_postures, present_errors
 from tests.pages_for_tests import parse
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
@@ -51,7 +59,8 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
     expected = [translation["mean"]["value"], translation["most_probable"]["value"]]
     expected += [translation["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
     assert [c.value for c in cells] == expected
-    counted = [figure["traces"][0] for figure in seen.figures]
+    charts = [figure for figure in seen.figures if "traces" in figure]
+    counted = [figure["traces"][0] for figure in charts]
     bins = [one for one in counted if one["type"] == "bar" and "orientation" not in one]
     assert {sum(one["y"]) for one in bins} == {100}
     shares = summary["importance"]["quantities"]["translation"]["total_index"]
@@ -105,3 +114,44 @@ def test_a_page_that_cannot_be_written_is_refused_before_the_work(
     )  # fmt: skip
     assert (status, printed) == (2, "")
     assert 'found the ending ".txt", expected an HTML page' in err
+
+
+def test_the_robot_of_the_page_is_a_draw_solved_alone():
+    """Its platform is where its own assembly, outside the experiment, puts it."""
+    posture = place_robot(load_robot("hexapod"))
+    experiment = Experiment(
+        posture, read_sources(ERRORS, posture.robot), seed=3, clearance_model="least"
+    )
+    data = run_draws(experiment, 40)
+    (scene,) = parse(drawn_robot(experiment, data)).figures
+    sizes = data["translation"].values
+    draw = int(np.argmin(np.abs(sizes - np.quantile(sizes, 0.95))))
+    platform = posture.robot.index(posture.robot.platform)
+    moved = np.array(scene["bodies"][platform]["moved"][-1])
+    assert np.linalg.norm(moved) == pytest.approx(sizes[draw], rel=1e-6)
+    assert moved == pytest.approx(data["platform_screw"].values[draw, 3:], rel=1e-6)
+
+
+def test_margins_over_a_grid_are_a_map_and_the_largest_a_robot():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1")
+    present = present_errors(postures)
+    (drawn,) = parse(margin_map(postures, present)).figures
+    values = np.array(drawn["layers"][0]["values"])
+    for posture, margin in zip(postures, present["margins"], strict=True):
+        i, j = (drawn["axes"][a]["values"] for a in "xy")
+        pose = posture.pose()
+        there = values[np.argmin(np.abs(np.array(i) - pose["tx"])),
+                       np.argmin(np.abs(np.array(j) - pose["tz"]))]  # fmt: skip
+        assert there == margin
+    assert np.max(values) == present["largest_margin"]
+    (scene,) = parse(tightest_robot(postures, present)).figures
+    assert {one["name"] for one in scene["bodies"]} == {f.name for f in robot.frames}
+
+
+def test_a_line_of_postures_is_a_curve_and_one_posture_no_map():
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    for grid, figures in (("tx=-0.1:0.1:0.1,tz=-0.5", 1), ("tx=0,tz=-0.5", 0)):
+        postures = grid_postures(robot, grid)
+        shown_map = margin_map(postures, present_errors(postures))
+        assert len(parse(shown_map).figures) == figures

@@ -86,7 +86,7 @@ def test_a_page_fetches_nothing_and_is_small():
     assert parse(text).fetched == []
     assert "@import" not in text
     assert "url(" not in text
-    assert 1_000_000 < len(text) < SIZE  # with plotly.js
+    assert 700_000 < len(text) < SIZE  # with plotly.js
     assert len(written()) < 50_000  # nothing to draw
     assert written() == written()
 
@@ -137,7 +137,7 @@ def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     )
     assert rows["SHA-256 of gone.toml"].startswith("cannot be read any more")
-    assert {"forcefit", "Python", "numpy", "clarabel", "plotly"} <= set(rows)
+    assert {"forcefit", "Python", "numpy", "clarabel"} <= set(rows)
 
 
 @pytest.mark.parametrize(
@@ -151,3 +151,7 @@ def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
 def test_what_holds_no_results_is_refused(text, message):
     with pytest.raises(BadInput, match=message):
         results_in(text, "x")
+
+
+def test_an_integer_that_no_float_holds_is_infinite():
+    assert results_in(f'{{"a": {"9" * 400}, "b": 3}}', "x") == {"a": np.inf, "b": 3}

@@ -325,3 +325,34 @@ def test_from_a_beam_to_nastran_and_back(run, tmp_path):
     )
     assert status == 2
     assert "found no stiffness, base and tip" in err
+
+
+def test_only_a_matrix_of_the_same_format_is_replaced(run, tmp_path):
+    link, out = tmp_path / "rod.json", tmp_path / "rod.mtx"
+    assert run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
+               "--poisson", 0.3, "--json", link)[0] == 0  # fmt: skip
+    words = ["stiffness", "export", link, "-o", out, "--to"]
+    assert run(*words, "matrix-market")[0] == 0
+    assert run(*words, "matrix-market", "--unit", "mm")[0] == 0
+    before = out.read_bytes()
+    status, _, err = run(*words, "nastran")
+    assert (status, out.read_bytes()) == (2, before)
+    assert "found a file that is not a matrix for nastran" in err
+
+
+def test_numbers_whose_products_are_none_are_refused(run, tmp_path):
+    link = tmp_path / "rod.json"
+    K = np.diag([1e300, 1, 1, 1, 1, 1]).tolist()
+    link.write_text(json.dumps({"stiffness": K, "base": [0] * 3, "tip": [0, 0, 1]}))
+    status, _, err = run("stiffness", "export", link, "--to", "abaqus", "-o",
+                         tmp_path / "rod.mtx")  # fmt: skip
+    assert status == 2
+    assert "numbers above 1e100" in err
+    assert not (tmp_path / "rod.mtx").exists()
+
+
+def test_a_matrix_of_no_link_s_size_is_refused(tmp_path):
+    path = tmp_path / "rod.npy"
+    np.save(path, 1e200 * np.eye(12))
+    with pytest.raises(BadInput, match="not finite, or above 1e100"):
+        import_link(path)

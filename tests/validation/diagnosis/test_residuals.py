@@ -96,6 +96,17 @@ def test_scatter_between_repeats_by_hand():
     assert found.rms == pytest.approx(np.sqrt(2510 / 2))
 
 
+def test_repeats_that_are_equal_leave_no_noise_to_blame():
+    """A device that rounds: what is left at all is a lack of fit."""
+    seen = np.full((4, 6), np.nan)
+    seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
+    campaign = campaign_of(seen, repeat=[0, 0, 1, 1])
+    judged = lack_of_fit(campaign, whiten(campaign, seen), 1)
+    assert (judged.repeats, judged.repeats_freedom) == (0.0, 2)
+    assert judged.against_repeats == 0.0
+    assert lack_of_fit(campaign, np.zeros(4), 1).against_repeats == 1.0
+
+
 def test_the_same_command_on_a_warmer_day_is_no_repeat():
     """Within a thirtieth of the range it is; time is no difference."""
     seen = np.full((4, 6), np.nan)

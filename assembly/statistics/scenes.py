@@ -1,0 +1,107 @@
+"""Robots of an experiment to be turned in its page, and margins over a workspace."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.report.scene import robot_scene
+from assembly.solvers.conic import SolverFailed
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.plot import NAMES
+from forcefit.page.charts import Axis, Layer, value_map
+
+if TYPE_CHECKING:
+    import xarray
+
+_QUANTILE = 0.95
+_CAPTION = (
+    "Nominal (grey) and forced robot. Red: elastic links; blue: rigid bodies; orange: "
+    "driven joints."
+)
+
+
+def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
+    """The draw whose pose error is nearest to its 95 % quantile, assembled.
+
+    Args:
+        experiment: that gave the draws.
+        data: the draws, numbered from 0.
+
+    Returns:
+        HTML of a scene; empty where no draw assembles.
+    """
+    solved = data["status"].values == 0
+    for key in ("translation", "energy"):
+        values = np.where(solved, data[key].values, np.nan)
+        known = np.isfinite(values)
+        if known.any():
+            break
+    else:
+        return ""
+    level = float(np.quantile(values[known], _QUANTILE))
+    draw = int(np.nanargmin(np.abs(np.where(known, values, np.nan) - level)))
+    drawn = experiment.sources.draw(draw, 1, experiment.seed)
+    errors = experiment.sources.errors(drawn)[0]
+    robot = experiment.posture.robot.with_errors(errors)
+    forced = solve_assembly(
+        replace(experiment.posture, robot=robot),
+        experiment.load, gravity=experiment.gravity,
+    )  # fmt: skip
+    text = f"{_CAPTION} Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them."
+    return robot_scene(forced, None, None, text)
+
+
+def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
+    """The robot where its margin is largest, assembled with the errors it has.
+
+    Args:
+        postures: that were judged.
+        present: of :func:`assembly.statistics.tolerances.present_errors`.
+
+    Returns:
+        HTML of a scene; empty where it cannot be assembled.
+    """
+    worst = postures[int(np.nanargmax(present["margins"]))]
+    try:
+        forced = solve_assembly(worst)
+    except (CannotAssemble, SolverFailed):
+        return ""
+    text = f"{_CAPTION} The posture of the largest margin, with the errors there are."
+    return robot_scene(forced, None, None, text)
+
+
+def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
+    """Margins over the postures of a grid.
+
+    Args:
+        postures: that were judged.
+        present: of :func:`assembly.statistics.tolerances.present_errors`.
+
+    Returns:
+        HTML of a map; empty where the grid has no axis or more than two.
+    """
+    poses = [posture.pose() for posture in postures]
+    values = {name: np.array([pose[name] for pose in poses]) for name in poses[0]}
+    varied = {name: v.round(9) for name, v in values.items() if np.ptp(v) > 1e-9}
+    if not 1 <= len(varied) <= 2:
+        return ""
+    ticks = {name: np.unique(v) for name, v in varied.items()}
+    at = tuple(np.searchsorted(ticks[name], v) for name, v in varied.items())
+    margins = np.full([len(v) for v in ticks.values()], np.nan)
+    margins[at] = present["margins"]
+    states = np.full(margins.shape, "out of reach", dtype=object)
+    states[at] = np.where(
+        np.asarray(present["margins"]) <= 1.0, "goes together", "needs force"
+    )
+    axes = [
+        (Axis(name, "m" if name.startswith("t") else "rad"), v)
+        for name, v in ticks.items()
+    ]
+    title = f"zone margin, eq. (21), compliant joints {present['compliant']}"
+    layer = Layer("margin", title, "", margins)
+    caption = "Up to 1 it goes together by its clearances alone."
+    return value_map(axes, [layer], states.astype(str), caption)

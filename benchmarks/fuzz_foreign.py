@@ -1,0 +1,104 @@
+"""Sound files of other programs and commands that read them: ``fuzz.py --foreign``.
+
+Robots and matrices are written by forcefit itself, then in the words of the format;
+what a device exports is made here.
+"""
+
+from pathlib import Path
+
+OVERLAY = """[[frame]]
+name = "*.elbow"
+clearance = { radial = 2e-5, axial = 2e-5, tilt = 5e-4 }
+"""
+SDF = """<sdf version="1.9"><model name="bar">
+<link name="crank"><inertial><mass>0.5</mass></inertial></link>
+<link name="coupler"><pose>0.1 0 0 0 0 0</pose></link>
+<link name="rocker"><pose relative_to="coupler">0.3 0 0 0 0 0</pose></link>
+<joint name="drive" type="revolute"><parent>world</parent><child>crank</child>
+ <axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="pin_a" type="revolute"><parent>crank</parent><child>coupler</child>
+ <axis><xyz expressed_in="__model__">0 0 1</xyz></axis></joint>
+<joint name="pin_b" type="revolute"><parent>coupler</parent><child>rocker</child>
+ <axis><xyz>0 0 1</xyz></axis></joint>
+<joint name="pin_c" type="revolute"><pose relative_to="__model__">0.3 0 0 0 0 0</pose>
+ <parent>rocker</parent><child>world</child><axis><xyz>0 0 1</xyz></axis></joint>
+</model></sdf>
+"""
+TARGETS = """robot = "arm.toml"
+unit = "mm"
+noise = 1e-5
+dates = "day_first"
+[targets]
+A = [0.0, 0.0, 0.1]
+B = [0.1, 0.02, 0.0]
+C = [0.0, 0.07, 0.03]
+"""
+NODES = "1,0,0,0\n2,0.3,0,0\n"
+
+# weight, command; names of files that come with the seeds, or that MADE_FOREIGN makes
+FOREIGN = [
+    (6, "convert five.urdf -o new.toml"),
+    (3, "convert five.urdf --loops loops.yaml --overlay overlay.toml -o new.toml"),
+    (5, "convert five.xml -o new.toml"),
+    (5, "convert bar.sdf -o new.toml"),
+    (2, "convert five.toml -o new.urdf"),
+    (2, "convert five.toml -o new.xml"),
+    (4, "stiffness import rod.mtx --json new.json"),
+    (3, "stiffness import rod.mtx --nodes nodes.csv --base 1 --tip 2 --json -"),
+    (4, "stiffness import element.mtx --unit mm --json -"),
+    (4, "stiffness import rod.pch --json new.json"),
+    (4, "stiffness import rod.npy --json -"),
+    (4, "stiffness export rod.json --to nastran -o new.pch"),
+    (6, "validation import named.txt --targets smr.toml --commands commands.csv "
+        "-o newfolder"),
+    (4, "validation import timed.csv --targets smr.toml --commands commands.csv "
+        "-o newfolder --json new.json"),
+    (3, "report compare rod.json other.json -o new.html"),
+]  # fmt: skip
+
+MADE_FOREIGN = [
+    "convert five_bar -o five.urdf", "convert five_bar -o five.xml",
+    "convert five_bar -o five.toml",
+    "stiffness beam --length 0.3 --young 7e10 --poisson 0.3 --radius 0.02 "
+    "--json rod.json",
+    "stiffness beam --length 0.3 --young 7e10 --poisson 0.3 --radius 0.03 "
+    "--json other.json",
+    "stiffness export rod.json --to matrix-market -o rod.mtx",
+    "stiffness export rod.json --to abaqus --unit mm -o element.mtx",
+    "stiffness export rod.json --to nastran -o rod.pch",
+    "stiffness export rod.json --to numpy -o rod.npy",
+]  # fmt: skip
+
+
+def write_foreign(folder: Path) -> None:
+    """All foreign files but those that commands make.
+
+    Args:
+        folder: with the robot ``arm.toml``.
+    """
+    from assembly.files.robot_file import read_robot
+    from assembly.kinematics.posture import place_robot
+
+    robot = read_robot(folder / "arm.toml")
+    drives = [frame.name for frame in robot.frames if frame.actuated]
+    platform = robot.index(robot.platform)
+    points = {"A": (0, 0, 0.1), "B": (0.1, 0.02, 0), "C": (0, 0.07, 0.03)}
+    commands = ["id," + ",".join(f"q.{name}" for name in drives) + ",time"]
+    named, timed = [], ["name,x [mm],y [mm],z [mm],U95 [um],timestamp"]
+    for k in range(6):
+        angles = [0.2 + 0.15 * k + 0.1 * j for j in range(len(drives))]
+        cells = ",".join(f"{angle:.3f}" for angle in angles)
+        commands.append(f"p{k},{cells},2026-11-22T10:{k:02d}:00")
+        at = place_robot(robot, joints=dict(zip(drives, angles, strict=True)))
+        for name, point in points.items():
+            x, y, z = 1e3 * (at.transforms[platform] @ [*point, 1.0])[:3]
+            named.append(f"Main::p{k}::{name}, {x:.4f}, {y:.4f}, {z:.4f}")
+            timed.append(f"{name},{x:.4f},{y:.4f},{z:.4f},20,2026-11-22T10:{k:02d}:02")
+    texts = {
+        "overlay.toml": OVERLAY, "bar.sdf": SDF, "smr.toml": TARGETS,
+        "nodes.csv": NODES, "loops.yaml": "closed_loop: []\nname_mot: []\n",
+    }  # fmt: skip
+    lines = {"commands.csv": commands, "named.txt": named, "timed.csv": timed}
+    texts |= {name: "\n".join(some) + "\n" for name, some in lines.items()}
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")

@@ -1,0 +1,125 @@
+"""Families of CAD parts: a table of files and sizes, and entries between them."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.link import LinkStiffness, inverted, scaled
+from stiffness.report.library import look_up, read_library
+from stiffness.report.library_build import build_library, read_spec
+from stiffness.report.library_surface import SurfaceLink
+from tests.libraries_for_tests import exact
+
+SPEC = """
+library = "links"
+[[family]]
+name = "rod"
+table = "rods.csv"
+base = "z=0"
+tip = "z={length}"
+young = 6e10
+poisson = 0.3
+"""
+LENGTHS = (0.2, 0.3, 0.4, 0.5, 0.6)
+
+
+@pytest.fixture
+def parts(tmp_path, monkeypatch):
+    """A folder with the files of five rods, each solved in closed form."""
+    asked = []
+
+    def solve(link):
+        asked.append(link)
+        length, radius = link.sizes["length"], link.sizes["radius"]
+        C = inverted(exact(length, radius, link.young))
+        tip = np.array([0.0, 0.0, length])
+        return LinkStiffness("closed form", C, tip=tip, base=np.zeros(3))
+
+    monkeypatch.setattr(SurfaceLink, "solve", solve)
+    rows = [f"rod{k}.stl,{length},0.02" for k, length in enumerate(LENGTHS)]
+    for k in range(len(LENGTHS)):
+        (tmp_path / f"rod{k}.stl").write_text(f"solid {k}")
+    (tmp_path / "rods.csv").write_text("\n".join(["surface,length,radius", *rows]))
+    (tmp_path / "spec.toml").write_text(SPEC)
+    return tmp_path, asked
+
+
+def test_a_row_is_an_entry_with_its_sizes(parts):
+    folder, asked = parts
+    files = build_library(read_spec(folder / "spec.toml"))
+    assert [one.tip for one in asked] == [f"z={length!r}" for length in LENGTHS]
+    assert files[0].stem == "rod-length0.2-radius0.02"
+    entries = read_library(folder / "links")
+    assert entries[2].parameters["length"] == 0.4
+    build_library(read_spec(folder / "spec.toml"))
+    assert len(asked) == len(LENGTHS)  # nothing is made again
+
+
+def test_a_changed_size_is_made_again(parts):
+    folder, asked = parts
+    build_library(read_spec(folder / "spec.toml"))
+    (folder / "rod1.stl").write_text("solid changed")
+    build_library(read_spec(folder / "spec.toml"))
+    assert [one.surface.name for one in asked[len(LENGTHS) :]] == ["rod1.stl"]
+
+
+@pytest.mark.parametrize("length", [0.25, 0.37, 0.55])
+def test_between_stored_sizes_the_error_stated_holds_the_closed_form(parts, length):
+    folder, _ = parts
+    build_library(read_spec(folder / "spec.toml"))
+    K, error = look_up(read_library(folder / "links"), {"length": length})
+    truth = exact(length, 0.02)
+    assert (np.abs(K - truth) <= error + 1e-9 * np.abs(truth).max()).all()
+    assert np.abs(scaled(error, truth)).max() < 0.02
+
+
+def test_an_entry_left_out_is_within_the_error_the_others_state(parts):
+    folder, _ = parts
+    build_library(read_spec(folder / "spec.toml"))
+    entries = read_library(folder / "links")
+    for left in entries[1:-1]:  # those between others
+        others = [one for one in entries if one is not left]
+        K, error = look_up(others, {"length": left.parameters["length"]})
+        gap = np.abs(scaled(K - left.stiffness, left.stiffness))
+        assert gap.max() <= scaled(error, left.stiffness).max()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("surface,length", "file,length", "rods.csv: line 1: found .*expected surface"),
+        ("rod1.stl", "gone.stl", "rods.csv: line 3: found no file .*gone.stl"),
+        ("0.3,0.02", "0.3", "rods.csv: line 3: found 2 cells, expected 3"),
+        ("0.3,0.02", "thick,0.02", "line 3, length: found 'thick', expected a length"),
+        ("0.3,0.02", "-0.3,0.02", "line 3, length: found '-0.3', expected a length"),
+        ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
+    ],
+)
+def test_a_wrong_table_is_one_line(parts, old, new, message):
+    folder, _ = parts
+    table = folder / "rods.csv"
+    table.write_text(table.read_text().replace(old, new, 1))
+    with pytest.raises(BadInput, match=message) as error:
+        read_spec(folder / "spec.toml")
+    assert "\n" not in str(error.value)
+
+
+def test_an_interface_may_name_only_sizes_there_are(parts):
+    folder, _ = parts
+    (folder / "spec.toml").write_text(SPEC.replace("{length}", "{height}"))
+    with pytest.raises(BadInput, match="line 2: tip"):
+        read_spec(folder / "spec.toml")
+
+
+def test_of_several_families_one_is_asked_for(parts):
+    folder, _ = parts
+    second = SPEC.partition("[[family]]")[2].replace('"rod"', '"bar"')
+    (folder / "spec.toml").write_text(SPEC + "[[family]]" + second)
+    build_library(read_spec(folder / "spec.toml"))
+    entries = read_library(folder / "links")
+    with pytest.raises(BadInput, match="found families bar, rod, expected one"):
+        look_up(entries, {"length": 0.3})
+    with pytest.raises(BadInput, match='no family "rood"'):
+        look_up(entries, {"length": 0.3}, "rood")
+    K, _ = look_up(entries, {"length": 0.3}, "rod")
+    assert np.abs(scaled(K - exact(0.3, 0.02), K)).max() < 1e-12

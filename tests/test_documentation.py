@@ -1,0 +1,305 @@
+"""Every code block of the documentation's pages is run; tutorials have their own test.
+
+Of each command line the options exist; of each page, in an empty folder with the files
+it speaks of, the commands run and the Python runs.  Options in brackets are given.
+"""
+
+import re
+import shlex
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+import typer
+
+import forcefit as ff
+from forcefit.commands.app import app
+from tests.test_tutorials import BLOCK, DOCS, ROOT, blocks
+
+PAGES = {path.stem: path for path in [*DOCS.glob("*.md"), ROOT / "README.md"]}
+# with the tutorials; large files
+OTHERS = {"measuring_protocol", "platform_stiffness", "measured_data"}
+# commands of this repository, a cluster, and what takes minutes with more of the same
+NOT_RUN = ("make ", "python ", "dask ", ".ci/run")
+CLUSTER = ("dask_jobqueue", "dask_kubernetes")
+FEWER = {
+    "--draws 100000": "--draws 200", "--draws 10000 ": "--draws 200 ",
+    "--draws 2000": "--draws 200", "--draws 1000": "--draws 4",
+    "--importance 2048": "--importance 32", "tx=-0.4:0.4:0.05,": "tx=-0.1:0.1:0.1,",
+    "tz=-0.6:-0.3:0.05": "tz=-0.5:-0.4:0.1", "--ratios 4,8,16,32": "--ratios 4,8",
+    "tx=-0.4:0.4:0.1,tz=-0.5 --solids": "tx=-0.1:0.1:0.1,tz=-0.5 --solids",
+    "radius=0.02:0.05:0.005": "radius=0.02:0.03:0.01", "--workers 2 ": "",
+    "tx=-0.2:0.2:0.1,": "tx=-0.1:0.1:0.1,", "0:1.5:0.1": "0:0.2:0.1",
+    "force=500": "force=500 --draws 100",
+}  # fmt: skip
+NAMES = {
+    "ROBOT": "irsbot2",
+    "FOLDER": "made",
+    "FILE.csv": "table.csv",
+    "FILE": "answer.json",
+}
+
+
+def command_lines(text):
+    """The command lines of a block of ``sh``, whole, without comments or brackets."""
+    whole = re.sub(r"\\\n\s*", "", text)
+    for line in whole.splitlines():
+        words = shlex.split(re.sub(r"[\[\]]", "", line), comments=True)
+        if words:
+            yield [NAMES.get(word, word) for word in words]
+
+
+def commands_of(page):
+    """Those of forcefit, of all blocks of a page."""
+    for language, _, text in blocks(page):
+        if language == "sh":
+            for words in command_lines(text):
+                if not " ".join(words).startswith(NOT_RUN):
+                    assert words[0] == "forcefit", words
+                    yield words[1:]
+
+
+def parsed(words):
+    """The parser's context of a command, which is not called."""
+    command, name = typer.main.get_command(app), words[0]
+    while hasattr(command, "commands"):
+        name, *words = words
+        command = command.commands[name]
+    return command.make_context(name, list(words))
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_the_commands_of_a_page_exist_with_their_options(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words in commands_of(PAGES[name]):
+        parsed(words)
+
+
+def test_every_block_of_a_page_states_its_language():
+    """A block without one would not be run."""
+    for page in PAGES.values():
+        text = page.read_text(encoding="utf-8")
+        fences = re.findall(r"^```.*$", text, re.M)
+        assert len(fences) == 2 * len(BLOCK.findall(text)), page.name
+
+
+FOUND = """
+[[effect]]
+name = "encoder_offset"
+parameters = { joint2 = 1e-3 }
+[[effect]]
+name = "function"
+where = "joint2"
+components = ["rz"]
+variables = ["q.joint2"]
+form = "waves"
+parameters = { "1.sine" = 1.2e-4, "1.cosine" = -3e-5 }
+"""
+CRANK = """
+name = "crank"
+platform = "tip"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+joint_stiffness = [inf, inf, 1e5, inf, inf, inf]
+[[frame]]
+name = "tip"
+parent = "drive"
+translation = [0.3, 0, 0]
+"""
+
+
+def test_every_table_of_a_page_is_toml():
+    for page in PAGES.values():
+        for language, _, text in blocks(page):
+            if language == "toml":
+                tomllib.loads(text)
+
+
+# the files that pages speak of -------------------------------------------------------
+def arm(folder, run):
+    """A machine with an effect, as a campaign and as a robot file; targets for it."""
+    shutil.copytree(
+        ROOT / "tests" / "campaigns" / "encoder_offset", folder / "CAMPAIGN"
+    )
+    robot = (folder / "CAMPAIGN" / "robot.toml").read_text()
+    (folder / "corrected.toml").write_text(robot + FOUND)
+    table = (folder / "CAMPAIGN" / "measurements.csv").read_text().splitlines()
+    heads = table[0].split(",")
+    kept = [k for k, head in enumerate(heads) if not head.startswith("meas")]
+    rows = [",".join(row.split(",")[k] for k in kept) for row in table[:6]]
+    for name in ("targets.csv", "table.csv"):
+        (folder / name).write_text("\n".join(rows) + "\n")
+
+
+def campaign(folder, run):
+    """Measurements of a machine that lacks nothing but its weight."""
+    shutil.copytree(ROOT / "tests" / "campaigns" / "self_weight", folder / "CAMPAIGN")
+
+
+def crank(folder, run):
+    """A machine of one drive with the effects that the page writes down."""
+    effects = next(text for language, _, text in blocks(DOCS / "effects.md")
+                   if language == "toml")  # fmt: skip
+    (folder / "corrected.toml").write_text(CRANK + effects)
+
+
+def runs(folder, run):
+    """The pages of two runs."""
+    from forcefit.page.page import Page, Provenance, page
+
+    for name, worst in (("before", 2.0), ("after", 1.0)):
+        about = Page(name, "", True, [], "", [], [], Provenance(), {"worst": worst})
+        (folder / f"{name}.html").write_text(page(about))
+
+
+def tracker(folder, run):
+    """A device's export of a Delta robot, with repeats, and its commands."""
+    delta = ff.load_robot("delta")
+    run("convert", "delta", "-o", folder / "delta.toml")
+    platform = delta.index(delta.platform)
+    rng = np.random.default_rng(1)  # exact repeats are none
+    points = {"SMR1": [0.05, 0.0, 0.02], "SMR2": [-0.03, 0.04, 0.02]}
+    home = ff.place_robot(delta).transforms[platform][:3, 3]
+    lines, commands = [], ["id;pose.tx;pose.ty;pose.tz"]
+    for k in range(24):
+        shift = home + 0.02 * np.array([
+            np.cos(k % 6),
+            np.sin(k % 6),
+            np.cos(2 * k % 12),
+        ])
+        placed = ff.place_robot(
+            delta, pose=dict(zip(("tx", "ty", "tz"), shift, strict=True))
+        )
+        commands.append(";".join([f"p{k}", *(f"{v:.9f}" for v in shift)]))
+        for name, point in points.items():
+            seen = placed.transforms[platform] @ [*point, 1.0]
+            seen = 1e3 * seen[:3] + 100.0 + rng.normal(0.0, 0.005, 3)
+            x, y, z = (f"{v:.5f}".replace(".", ",") for v in seen)
+            lines.append(f"A::p{k}::{name}; {x}; {y}; {z}")
+    for name in ("spatial_analyzer.txt", "export.txt"):
+        (folder / name).write_text("\n".join(lines) + "\n")
+    (folder / "commands.csv").write_text("\n".join(commands).replace("0.", "0,") + "\n")
+    (folder / "smr.toml").write_text(_block("tracker_import", "smr.toml"))
+
+
+def links(folder, run):
+    """A beam as other programs write it: 12 rows, and a full matrix with its nodes."""
+    from scipy.io import mmwrite
+
+    run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
+        "--poisson", 0.3, "--json", folder / "rod.json")  # fmt: skip
+    run("stiffness", "export", folder / "rod.json", "--to", "matrix-market", "--unit",
+        "mm", "-o", folder / "rod.mtx")  # fmt: skip
+    run("stiffness", "export", folder / "rod.json", "--to", "matrix-market", "-o",
+        folder / "full.mtx")  # fmt: skip
+    mmwrite(folder / "m.mtx", np.eye(12))
+    (folder / "nodes.csv").write_text("1,0,0,0\n2,0.4,0,0\n")
+
+
+def robots(folder, run):
+    """A URDF with its loops, and the same robot in the formats that pages name."""
+    run("convert", "irsbot2", "-o", folder / "robot.urdf")
+    shutil.copy(folder / "robot.yaml", folder / "loops.yaml")
+    run("convert", "irsbot2", "-o", folder / "scene.xml")
+    for name in ("corrected", "robot"):
+        run("convert", "irsbot2", "-o", folder / f"{name}.toml")
+    from tests.assembly.exchange.test_sdf import four_bar
+
+    (folder / "robot.sdf").write_text(four_bar())
+
+
+def plans(folder, run):
+    """Errors, tolerances and postures of the paper's robot."""
+    shutil.copy(ROOT / "examples" / "irsbot2_errors.toml", folder / "errors.toml")
+    for name in ("plan.toml", "mostly.toml"):
+        shutil.copy(ROOT / "examples" / "tolerance_allocation" / "mostly.toml",
+                    folder / name)  # fmt: skip
+    (folder / "path.csv").write_text("pose.tx,pose.tz\n0.0,-0.5\n0.1,-0.5\n")
+
+
+def imperfect(folder, run):
+    """The paper's robot with an error in each link."""
+    run("convert", "irsbot2", "-o", folder / "nominal.toml")
+    text = (folder / "nominal.toml").read_text()
+    name, error = 'name = "leg1.link_a"\n', "geometric_error = [1e-4, 0, 0, 0, 0, 0]\n"
+    assert name in text
+    (folder / "my_robot.toml").write_text(text.replace(name, name + error))
+
+
+def own_robot(folder, run):
+    """The robot of the tutorial."""
+    text = _block("tutorials/own_robot", "my_robot.toml")
+    (folder / "my_robot.toml").write_text(text)
+
+
+def _block(page, title):
+    """The file of that title on a page."""
+    return next(t for _, name, t in blocks(DOCS / f"{page}.md") if name == title)
+
+
+STAGE = {
+    "campaigns": [campaign], "commands": [arm, plans, robots, links, tracker],
+    "conversion": [robots], "correction": [arm], "diagnosis": [campaign],
+    "effects": [crank], "gallery": [plans, own_robot], "link_exchange": [links],
+    "reports": [campaign, plans, runs], "sweeps": [plans, robots],
+    "tolerances": [imperfect], "tracker_import": [tracker],
+    "README": [campaign, plans],
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+@pytest.mark.parametrize("name", sorted(set(PAGES) - OTHERS))
+def test_the_commands_of_a_page_run(name, tmp_path, monkeypatch, run):
+    commands = list(commands_of(PAGES[name]))
+    if not commands:
+        pytest.skip("the page has no commands")
+    for place in ("examples", "meshes", "tests"):
+        (tmp_path / place).symlink_to(ROOT / place)
+    monkeypatch.chdir(tmp_path)
+    for stage in STAGE.get(name, []):
+        stage(tmp_path, run)
+    titled(name, tmp_path)
+    for words in commands:
+        line = shlex.join(words)
+        for long, short in FEWER.items():
+            line = line.replace(long, short)
+        status, _, said = run(*shlex.split(line))
+        assert status in {0, 1}, f"{line}\n{said}"
+
+
+def titled(name, folder):
+    """Write the files that a page shows."""
+    for _, title, text in blocks(PAGES[name]):
+        if title:
+            (folder / title).write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", sorted(set(PAGES) - {"README"}))  # has its own
+def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch, capsys):
+    """One session a page; what it is said to print is what it prints."""
+    monkeypatch.chdir(tmp_path)
+    titled(name, tmp_path)
+    session, printed = {}, ""
+    for language, _, text in blocks(PAGES[name]):
+        if language == "python" and not any(one in text for one in CLUSTER):
+            exec(compile(text, name, "exec"), session)
+            printed = capsys.readouterr().out
+        elif language == "output":
+            same(text, printed)
+
+
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+
+
+def same(shown, printed):
+    """The same words, and the same numbers where a page does not round them off."""
+    assert NUMBER.sub("#", shown).split() == NUMBER.sub("#", printed).split()
+    for mine, yours in zip(shown.splitlines(), printed.splitlines(), strict=True):
+        if "certificate" not in mine:  # rounding
+            numbers = [[float(n) for n in NUMBER.findall(t)] for t in (mine, yours)]
+            assert numbers[0] == pytest.approx(numbers[1], rel=1e-3, abs=1e-12)

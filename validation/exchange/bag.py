@@ -1,0 +1,93 @@
+"""ROS bags as a device's file: points, poses and transforms, read by ``rosbags``.
+
+A rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named by its topic
+and its frame, its time is the message's stamp, lengths are metres.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from forcefit.inputs.errors import BadInput, one_line
+from validation.exchange.device_table import LARGEST, Reading
+
+_MESSAGES = {
+    "geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage",
+}  # fmt: skip
+
+
+def is_bag(path: Path | str) -> bool:
+    """Whether a path is a bag: a folder with ``metadata.yaml``, or a ``.bag`` file."""
+    path = Path(path)
+    return path.suffix.lower() == ".bag" or os.path.isfile(path / "metadata.yaml")
+
+
+def read_bag(path: Path | str) -> list[Reading]:
+    """Readings of all points, poses and transforms in a bag.
+
+    Args:
+        path: a rosbag2 folder or a ROS 1 bag.
+
+    Returns:
+        The readings in the order recorded; turns are passed over.
+
+    Raises:
+        BadInput: ``rosbags`` is not installed, the bag cannot be read, or it has no
+            messages of these kinds.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise BadInput(
+            f"{path}: a bag needs the package rosbags; install forcefit[ros], or "
+            "export its points as a table"
+        ) from None
+    readings = []
+    try:
+        store = get_typestore(Stores.LATEST)
+        with AnyReader([Path(path)], default_typestore=store) as bag:
+            wanted = [c for c in bag.connections if c.msgtype in _MESSAGES]
+            for number, (link, _, raw) in enumerate(bag.messages(wanted), 1):
+                message = bag.deserialize(raw, link.msgtype)
+                topic = [part for part in link.topic.split("/") if part]
+                for frame, header, place in _places(message):
+                    names = tuple(dict.fromkeys([*topic, frame]))
+                    readings.append(_reading(str(path), number, names, header, place))
+    except BadInput:
+        raise
+    except Exception as error:  # any error of a third-party reader
+        reason = one_line(str(error), 120) or type(error).__name__
+        raise BadInput(f"{path}: not a readable bag: {reason}") from None
+    if not readings:
+        kinds = ", ".join(sorted(name.rpartition("/")[2] for name in _MESSAGES))
+        raise BadInput(f"{path}: found no messages of points, expected {kinds}")
+    return readings
+
+
+def _places(message: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Frame, header and position of a message's points."""
+    for one in getattr(message, "transforms", [message]):
+        if hasattr(one, "transform"):
+            yield one.child_frame_id, one.header, one.transform.translation
+        else:
+            pose = getattr(one, "pose", None)
+            place = one.point if pose is None else pose.position
+            yield one.header.frame_id, one.header, place
+
+
+def _reading(
+    path: str, number: int, names: tuple[str, ...], header: Any, place: Any
+) -> Reading:
+    """One point of a bag; ``line`` is the message's number."""
+    position = np.array([place.x, place.y, place.z], dtype=float)
+    if not (np.abs(position) <= LARGEST).all():
+        raise BadInput(
+            f"{path}: message {number}: found {position.tolist()}, expected a place [m]"
+        )
+    time = header.stamp.sec + 1e-9 * header.stamp.nanosec
+    return Reading(path, number, names, position, np.full(3, np.nan), time)
