@@ -8,7 +8,7 @@ import typer
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
-from forcefit.inputs.writing import write_json
+from forcefit.inputs.writing import check_new_folder, write_json
 
 
 def plan(
@@ -47,7 +47,7 @@ def plan(
     from assembly.robots import load_robot
     from validation.inspection import planning
     from validation.synthetic.design import CampaignDesign
-    from validation.synthetic.generator import check_folder, write_campaign
+    from validation.synthetic.generator import write_campaign
 
     x, y, z = parse_point(point, "--point")
     if not (rotation > 0 and position > 0):
@@ -55,7 +55,7 @@ def plan(
         size = rotation if not rotation > 0 else position
         raise BadInput(f"--{wrong}: found {size:g}, expected > 0")
     machine = load_robot(robot)
-    check_folder(output)
+    check_new_folder(output)
     design = CampaignDesign(
         configurations=configurations, rows=max(rows, configurations), reach=reach,
         size=stroke, load=force, temperature=temperature, command=command,

@@ -10,7 +10,6 @@ import pytest
 from assembly.sweeps.netcdf import netcdf_file
 from forcefit.inputs.table import BadInput
 
-
 SIZE = 6_500_000  # bytes of the file below, about
 
 
