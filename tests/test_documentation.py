@@ -284,13 +284,15 @@ def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch, capsys):
     """One session a page; what it is said to print is what it prints."""
     monkeypatch.chdir(tmp_path)
     titled(name, tmp_path)
-    session, printed = {}, ""
+    session, printed = {}, None
     for language, _, text in blocks(PAGES[name]):
         if language == "python" and not any(one in text for one in CLUSTER):
             exec(compile(text, name, "exec"), session)
             printed = capsys.readouterr().out
-        elif language == "output":
+        elif language == "output" and printed is not None:
             same(text, printed)
+        else:
+            printed = None  # what follows is a command's
 
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
