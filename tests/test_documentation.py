@@ -31,7 +31,7 @@ FEWER = {
     "tx=-0.4:0.4:0.1,tz=-0.5 --solids": "tx=-0.1:0.1:0.1,tz=-0.5 --solids",
     "radius=0.02:0.05:0.005": "radius=0.02:0.03:0.01", "--workers 2 ": "",
     "tx=-0.2:0.2:0.1,": "tx=-0.1:0.1:0.1,", "0:1.5:0.1": "0:0.2:0.1",
-    "force=500": "force=500 --draws 100",
+    "force=500": "force=500 --draws 100", "--rows 60": "--rows 8 --configurations 9",
 }  # fmt: skip
 NAMES = {
     "ROBOT": "irsbot2",
