@@ -74,7 +74,8 @@ def test_the_command_gives_them_at_the_exact_equilibrium(run):
         assert status == 0
         slopes[len(words)] = np.array(answer["slopes"]["crank_pin.link.young"])
     assert slopes[3][3, 3] < 0.0
-    assert np.abs(slopes[3] / slopes[0] - 1)[3, 3] > 1e-4
+    # entries beside it are zero or its rounding
+    assert abs(slopes[3][3, 3] / slopes[0][3, 3] - 1) > 1e-4
 
 
 def test_an_unknown_number_is_named():
