@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
-    Structure,
     eliminate,
     eliminate_springs,
     least_motions,
     misfit_of,
     moved_by,
-    own_springs,
-    paths_of,
     rigid_rows,
     small_problem,
 )
+from assembly.linear.compiled_structure import Structure, own_springs, paths_of
 from assembly.linear.thresholds import MISMATCH_FACTOR, OPEN, RANK
 from assembly.solvers.compiled import (
     Indices,

@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
-    Structure,
-    free_columns,
     least_motions,
     orthogonal_rows,
-    paths_of,
     small_problem,
 )
+from assembly.linear.compiled_structure import Structure, free_columns, paths_of
 from assembly.linear.compiled_zone import largest_clearance, orthonormal_rows
 from assembly.linear.thresholds import MISMATCH_FACTOR, RANK, UNBOUNDED
 from assembly.solvers.compiled import (

@@ -23,6 +23,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.compiled_structure import (
+    Structure,
+    free_columns,
+    grouped_springs,
+    largest_spring,
+)
 from assembly.linear.thresholds import NOISE
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import CLEAR, triangulate, turn, turn_all, turn_back
@@ -38,83 +44,6 @@ from assembly.solvers.vectors import (
 )
 
 
-class Structure(NamedTuple):
-    """Data that a robot's postures share; n frames, closures, np patterns of closures.
-
-    Attributes:
-        size: [m] reference length.
-        platform: row of its frame.
-        on_path: (n,) 1 on the way to the platform.
-        patterns: (np, closures) signs with which frames enter the closures.
-        pattern_of: (n,) row of ``patterns``.
-        springs: (ny, 6) spring columns in their frame's axes, sorted by group.
-        spring_frame: (ny,) whose they are.
-        spring_order: (ny,) their places among the virtual joints' columns.
-        groups: (ng + 1,) first spring of each group, and ny.
-        group_pattern: (ng,) row of ``patterns``.
-        group_on_path: (ng,) 1 on the way to the platform.
-        cone_frame: (nu,) whose a clearance is.
-        cone_axis: (nu,) component of its screw.
-        cone_size: (nu,) [rad or m].
-        starts: (cones + 1,) first clearance of each cone, and nu.
-        free_frame: (nq,) whose a free motion is.
-        free_axis: (nq,) component of its screw.
-        free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
-    """
-
-    size: float
-    platform: int
-    on_path: Vector
-    patterns: Matrix
-    pattern_of: Indices
-    springs: Matrix
-    spring_frame: Indices
-    spring_order: Indices
-    groups: Indices
-    group_pattern: Indices
-    group_on_path: Vector
-    cone_frame: Indices
-    cone_axis: Indices
-    cone_size: Vector
-    starts: Indices
-    free_frame: Indices
-    free_axis: Indices
-    free_bound: Vector
-
-
-@part
-def paths_of(T: Matrices, s: Structure) -> Matrices:
-    """Unit screws of every frame at the platform, see ``P``."""
-    n = len(T)
-    P = matrices(n, 6, 6)
-    for j in range(n):
-        x = (T[j, 0, 3] - T[s.platform, 0, 3]) / s.size
-        y = (T[j, 1, 3] - T[s.platform, 1, 3]) / s.size
-        z = (T[j, 2, 3] - T[s.platform, 2, 3]) / s.size
-        for axis in range(3):
-            a, b, c = T[j, 0, axis], T[j, 1, axis], T[j, 2, axis]
-            turned, slid = P[j, axis], P[j, 3 + axis]
-            turned[0], turned[1], turned[2] = a, b, c
-            turned[3], turned[4] = y * c - z * b, z * a - x * c
-            turned[5] = x * b - y * a
-            slid[3], slid[4], slid[5] = a / s.size, b / s.size, c / s.size
-    return P
-
-
-@part
-def free_columns(s: Structure, P: Matrices, m: int) -> Matrix:
-    """Closure columns of the free motions, as rows."""
-    F = matrix(len(s.free_frame), m)
-    for c in range(len(F)):
-        j = s.free_frame[c]
-        for k in range(m // 6):
-            sign = s.patterns[s.pattern_of[j], k]
-            if sign != 0.0:
-                for a in range(6):
-                    F[c, 6 * k + a] = sign * P[j, s.free_axis[c], a]
-    return F
-
-
 @part(fastmath={"contract", "reassoc"})
 def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
     """Orthonormal rows orthogonal to all triangulated ones."""
@@ -124,73 +53,6 @@ def orthogonal_rows(F: Matrix, turns: Vector, rank: int, m: int) -> Matrix:
         Zt[rank + i, i] = 1.0
     turn_all(F, turns, rank, Zt)
     return np.ascontiguousarray(Zt[:, :count].T)
-
-
-@part
-def grouped_springs(s: Structure, P: Matrices) -> Matrices:
-    """Springs that act together, combined into six with the same sum of squares."""
-    count = len(s.groups) - 1
-    L = matrices(count, 6, 6)
-    turns, diagonal = vector(6), vector(6)
-    order = indices(6)
-    for g in range(count):
-        rows = spring_group(s, P, g)
-        rank = triangulate(rows, turns, diagonal, order, 0.0, 0.0, -1.0)
-        for i in range(6):
-            for l in range(min(i, rank)):
-                L[g, order[i], l] = rows[i, l]
-            if i < rank:
-                L[g, order[i], i] = diagonal[i]
-    return L
-
-
-@part
-def spring_group(s: Structure, P: Matrices, g: int) -> Matrix:
-    """(6, springs, or 6 if they are fewer) columns of a group's springs."""
-    a, b = s.groups[g], s.groups[g + 1]
-    rows = matrix(6, max(b - a, 6))
-    for c in range(a, b):
-        j = s.spring_frame[c]
-        for axis in range(6):
-            weight = s.springs[c, axis]
-            if weight != 0.0:
-                for i in range(6):
-                    rows[i, c - a] += weight * P[j, axis, i]
-    return rows
-
-
-@part
-def own_springs(s: Structure, P: Matrices, grouped: Vector, elastic: Vector) -> None:
-    """Deformation of every spring, from that of the groups' six."""
-    turns, diagonal = vector(6), vector(6)
-    order = indices(6)
-    for g in range(len(s.groups) - 1):
-        a, b = s.groups[g], s.groups[g + 1]
-        rows = spring_group(s, P, g)
-        rank = triangulate(rows, turns, diagonal, order, 0.0, 0.0, -1.0)
-        own = vector(rows.shape[1])
-        for i in range(rank):
-            own[i] = grouped[6 * g + i]
-        turn(rows, turns, rank, own)
-        for c in range(a, b):
-            elastic[s.spring_order[c]] = own[c - a]
-
-
-@part
-def largest_spring(s: Structure, P: Matrices) -> float:
-    """Largest entry of the springs' closure columns, for the noise floor."""
-    largest = 0.0
-    column = vector(6)
-    for c in range(len(s.springs)):
-        fill(column, 0.0)
-        for axis in range(6):
-            weight = s.springs[c, axis]
-            if weight != 0.0:
-                for i in range(6):
-                    column[i] += weight * P[s.spring_frame[c], axis, i]
-        for i in range(6):
-            largest = max(largest, abs(column[i]))
-    return largest
 
 
 @kernel(fastmath={"contract", "reassoc"})

@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
-    Structure,
-    free_columns,
     least_motions,
     misfit_of,
     moved_by,
     orthogonal_rows,
-    paths_of,
     small_problem,
 )
+from assembly.linear.compiled_structure import Structure, free_columns, paths_of
 from assembly.linear.thresholds import (
     INFEASIBLE,
     MARGIN_GAP,

@@ -16,7 +16,7 @@ from assembly.model.robot import Robot
 
 if TYPE_CHECKING:
     from assembly.linear.compiled_reach import Bounds
-    from assembly.linear.compiled_reduction import Structure
+    from assembly.linear.compiled_structure import Structure
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from assembly.model.clearance import Compliant, clearance_bounds, component_boun
 from assembly.model.robot import Robot
 
 if TYPE_CHECKING:
-    from assembly.linear.compiled_reduction import Structure
+    from assembly.linear.compiled_structure import Structure
 
 
 @lru_cache(maxsize=32)
@@ -47,7 +47,7 @@ class _Tree:
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> "Structure":
     """The arrays, once for all robots that differ in their errors alone."""
-    from assembly.linear.compiled_reduction import Structure
+    from assembly.linear.compiled_structure import Structure
 
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
