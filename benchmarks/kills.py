@@ -280,8 +280,8 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status, before)
-        if status == 0 or (case.header and not path.exists() and standing):
-            standing = 0  # all is done, or the last of it was
+        if status == 0 or removed(case, standing):
+            standing = 0
             counts["half-written"] += any(not Path(n).exists() for n in case.files)
             continue
         if case.header:  # of the others' journals only the ends are compared
@@ -306,6 +306,12 @@ def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
         return False
     print(f"exit status {status} of {case.words[1]} after {way}")
     return True
+
+
+def removed(case: Case, standing: int) -> bool:
+    """Whether the journal is gone since the last child, or one before, was done."""
+    everything = standing + counted(KEPT) == case.points
+    return bool(case.header) and everything and not Path("out.nc.journal").exists()
 
 
 def solved_again(case: Case, standing: int) -> int:
