@@ -5,7 +5,7 @@ Sources:
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,11 @@ from scipy.sparse import triu
 
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_text
-from stiffness.exchange.matrix_file import FileMatrix
+from stiffness.exchange.matrix_file import FileMatrix, bulk_fields, real
 from stiffness.surface.interface import Interface, parse_interface
 
+_GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
+_NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _ON = 1e-6  # of the body's size: how near a node lies on its interface
 
 
@@ -24,7 +26,8 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
     """Places of nodes: lines of number, x, y, z between commas or blanks.
 
     Args:
-        path: the file; lines that begin with ``*`` or ``#`` are passed over.
+        path: the file; lines that begin with ``*`` or ``#`` are passed over. Of a deck
+            of Abaqus or CalculiX the lines after ``*NODE``, of Nastran's ``GRID``.
         unit: [m] of its lengths.
 
     Returns:
@@ -34,14 +37,11 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
         BadInput: a line of something else.
     """
     nodes: dict[int, NDArray] = {}
-    for number, line in enumerate(read_text(path).split("\n"), 1):
-        words = re.split(r"[,\s]+", line.strip(" ,\t"))
-        if not words[0] or words[0].startswith(("*", "#")):
-            continue
+    for number, words, line in _node_lines(read_text(path)):
         try:
-            place = np.array([float(word) for word in words[1:4]])
+            place = np.array([real(path, word) for word in words[1:4]])
             node = int(words[0])
-        except ValueError:
+        except (ValueError, BadInput):
             place, node = np.empty(0), 0
         if place.shape != (3,) or not np.isfinite(place).all() or node in nodes:
             raise BadInput(
@@ -52,6 +52,34 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
     if not nodes:
         raise BadInput(f"{path}: found no nodes")
     return nodes
+
+
+def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
+    """Lines that place a node: their number, number and coordinates, the line."""
+    if _GRID.search(text):
+        yield from _grids(text)
+        return
+    deck = bool(_NODE.search(text))
+    listed = not deck
+    for number, line in enumerate(text.split("\n"), 1):
+        words = re.split(r"[,\s]+", line.strip(" ,\t\r"))
+        if deck and re.match(r"\*[^*]", words[0]):
+            listed = bool(_NODE.match(line))
+        if listed and words[0] and not words[0].startswith(("*", "#")):
+            yield number, words, line
+
+
+def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
+    """Nastran's ``GRID``, on one line or, of wide fields, on two."""
+    lines = text.split("\n")
+    for number, line in enumerate(lines, 1):
+        if _GRID.match(line):
+            _, fields = bulk_fields(line)
+            if len(fields) == 4 and number < len(lines):
+                fields += bulk_fields(lines[number])[1]
+            node, system, *place = fields
+            # another system of axes gives no place: refused
+            yield number, [node, *([] if system.strip("0") else place)], line
 
 
 def interface_rows(

@@ -32,7 +32,8 @@ def import_link(
     Args:
         path: of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
         mass: of the mass matrix of the same freedoms; None without one.
-        nodes: places of nodes, needed for interfaces of many.
+        nodes: places of nodes, needed for interfaces of many; their order is that of
+            rows which the matrix' file does not name.
         base: node, or interface such as ``"z=0"`` [m], that is held.
         tip: likewise, where the screw is read.
         unit: of lengths in all files; forces are N, turns rad.
@@ -49,7 +50,10 @@ def import_link(
         if value not in valid:
             raise BadInput(f"{option}: found {quoted(value)}{nearest(value, valid)}")
     length = LENGTHS[unit]
-    matrix = in_metres(reordered(read_matrix(path), order), length)
+    places = None if nodes is None else read_nodes(nodes, length)
+    numbers = None if places is None else list(places)
+    matrix = read_matrix(path, nodes=numbers)
+    matrix = in_metres(reordered(matrix, order), length)
     if matrix.matrix.shape[0] == 6 and not matrix.named:
         if mass is not None:
             raise BadInput("--mass: a stiffness of 6 rows has no body with a mass")
@@ -58,7 +62,6 @@ def import_link(
         return LinkStiffness(
             f"imported from {Path(path).name}", inverted(K), np.zeros(3), np.zeros(3)
         )
-    places = None if nodes is None else read_nodes(nodes, length)
     ends = _ends(matrix, base, tip, places)
     K12, fields = condensed(matrix, (ends[0][:2], ends[1][:2]))
     points = [end[2] for end in ends]
@@ -67,7 +70,7 @@ def import_link(
     link = link_of_both_ends(K12, who, known[0], known[1])
     if mass is None:
         return link
-    heavy = in_metres(reordered(read_matrix(mass, "mass"), order), length)
+    heavy = in_metres(reordered(read_matrix(mass, "mass", numbers), order), length)
     if heavy.freedoms != matrix.freedoms:
         raise BadInput(f"{mass}: its freedoms are not those of {path}")
     M12 = fields.T @ (heavy.matrix @ fields)

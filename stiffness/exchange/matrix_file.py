@@ -5,7 +5,9 @@ file               written by
 =================  ===============================================================
 Matrix Market      Ansys (HBMAT's successor), SciPy, Exudyn scripts: ``.mtx``
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
-five columns       Abaqus ``*MATRIX OUTPUT``, CalculiX ``OUTPUT FILE=MATRIX``
+five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
+three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
+                   ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof`` beside them
 DMIG               Nastran, small, large or free fields: ``.pch``, ``.dmig``
 NumPy              ``.npy``, SciPy's sparse ``.npz``
 =================  ===============================================================
@@ -17,8 +19,10 @@ Sources:
 
 import io
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -28,7 +32,9 @@ from forcefit.inputs.table import read_text
 
 Freedom = tuple[int, int]
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
-_ENDINGS = (".mtx", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz")
+_ENDINGS = (
+    ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz"
+)  # fmt: skip
 _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
 _LARGEST = 2_000_000  # rows
 
@@ -50,15 +56,19 @@ class FileMatrix:
     named: bool
 
 
-def read_matrix(path: Path | str, which: str = "stiffness") -> FileMatrix:
+def read_matrix(
+    path: Path | str, which: str = "stiffness", nodes: Sequence[int] | None = None
+) -> FileMatrix:
     """A matrix of a file, its kind told by its content.
 
     Args:
         path: the file.
         which: ``"stiffness"`` or ``"mass"``, where the file holds both.
+        nodes: in the order of rows that the file does not name; None: 1, 2, ..
 
     Returns:
-        The matrix; rows that the file does not name are six a node, from node 1.
+        The matrix; rows that the file does not name are three a node of ``nodes``, as
+        of solids, where that is their number, else six.
 
     Raises:
         BadInput: the file is none of these, its matrix is not square, not finite or
@@ -80,14 +90,17 @@ def read_matrix(path: Path | str, which: str = "stiffness") -> FileMatrix:
         elif re.search(r"^\s*\*USER ELEMENT", text, re.M | re.I):
             matrix, freedoms = _user_element(path, text, which)
         elif re.search(r"^DMIG", text, re.M):
-            matrix, freedoms = _dmig(path, text)
+            matrix, freedoms = _dmig(path, text, which)
         else:
-            matrix, freedoms = _five_columns(path, text)
-    return _checked(path, matrix, freedoms)
+            matrix, freedoms = _columns(path, text)
+    return _checked(path, matrix, freedoms, nodes)
 
 
 def _checked(
-    path: Path, matrix: csr_array, freedoms: list[Freedom] | None
+    path: Path,
+    matrix: csr_array,
+    freedoms: list[Freedom] | None,
+    nodes: Sequence[int] | None,
 ) -> FileMatrix:
     """The matrix, if it is square, finite and symmetric."""
     n = matrix.shape[0]
@@ -95,11 +108,7 @@ def _checked(
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
     if not (np.abs(matrix.data) < 1e100).all():  # products of them are numbers
         raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
-    if freedoms is None and n % 6:
-        raise BadInput(
-            f"{path}: found {n} rows without names, expected six for each node, or a "
-            "format that names them"
-        )
+    given = freedoms or _in_order(path, n, nodes)
     size = np.sqrt(np.abs(matrix.diagonal()))
     gap = abs(matrix - matrix.T).tocoo()
     scale = size[gap.row] * size[gap.col]
@@ -111,9 +120,23 @@ def _checked(
             f"{path}: not symmetric: found [{i + 1}, {j + 1}] = {matrix[i, j]:.6e} but "
             f"[{j + 1}, {i + 1}] = {matrix[j, i]:.6e}"
         )
-    given = freedoms or [(k // 6 + 1, k % 6 + 1) for k in range(n)]
     both = csr_array((matrix + matrix.T) / 2)
     return FileMatrix(str(path), both, tuple(given), freedoms is not None)
+
+
+def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
+    """Freedoms of n rows without names: three or six a node."""
+    numbers = range(1, n // 6 + 1) if nodes is None else nodes
+    for each in (3, 6):
+        if n == each * len(numbers):
+            return [(node, d) for node in numbers for d in range(1, each + 1)]
+    expected = "six for each node" if nodes is None else (
+        f"three or six for each of the {len(nodes)} nodes"
+    )  # fmt: skip
+    raise BadInput(
+        f"{path}: found {n} rows without names, expected {expected}, or a format that "
+        "names them"
+    )
 
 
 def _numpy(path: Path) -> csr_array:
@@ -173,7 +196,7 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
             lines.append([_whole(path, word) for word in upper.split(",") if word])
         elif part in values and upper:
             words = re.split(r"[,\s]+", upper.strip(" ,"))
-            values[part] += [_real(path, word) for word in words]
+            values[part] += [real(path, word) for word in words]
     if not nodes or not lines or not lines[0]:
         raise BadInput(f"{path}: found no ** ELEMENT NODES and their freedoms")
     changes = {1: lines[0], **{row[0]: row[1:] for row in lines[1:]}}
@@ -194,39 +217,74 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
     return csr_array(K + np.tril(K, -1).T), freedoms
 
 
-def _five_columns(path: Path, text: str) -> tuple[csr_array, list[Freedom]]:
-    """Lines of node, direction, node, direction, value; one half or both."""
-    entries: dict[tuple[Freedom, Freedom], float] = {}
+def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
+    """Lines of node, direction, node, direction, value, or of row, column, value."""
+    named: dict[tuple[Freedom, Freedom], float] = {}
+    unnamed: dict[tuple[int, int], float] = {}
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip() or line.lstrip().startswith(("*", "#")):
             continue
-        words = re.split(r"[,\s]+", line.strip(" ,\t"))
-        if len(words) != 5:
+        words = re.split(r"[,\s]+", line.strip(" ,\t\r"))
+        if len(words) != (3 if unnamed else 5) and (named or len(words) != 3):
             raise BadInput(
-                f"{path}: line {number}: found {len(words)} words, expected node, "
-                "direction, node, direction, value; or another format that is known"
+                f"{path}: line {number}: found {len(words)} words, expected "
+                f"{'' if unnamed else 'node, direction, node, direction, value'}"
+                f"{'' if unnamed or named else ', or '}"
+                f"{'' if named else 'row, column, value'}"
             )
-        a, b, c, d = (_whole(path, word) for word in words[:4])
-        entries[(a, b), (c, d)] = _real(path, words[4])
-    return _from_entries(path, entries)
+        *places, value = words
+        where = [_whole(path, word) for word in places]
+        if len(where) == 4:
+            a, b, c, d = where
+            named[(a, b), (c, d)] = real(path, value)
+        elif min(where) < 1 or max(where) > _LARGEST:
+            raise BadInput(
+                f"{path}: line {number}: found row {where[0]}, column {where[1]}, "
+                f"expected 1 to {_LARGEST}"
+            )
+        else:
+            unnamed[where[0], where[1]] = real(path, value)
+    if not unnamed:
+        return _from_entries(path, named)
+    places_of = path.with_suffix(".dof")
+    order = list(range(1, max(map(max, unnamed)) + 1))
+    matrix = _of_rows(unnamed, {row: row - 1 for row in order})
+    if path.suffix.lower() in {".sti", ".mas"} and places_of.exists():
+        return matrix, _named_by(places_of, matrix.shape[0])
+    return matrix, None
 
 
-def _dmig(path: Path, text: str) -> tuple[csr_array, list[Freedom]]:
-    """``DMIG`` of one name, in any of its three widths of fields."""
-    entries: dict[tuple[Freedom, Freedom], float] = {}
-    names: set[str] = set()
-    column: Freedom | None = None
+def _named_by(path: Path, n: int) -> list[Freedom]:
+    """CalculiX's ``.dof``: ``node.direction`` of each row."""
+    words = read_text(path).split()
+    freedoms: list[Freedom] = []
+    for word in words:
+        node, point, direction = word.partition(".")
+        if not point:
+            raise BadInput(f"{path}: found {describe(word)}, expected node.direction")
+        freedoms.append((_whole(path, node), _whole(path, direction)))
+    if len(set(freedoms)) != n:
+        raise BadInput(
+            f"{path}: found {len(set(freedoms))} freedoms, expected {n}, as many as "
+            "the matrix has rows"
+        )
+    return freedoms
+
+
+def _dmig(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
+    """``DMIG`` in any of its widths of fields; of many square ones, K.. or M.."""
+    matrices: dict[str, dict[tuple[Freedom, Freedom], float]] = {}
+    forms: dict[str, str] = {}
+    name, column = "", None
     for line in text.split("\n"):
         if not line.strip() or line.startswith("$"):
             continue
-        head, fields = _fields(line)
+        head, fields = bulk_fields(line)
         if head.startswith("DMIG"):
-            names.add(fields[0])
+            name = fields[0]
+            entries = matrices.setdefault(name, {})
             if fields[1] in {"0", ""}:  # the header: form, types
-                if fields[2] not in {"1", "6", ""}:
-                    form = describe(fields[2])
-                    raise BadInput(f"{path}: form {form}, expected 6 or 1, real")
-                column = None
+                forms[name], column = fields[2], None
                 continue
             column = _whole(path, fields[1]), max(1, _whole(path, fields[2] or "0"))
             fields = fields[4:]
@@ -237,14 +295,25 @@ def _dmig(path: Path, text: str) -> tuple[csr_array, list[Freedom]]:
             node, direction, value = fields[start : start + 3]
             if node:
                 row = _whole(path, node), max(1, _whole(path, direction or "0"))
-                entries[row, column] = _real(path, value)
+                entries[row, column] = real(path, value)
+    initial = which[0].upper().replace("S", "K")
+    names = [name for name in matrices if forms.get(name, "") in {"1", "6", ""}]
+    names = names or list(matrices)
+    if len(names) > 1:
+        names = [name for name in names if name.startswith(initial)]
     if len(names) != 1:
-        matrices = ", ".join(sorted(names)) or "none"
-        raise BadInput(f"{path}: found the matrices {matrices}, expected exactly one")
-    return _from_entries(path, entries)
+        given = ", ".join(sorted(matrices)) or "none"
+        raise BadInput(
+            f"{path}: found the matrices {given}, expected one, or one whose name "
+            f"begins with {initial}"
+        )
+    form = forms.get(names[0], "")
+    if form not in {"1", "6", ""}:
+        raise BadInput(f"{path}: form {describe(form)}, expected 6 or 1, real")
+    return _from_entries(path, matrices[names[0]])
 
 
-def _fields(line: str) -> tuple[str, list[str]]:
+def bulk_fields(line: str) -> tuple[str, list[str]]:
     """The first field of a bulk data line, and its others, all eight or four."""
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -265,14 +334,18 @@ def _from_entries(
     if not freedoms or len(freedoms) > _LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
     row = {freedom: k for k, freedom in enumerate(freedoms)}
+    return _of_rows(entries, row), freedoms
+
+
+def _of_rows(
+    entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
+) -> csr_array:
+    """A matrix from entries by the names of their rows."""
     # a half that is not there is the other one's
-    whole = entries | {
-        (b, a): v for (a, b), v in entries.items() if (b, a) not in entries
-    }
-    i = [row[a] for a, _ in whole]
-    j = [row[b] for _, b in whole]
-    shape = (len(freedoms), len(freedoms))
-    return csr_array(coo_array((list(whole.values()), (i, j)), shape=shape)), freedoms
+    whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
+    i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]
+    shape = (len(row), len(row))
+    return csr_array(coo_array((list(whole.values()), (i, j)), shape=shape))
 
 
 def _whole(path: Path, word: str) -> int:
@@ -285,7 +358,7 @@ def _whole(path: Path, word: str) -> int:
         ) from None
 
 
-def _real(path: Path, word: str) -> float:
+def real(path: Path | str, word: str) -> float:
     """A number, its exponent perhaps without a letter or with a D (Fortran)."""
     match = _REAL.fullmatch(word.strip())
     if not match:

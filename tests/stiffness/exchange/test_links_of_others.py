@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy.io import mmread, mmwrite
-from scipy.sparse import csr_matrix, diags, save_npz
+from scipy.sparse import csr_matrix, save_npz
 
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.beam import beam_compliance
@@ -13,9 +13,7 @@ from stiffness.beam.sections import round_section
 from stiffness.exchange.export_link import FORMATS, link_file, read_link_results
 from stiffness.exchange.import_link import import_link
 from stiffness.exchange.two_interfaces import both_ends
-from stiffness.fem.elements import assemble, isoparametric, lame
 from stiffness.link import scaled
-from tests.solids_for_tests import box_solid
 
 # a steel bar of 0.5 m along x in mm, N, tonnes
 E, NU, RADIUS, LENGTH, RHO = 2.1e5, 0.3, 10.0, 500.0, 7.85e-9
@@ -96,6 +94,13 @@ def five_columns(K):
     ).replace("np.float64(", "").replace(")", "")  # fmt: skip
 
 
+def three_columns(K):
+    """Row, column, value: both halves, a row of the diagonal first."""
+    entries = [(i, j) for i in range(len(K)) for j in range(i, len(K)) if K[i, j]]
+    both = [pair for i, j in entries for pair in dict.fromkeys([(i, j), (j, i)])]
+    return "".join(f"{i + 1} {j + 1}  {K[i, j]:.15e}\n" for i, j in both)
+
+
 def dmig_small(K):
     """Nastran's DMIG in fields of eight, exponents without a letter."""
 
@@ -122,6 +127,7 @@ def dmig_small(K):
         ("k.mtx", lambda p, K: p.write_text(user_element(K)), 1e-9),
         ("ccx.mtx", lambda p, K: p.write_text(calculix_element(K)), 1e-9),
         ("five.mtx", lambda p, K: p.write_text(five_columns(K)), 1e-9),
+        ("three.mtx", lambda p, K: p.write_text(three_columns(K)), 1e-9),
         ("mm.mtx", lambda p, K: mmwrite(p, csr_matrix(K), symmetry="symmetric"), 1e-9),
         ("full.mtx", lambda p, K: mmwrite(p, K, symmetry="general"), 1e-9),
         ("k.npy", lambda p, K: np.save(p, K), 1e-9),
@@ -204,58 +210,6 @@ def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
     assert_same(link.stiffness, expected_stiffness())
 
 
-def full_matrix(counts=(2, 2, 5)):
-    """Nodes and sparse matrix of a bar of cubic elements, 0.02 by 0.03 by 0.2 m."""
-    solid = box_solid(counts, np.array([0.02, 0.03, 0.2]))
-    mesh = isoparametric(solid, 3)
-    lam, mu = (np.full(len(mesh.cells), c) for c in lame(7e10, 0.33))
-    upper = assemble(mesh, lam, mu)
-    return mesh.nodes, csr_matrix(upper + upper.T - diags(upper.diagonal()))
-
-
-def write_solid(folder, nodes, K):
-    """The two files of a solid: its nodes, and its matrix in five columns."""
-    lines = [f"{i},{x!r},{y!r},{z!r}" for i, (x, y, z) in enumerate(nodes.tolist(), 1)]
-    (folder / "nodes.csv").write_text("\n".join(lines))
-    upper = csr_matrix(np.triu(K.toarray())).tocoo()
-    rows = zip(upper.row.tolist(), upper.col.tolist(), upper.data.tolist(), strict=True)
-    (folder / "k.mtx").write_text("\n".join(
-        f"{i // 3 + 1} {i % 3 + 1} {j // 3 + 1} {j % 3 + 1} {v!r}" for i, j, v in rows
-    ))  # fmt: skip
-
-
-@pytest.mark.exudyn
-def test_a_solid_is_condensed_as_exudyn_condenses_it(tmp_path):
-    """Rigid faces at both ends (RBE2), static modes of Hurty-Craig-Bampton, to 1e-8."""
-    fem = pytest.importorskip("exudyn.FEM")
-    nodes, K = full_matrix()
-    write_solid(tmp_path, nodes, K)
-    link = import_link(
-        tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", base="z=0", tip="z=0.2"
-    )
-    ends = [np.flatnonzero(np.abs(nodes[:, 2] - z) < 1e-9) for z in (0, 0.2)]
-    other = fem.FEMinterface()
-    other.nodes = {"Position": nodes}
-    other.surface = [{"Name": "none", "Trigs": []}]
-    other.stiffnessMatrix = K
-    other.massMatrix = csr_matrix(np.eye(3 * len(nodes)))
-    other.ComputeHurtyCraigBamptonModes(
-        [end.tolist() for end in ends], 0,
-        computationMode=fem.HCBstaticModeSelection.RBE2,
-    )  # fmt: skip
-    reduced = fem.ObjectFFRFreducedOrderInterface(other)
-    basis = np.asarray(reduced.modeBasis)
-    rigid = np.zeros((len(ends[1]), 3, 6))
-    for k in range(3):
-        rigid[:, :, k] = np.cross(np.eye(3)[k], nodes[ends[1]] - link.tip)
-        rigid[:, k, 3 + k] = 1.0
-    moved = basis.reshape(-1, 3, basis.shape[1])[ends[1]]
-    screws = np.linalg.lstsq(rigid.reshape(-1, 6), moved.reshape(-1, 6))[0]
-    back = np.linalg.inv(screws)
-    theirs = back.T @ np.asarray(reduced.stiffnessMatrixReduced) @ back
-    assert_same(link.stiffness, theirs, 1e-8)
-
-
 @pytest.mark.parametrize(
     ("matrix", "options", "message"),
     [
@@ -288,10 +242,15 @@ def test_what_is_no_link_is_one_line(run, matrix, options, message, tmp_path):
         ("k.mtx", "%%MatrixMarket matrix nonsense\n", "no Matrix Market file"),
         ("k.mtx", "1 1 1 1\n", "line 1: found 4 words"),
         ("k.mtx", "1 1 1 1 x\n", "expected a number"),
+        ("k.mtx", "1 1 1 1 1\n1 1 1\n", "line 2: found 3 words, expected node,"),
+        ("k.mtx", "1 1 1\n1 1 1 1 1\n", "line 2: found 5 words, expected row,"),
+        ("k.mtx", "1 0 1\n", "line 1: found row 1, column 0, expected 1 to"),
+        ("k.mtx", "1 1 1\n", "found 1 rows without names, expected six for each"),
         ("k.mtx", "", "found no entries"),
         ("k.mtx", "*USER ELEMENT,NODES=2\n", "found no ** ELEMENT NODES"),
         ("k.mtx", user_element(np.eye(11)), "found 66 numbers, expected 78"),
         ("k.pch", "DMIG    A              0       9       1       0\n", "form '9'"),
+        ("k.pch", "DMIG,A,1,1,,1,1,1.0\nDMIG,B,1,1,,1,1,1.0\n", "the matrices A, B"),
         ("k.pch", "DMIG,A,1,x,,1,1,1.0\n", "expected a whole number"),
         ("k.npy", "not numpy", "no matrix of NumPy"),
         ("k.npz", "not numpy", "no matrix of NumPy"),
