@@ -24,6 +24,7 @@ from validation.diagnosis.figures import (
 )
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import LISTED, effects, learned, steps
+from validation.diagnosis.scene import worst_robot
 from validation.diagnosis.sentence import calibration_text, open_text, sentence
 from validation.diagnosis.verdict import Calibration
 
@@ -75,6 +76,7 @@ def report_page(
     body = [
         section("Before and after", error_chart(diagnosis)),
         section("What every step bought", ladder_chart(diagnosis), _steps(diagnosis)),
+        *_robot(diagnosis),
         *_learned(diagnosis),
         *_parameters(diagnosis),
         section("Where the residual is", vector_charts(diagnosis)),
@@ -123,6 +125,12 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
     if diagnosis.next is not None:
         tiles.append(Tile("Measure next", [diagnosis.next.why]))
     return tiles
+
+
+def _robot(diagnosis: Diagnosis) -> list[str]:
+    """The robot where the declared model errs most."""
+    drawn = worst_robot(diagnosis)
+    return [section("The robot where the error is largest", drawn)] if drawn else []
 
 
 def _steps(diagnosis: Diagnosis) -> str:

@@ -1,0 +1,49 @@
+"""The robot of a diagnosis' page, against what was measured of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.planar_arm_for_tests import SIGMA, measured
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.scene import assembled, worst_robot, worst_row
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """A soft drive: the arm sags under its loads."""
+    folder = tmp_path_factory.mktemp("soft") / "soft"
+    return diagnose(measured(folder, seed=1, stiffness=(np.inf, 7e4)))
+
+
+def test_the_robot_drawn_stands_where_it_was_measured(diagnosed):
+    """Within five sigma of the reading, where the declared model errs by far more."""
+    row, name = worst_row(diagnosed)
+    assert name == "position"
+    aside = ~diagnosed.split.fitted
+    sizes = np.linalg.norm(np.nan_to_num(diagnosed.residual_before[:, 3:]), axis=1)
+    assert aside[row]
+    assert sizes[row] == sizes[aside].max()
+    read = diagnosed.campaign.measured[row]
+    known = np.isfinite(read)
+    sigma = np.broadcast_to(SIGMA, 6)[known]
+    off = (read - assembled(diagnosed, row).platform_screw)[known] / sigma
+    assert np.abs(off).max() < 5
+    assert np.abs(diagnosed.residual_before[row][known] / sigma).max() > 20
+
+
+def test_the_page_names_the_row_and_what_is_drawn(diagnosed):
+    row, _ = worst_row(diagnosed)
+    drawn = worst_robot(diagnosed)
+    assert f"Row {diagnosed.campaign.ids[row]}, kept aside" in drawn
+    assert "drive compliance" in drawn
+
+
+def test_without_rows_kept_aside_nothing_is_drawn(diagnosed):
+    everything = replace(
+        diagnosed.split, fitted=np.ones_like(diagnosed.split.fitted)
+    )  # fmt: skip
+    none = replace(diagnosed, split=everything)
+    assert worst_row(none) == (-1, "")
+    assert worst_robot(none) == ""
