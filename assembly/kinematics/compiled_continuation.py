@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.compiled_rotations import (
     inverse_left_jacobian,
+    rotation_between,
     rotation_exp,
     rotation_log,
-    times_transposed,
 )
 from assembly.solvers.compiled import (
     IndexRows,
@@ -21,7 +21,7 @@ from assembly.solvers.compiled import (
     kernel,
     part,
 )
-from assembly.solvers.layers import FAST, LANES
+from assembly.solvers.layers import FAST
 from assembly.solvers.vectors import copy, indices, matrices, matrix, vector
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved
@@ -35,6 +35,7 @@ _FIRST_STEP = 0.125  # there, and where the target does not determine all joints
 _CURVED = 0.25  # of the tangent's step: largest correction of it
 _CLEAR = 1e4  # times the damping: a joint motion of its own
 _SMALLEST_STEP = 1e-5
+_WIDTH = 8  # numbers in a vector register
 _NEWTON = 12  # iterations; quadratic convergence needs about 4
 
 
@@ -45,8 +46,10 @@ class Tree(NamedTuple):
         parents: (n,) rows, -1 for the base.
         kinds: (n,) of joints: 0 fixed, 1 revolute, 2 prismatic.
         fixed: (n, 4, 4) frames in their parents.
-        carries: (n, n) 1 in row i where joint j's motion moves frame i, else 0.
         pairs: (closures, 2) rows of each closure's frames.
+        moves: (k, 2) joints whose motions move one frame of a closure, and the sign,
+            -1 for the second frame; closure after closure, then the platform's.
+        groups: (closures + 2,) where in these each begins, and k.
         platform: its row.
         size: [m] reference length.
     """
@@ -54,8 +57,9 @@ class Tree(NamedTuple):
     parents: Indices
     kinds: Indices
     fixed: Matrices
-    carries: Matrix
     pairs: IndexRows
+    moves: IndexRows
+    groups: Indices
     platform: int
     size: float
 
@@ -66,10 +70,12 @@ class Free(NamedTuple):
     Attributes:
         joints: (m,) their rows.
         unit: (m,) reference length where they slide, else 1.
+        columns: (n,) which of them a joint is, -1 for none.
     """
 
     joints: Indices
     unit: Vector
+    columns: Indices
 
 
 @kernel
@@ -93,7 +99,7 @@ def follow_all(
     """
     count, n = held.shape
     ends, progress = matrix(count, n), vector(count)
-    pose = vector(6)
+    pose, turn = vector(6), vector(3)
     for i in range(count):
         for k in range(6):
             pose[k] = poses[i, k] if len(poses) else np.nan
@@ -106,7 +112,7 @@ def follow_all(
                     T[i, j, k, l] = R[j, k, l]
         for c in range(len(tree.pairs)):
             a, b = tree.pairs[c]
-            turn = rotation_log(times_transposed(R[a], R[b]))
+            rotation_between(R, a, R, b, turn, 0)
             for k in range(3):
                 most = max(abs(turn[k]), abs(p[a, k] - p[b, k]))
                 # written so that NaN stays
@@ -177,20 +183,21 @@ def _newton(
         that was asked; how far the tangent moves a joint.
     """
     n, count = len(q), 0
-    joints, unit = indices(n), vector(n)
+    joints, unit, columns = indices(n), vector(n), indices(n)
     ahead = 0.0
     for j in range(n):
+        columns[j] = -1
         if np.isfinite(held[j]):
             ahead = max(ahead, abs(held[j] - q[j]))
             q[j] = held[j]
         elif tree.kinds[j] > 0:
             joints[count], unit[count] = j, tree.size if tree.kinds[j] == 2 else 1.0
+            columns[j] = count
             count += 1
     joints, unit = joints[:count], unit[:count]
-    free = Free(joints, unit)
+    free = Free(joints, unit, columns)
     rows = 6 * len(tree.pairs) + 6
-    # columns as rows, padded with zeros to a multiple of the vector registers
-    r, J = vector(rows + -rows % LANES), matrix(count, rows + -rows % LANES)
+    r, J = vector(rows), matrix(len(tree.moves), 6)
     before, first = np.inf, 0.0
     for iteration in range(_NEWTON):
         R, p = forward(tree, q)
@@ -198,7 +205,7 @@ def _newton(
         worst = _largest(r)
         if near and not careful and worst < _NEAR:
             return True, True, ahead
-        x, determined = _least_step(J, r)
+        x, determined = _least_step(tree, free, J, r)
         largest = _largest(x)
         still = largest < 1e-9
         if iteration == 0 and not careful:
@@ -224,28 +231,26 @@ def _newton(
 @part
 def forward(tree: Tree, q: Vector) -> tuple[Matrices, Matrix]:
     """Rotations (n, 3, 3) and origins (n, 3) of all frames before their own motion."""
-    n, parents, kinds, fixed = len(q), tree.parents, tree.kinds, tree.fixed
+    n, kinds = len(q), tree.kinds
     R, p = matrices(n, 3, 3), matrix(n, 3)
     after_R, after_p = matrices(n, 3, 3), matrix(n, 3)
     for i in range(n):
-        j = parents[i]
-        for k in range(3):
-            p[i, k] = fixed[i, k, 3] if j < 0 else after_p[j, k]
-            for l in range(3):
-                R[i, k, l] = fixed[i, k, l] if j < 0 else 0.0
-                if j >= 0:
-                    p[i, k] += after_R[j, k, l] * fixed[i, l, 3]
-                    for m in range(3):
-                        R[i, k, l] += after_R[j, k, m] * fixed[i, m, l]
+        j, fixed = tree.parents[i], tree.fixed[i]
         slid = q[i] if kinds[i] == 2 else 0.0
         c, s = 1.0, 0.0
         if kinds[i] == 1:
             c, s = math.cos(q[i]), math.sin(q[i])
         for k in range(3):
-            after_p[i, k] = p[i, k] + slid * R[i, k, 2]
-            after_R[i, k, 0] = c * R[i, k, 0] + s * R[i, k, 1]
-            after_R[i, k, 1] = c * R[i, k, 1] - s * R[i, k, 0]
-            after_R[i, k, 2] = R[i, k, 2]
+            x, y, z, t = fixed[k, 0], fixed[k, 1], fixed[k, 2], fixed[k, 3]
+            if j >= 0:
+                a, b, d = after_R[j, k, 0], after_R[j, k, 1], after_R[j, k, 2]
+                x = a * fixed[0, 0] + b * fixed[1, 0] + d * fixed[2, 0]
+                y = a * fixed[0, 1] + b * fixed[1, 1] + d * fixed[2, 1]
+                z = a * fixed[0, 2] + b * fixed[1, 2] + d * fixed[2, 2]
+                t = a * fixed[0, 3] + b * fixed[1, 3] + d * fixed[2, 3] + after_p[j, k]
+            R[i, k, 0], R[i, k, 1], R[i, k, 2], p[i, k] = x, y, z, t
+            after_R[i, k, 0], after_R[i, k, 1] = c * x + s * y, c * y - s * x
+            after_R[i, k, 2], after_p[i, k] = z, t + slid * z
     return R, p
 
 
@@ -253,51 +258,45 @@ def forward(tree: Tree, q: Vector) -> tuple[Matrices, Matrix]:
 def _equations(
     tree: Tree, R: Matrices, p: Matrix, pose: Vector, free: Free, r: Vector, J: Matrix
 ) -> None:
-    """Scaled residuals and, a row for each free joint, their derivatives."""
-    kinds, carries, pairs = tree.kinds, tree.carries, tree.pairs
-    platform, size = tree.platform, tree.size
-    joints, unit = free.joints, free.unit
-    for c in range(len(pairs)):
-        a, b = pairs[c]
-        row = 6 * c
-        turn = rotation_log(times_transposed(R[a], R[b]))
-        for k in range(3):
-            r[row + k], r[row + 3 + k] = turn[k], (p[a, k] - p[b, k]) / size
-        for i in range(len(joints)):
-            j = joints[i]
-            sign = carries[a, j] - carries[b, j]
-            if sign != 0.0:
-                _move(
-                    kinds[j],
-                    R[j],
-                    p[j],
-                    p[a],
-                    sign * unit[i],
-                    size,
-                    J[i, row : row + 6],
-                )
-    row = 6 * len(pairs)
+    """Scaled residuals and, a row for each of the tree's moves, their derivatives."""
+    pairs, platform, size = tree.pairs, tree.platform, tree.size
+    closures, groups = len(pairs), tree.groups
+    for g in range(closures + 1):
+        a = pairs[g, 0] if g < closures else platform
+        if g < closures:
+            b = pairs[g, 1]
+            rotation_between(R, a, R, b, r, 6 * g)
+            for k in range(3):
+                r[6 * g + 3 + k] = (p[a, k] - p[b, k]) / size
+        for e in range(groups[g], groups[g + 1]):
+            j = tree.moves[e, 0]
+            i = free.columns[j]
+            if i >= 0:
+                factor = tree.moves[e, 1] * free.unit[i]
+                x, y, z = factor * R[j, 0, 2], factor * R[j, 1, 2], factor * R[j, 2, 2]
+                if tree.kinds[j] == 1:
+                    J[e, 0], J[e, 1], J[e, 2] = x, y, z
+                    u, v, w = p[a, 0] - p[j, 0], p[a, 1] - p[j, 1], p[a, 2] - p[j, 2]
+                    x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
+                J[e, 3], J[e, 4], J[e, 5] = x / size, y / size, z / size
+    first = groups[closures]
+    row = 6 * closures
     whole, none = True, True
     for k in range(3):
         whole = whole and np.isfinite(pose[3 + k])
         none = none and not np.isfinite(pose[3 + k])
-    for i in range(len(joints)):
-        j = joints[i]
-        if carries[platform, j] != 0.0:
-            out = J[i, row : row + 6]
-            _move(kinds[j], R[j], p[j], p[platform], unit[i], size, out)
     turn = vector(3)
     if whole:
         # regular near half a turn when the whole rotation is given
         asked = rotation_exp(pose[3], pose[4], pose[5])
-        turn = rotation_log(times_transposed(R[platform], asked))
+        rotation_between(R, platform, asked, 0, turn, 0)
     elif not none:
-        turn = rotation_log(R[platform])
-        left = inverse_left_jacobian(turn)
-        for i in range(len(joints)):
-            a0, a1, a2 = J[i, row], J[i, row + 1], J[i, row + 2]
+        turn[0], turn[1], turn[2] = rotation_log(R[platform])
+        left = inverse_left_jacobian(turn[0], turn[1], turn[2])
+        for e in range(first, len(J)):
+            a0, a1, a2 = J[e, 0], J[e, 1], J[e, 2]
             for k in range(3):
-                J[i, row + k] = left[k, 0] * a0 + left[k, 1] * a1 + left[k, 2] * a2
+                J[e, k] = left[0, k, 0] * a0 + left[0, k, 1] * a1 + left[0, k, 2] * a2
         for k in range(3):
             turn[k] -= pose[3 + k]
     for k in range(3):
@@ -305,26 +304,8 @@ def _equations(
     for k in range(6):
         if not np.isfinite(pose[(k + 3) % 6]):
             r[row + k] = 0.0
-            for i in range(len(joints)):
-                J[i, row + k] = 0.0
-
-
-@part
-def _move(
-    kind: int, R: Matrix, origin: Vector, point: Vector, factor: float, size: float,
-    screw: Vector,
-) -> None:  # fmt: skip
-    """Screw of a unit joint motion at a point, scaled."""
-    for k in range(3):
-        l, m = (k + 1) % 3, (k + 2) % 3
-        if kind == 1:
-            screw[k] = factor * R[k, 2]
-            moment = R[l, 2] * (point[m] - origin[m])
-            moment -= R[m, 2] * (point[l] - origin[l])
-            screw[3 + k] = factor * moment / size
-        else:
-            screw[k] = 0.0
-            screw[3 + k] = factor * R[k, 2] / size
+            for e in range(first, len(J)):
+                J[e, k] = 0.0
 
 
 @part
@@ -340,45 +321,67 @@ def _largest(v: Vector) -> float:
 
 
 @part(fastmath=FAST)
-def _least_step(J: Matrix, r: Vector) -> tuple[Vector, bool]:
-    """Least-squares x of J^T x = r, of least norm by damping at rounding level.
+def _least_step(tree: Tree, free: Free, J: Matrix, r: Vector) -> tuple[Vector, bool]:
+    """Least-squares step, of least norm by damping at rounding level.
+
+    Each equation moves with few joints: the normal matrix is summed closure by closure.
+    Of its rows the upper part is kept, from a multiple of the vector registers on.
 
     Returns:
-        x; whether it is determined without that.
+        (m,) the joint coordinates' step; whether it is determined without damping.
     """
-    n = len(J)
-    N, x = matrix(n, n), vector(n)
+    n, moves, columns = len(free.joints), tree.moves, free.columns
+    width = n + -n % _WIDTH
+    N, x, inverse = matrix(n, width), vector(n), vector(n)
     damping = 1e-30
+    for g in range(len(tree.groups) - 1):
+        first = tree.groups[g]
+        for e in range(first, tree.groups[g + 1]):
+            i = columns[moves[e, 0]]
+            if i < 0:
+                continue
+            a, b, c, d, f, h = J[e, 0], J[e, 1], J[e, 2], J[e, 3], J[e, 4], J[e, 5]
+            x[i] += a * r[6 * g] + b * r[6 * g + 1] + c * r[6 * g + 2]
+            x[i] += d * r[6 * g + 3] + f * r[6 * g + 4] + h * r[6 * g + 5]
+            for k in range(first, e + 1):
+                j = columns[moves[k, 0]]
+                if j >= 0:
+                    total = a * J[k, 0] + b * J[k, 1] + c * J[k, 2]
+                    N[j, i] += total + d * J[k, 3] + f * J[k, 4] + h * J[k, 5]
     for i in range(n):
-        row, right = J[i], 0.0
-        for l in range(len(r)):
-            right += row[l] * r[l]
-        x[i] = right
-        for j in range(i + 1):
-            other, total = J[j], 0.0
-            for l in range(len(r)):
-                total += row[l] * other[l]
-            N[i, j] = total
         damping += 1e-13 * N[i, i]
     determined = True
+    for i in range(0, n, 2):  # two pivots at once
+        row, other = N[i], N[min(i + 1, n - 1)]
+        determined = _pivot(row, i, damping, inverse) and determined
+        if i + 1 < n:
+            factor = row[i + 1]
+            for j in range(i - i % _WIDTH, width):
+                other[j] -= factor * row[j]
+            determined = _pivot(other, i + 1, damping, inverse) and determined
+        for k in range(i + 2, n):
+            a, b, to = row[k], other[k], N[k]
+            if a or b:
+                for j in range(k - k % _WIDTH, width):
+                    to[j] -= a * row[j] + b * other[j]
     for i in range(n):
-        N[i, i] += damping
-        row = N[i]
-        for j in range(i + 1):
-            other, total = N[j], row[j]
-            for l in range(j):
-                total -= row[l] * other[l]
-            if j < i:
-                row[j] = total * other[j]
-            else:  # kept as its inverse
-                determined = determined and total > _CLEAR * damping
-                row[j] = 1.0 / math.sqrt(max(total, 0.1 * damping))
-    for i in range(n):
-        for l in range(i):
-            x[i] -= N[i, l] * x[l]
-        x[i] *= N[i, i]
+        x[i] *= inverse[i]
+        row, factor = N[i], x[i]
+        for j in range(i + 1, n):
+            x[j] -= factor * row[j]
     for i in range(n - 1, -1, -1):
-        x[i] *= N[i, i]
-        for l in range(i):
-            x[l] -= N[i, l] * x[i]
+        row, total = N[i], x[i]
+        for j in range(i + 1, n):
+            total -= row[j] * x[j]
+        x[i] = total * inverse[i]
     return x, determined
+
+
+@kernel(fastmath=FAST)
+def _pivot(row: NDArray, i: int, damping: float, inverse: NDArray) -> bool:
+    """Divide a row by the root of its pivot; whether that is more than damping."""
+    pivot = row[i] + damping
+    inverse[i] = 1.0 / math.sqrt(max(pivot, 0.1 * damping))
+    for j in range(i - i % _WIDTH, len(row)):
+        row[j] *= inverse[i]
+    return pivot > _CLEAR * damping

@@ -99,13 +99,18 @@ def _tree(robot: Robot) -> "Tree":
     from assembly.kinematics.compiled_continuation import Tree
 
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    # a joint's motion comes after its own frame
+    carries = robot.on_path - np.eye(len(robot.frames))
+    moved = [carries[a] - carries[b] for a, b in pairs]
+    moved.append(carries[robot.index(robot.platform)])
+    moves = [(j, int(signs[j])) for signs in moved for j in np.flatnonzero(signs)]
     return Tree(
         parents=np.array(robot.parents),
         kinds=np.array([JOINTS.index(f.joint) for f in robot.frames]),
         fixed=np.array(robot.fixed_transforms),
-        # a joint's motion comes after its own frame
-        carries=robot.on_path - np.eye(len(robot.frames)),
         pairs=np.array(pairs, dtype=int).reshape(-1, 2),
+        moves=np.array(moves, dtype=int).reshape(-1, 2),
+        groups=np.cumsum([0, *map(np.count_nonzero, moved)]),
         platform=robot.index(robot.platform),
         size=size_of(robot),
     )
