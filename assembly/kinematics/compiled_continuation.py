@@ -33,6 +33,10 @@ _LONG = 0.7  # of it: the step that is tried, by the tangent
 _SHORT = 0.03  # of the way: where long steps lead nowhere
 _FIRST_STEP = 0.125  # there, and where the target does not determine all joints
 _CURVED = 0.25  # of the tangent's step: largest correction of it
+_LEAST = 1e-13  # damping, of the normal matrix' trace, where all joints are determined
+# where some are not: rounding moves those by its own size over the damping, and with
+# less they would stand elsewhere on every processor
+_SPREAD = 1e-9
 _CLEAR = 1e4  # times the damping: a joint motion of its own
 _SMALLEST_STEP = 1e-5
 _WIDTH = 8  # numbers in a vector register
@@ -205,7 +209,7 @@ def _newton(
         worst = _largest(r)
         if near and not careful and worst < _NEAR:
             return True, True, ahead
-        x, determined = _least_step(tree, free, J, r)
+        x, determined = _least_step(tree, free, J, r, _SPREAD if careful else _LEAST)
         largest = _largest(x)
         still = largest < 1e-9
         if iteration == 0 and not careful:
@@ -321,8 +325,10 @@ def _largest(v: Vector) -> float:
 
 
 @part(fastmath=FAST)
-def _least_step(tree: Tree, free: Free, J: Matrix, r: Vector) -> tuple[Vector, bool]:
-    """Least-squares step, of least norm by damping at rounding level.
+def _least_step(
+    tree: Tree, free: Free, J: Matrix, r: Vector, damped: float
+) -> tuple[Vector, bool]:
+    """Least-squares step, of least norm by damping.
 
     Each equation moves with few joints: the normal matrix is summed closure by closure.
     Of its rows the upper part is kept, from a multiple of the vector registers on.
@@ -349,7 +355,7 @@ def _least_step(tree: Tree, free: Free, J: Matrix, r: Vector) -> tuple[Vector, b
                     total = a * J[k, 0] + b * J[k, 1] + c * J[k, 2]
                     N[j, i] += total + d * J[k, 3] + f * J[k, 4] + h * J[k, 5]
     for i in range(n):
-        damping += 1e-13 * N[i, i]
+        damping += damped * N[i, i]
     determined = True
     for i in range(0, n, 2):  # two pivots at once
         row, other = N[i], N[min(i + 1, n - 1)]
