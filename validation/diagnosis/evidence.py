@@ -108,7 +108,8 @@ class Evidence:
             along: (k,) of columns and residual.
             squares: of the residual.
             start: of the same terms with nearly the same residual: the choice of terms
-                is kept, sizes are looked for from there.
+                is kept, sizes are looked for from there; unknowns that it left out
+                come in where they are called for now.
 
         Returns:
             The prior.
@@ -160,14 +161,23 @@ class Evidence:
             used = list(start.used)
             for i, term in enumerate(self.terms):
                 scales[2 * i : 2 * i + 2] = start.scales.get(term.name, np.nan)
-        for _ in range(_PASSES):
+        for turn in range(_PASSES):
             prior, values, scales = self._sized(used, along, squares, scales)
             parts = np.split(values, self._begin[1:-1])
             wrong = [x < t.lower for t, x in zip(self.terms, parts, strict=True)]
-            if not any(w.any() for w in wrong):
+            again = self._called_for(used, along, values) if start and not turn else []
+            if not any(w.any() for w in (*wrong, *again)):
                 break
             used = [u & ~w for u, w in zip(used, wrong, strict=True)]
+            used = [u | a for u, a in zip(used, again or used, strict=True)]
         return prior
+
+    def _called_for(
+        self, used: Sequence[NDArray], along: NDArray, values: NDArray
+    ) -> list[NDArray]:
+        """Unknowns left out of terms in use that what is left would make positive."""
+        left = np.split(along - self._gram @ values, self._begin[1:-1])
+        return [u.any() & ~u & (b > 0.0) for u, b in zip(used, left, strict=True)]
 
     def _sized(
         self, used: Sequence[NDArray], along: NDArray, squares: float, start: NDArray
