@@ -182,14 +182,20 @@ def _plain(one: Alternative) -> list[str]:
     return [name.partition("(")[0] for name in one.names]
 
 
-def make(folder: Path, seed: int, only: str | None = None) -> None:
-    """Write a case's campaign and truth, unless it is there."""
+def make(
+    folder: Path, seed: int, only: str | None = None, understated: float = 1.0
+) -> None:
+    """Write a case's campaign and truth, unless it is there.
+
+    The campaign states a sigma that is too small by the factor ``understated``.
+    """
     name = f"c{seed:04d}"
     if (folder / "truths" / f"{name}.json").exists():
         return
     kind, campaign = draw_case(seed, only)
     shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
-    write_campaign(campaign, folder / "campaigns" / name)
+    stated = replace(campaign, sigma=campaign.sigma / understated)
+    write_campaign(stated, folder / "campaigns" / name)
     truth = plain(truth_with_rivals(kind, campaign))
     write_json({name: truth}, str(folder / "truths" / f"{name}.json"))
 
@@ -345,6 +351,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--kind", choices=MIX, help="campaigns of one kind alone")
     parser.add_argument("--step", type=int, default=1, help="for several at a time")
+    parser.add_argument(
+        "--understated", type=float, default=1.0, help="sigma stated too small by it"
+    )
     parser.add_argument("--make", action="store_true", help="make campaigns only")
     parser.add_argument("--answer", action="store_true", help="of those made already")
     parser.add_argument("--score", action="store_true", help="score answers only")
@@ -356,7 +365,7 @@ def main() -> None:
             started = time.perf_counter()
             try:
                 if not asked.answer:
-                    make(asked.folder, seed, asked.kind)
+                    make(asked.folder, seed, asked.kind, asked.understated)
             except SimulationFailed as error:
                 print(f"case {seed}: left out, {error}", flush=True)
             made = (asked.folder / "truths" / f"c{seed:04d}.json").exists()
