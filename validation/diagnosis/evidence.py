@@ -17,7 +17,7 @@ Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -107,18 +107,21 @@ class Evidence:
         Args:
             along: (k,) of columns and residual.
             squares: of the residual.
-            start: of the same terms with nearly the same residual: the choice of terms
-                is kept, sizes are looked for from there; unknowns that it left out
-                come in where they are called for now.
+            start: of the same terms with nearly the same residual: its choice of terms,
+                and those that differ by one, are looked at, sizes from there; unknowns
+                that it left out come in where they are called for now.
 
         Returns:
             The prior.
         """
-        if start is not None:
+        choices: Iterable[Sequence[bool]]
+        if start is None:
+            choices = product(*((True,) if s else (False, True) for s in self._sure))
+        else:
             on = [bool(used.any()) for used in start.used]
-            return self._fitted(on, along, squares, start)
-        choices = product(*((True,) if s else (False, True) for s in self._sure))
-        priors = [self._fitted(chosen, along, squares) for chosen in choices]
+            free = [None, *(i for i, sure in enumerate(self._sure) if not sure)]
+            choices = [[o ^ (i == k) for i, o in enumerate(on)] for k in free]
+        priors = [self._fitted(chosen, along, squares, start) for chosen in choices]
         return max(priors, key=lambda prior: prior.evidence)
 
     @property
@@ -158,7 +161,8 @@ class Evidence:
         used = [np.full(len(t), on) for t, on in zip(self.terms, chosen, strict=True)]
         scales = np.full(2 * len(self.terms), np.nan)
         if start is not None:
-            used = list(start.used)
+            kept = zip(start.used, used, strict=True)
+            used = [was if was.any() and now.any() else now for was, now in kept]
             for i, term in enumerate(self.terms):
                 scales[2 * i : 2 * i + 2] = start.scales.get(term.name, np.nan)
         for turn in range(_PASSES):
