@@ -233,6 +233,8 @@ def score(folder: Path) -> dict[str, Any]:
     inside: list[bool] = []
     ratios: list[float] = []
     outside: list[float] = []
+    places: list[bool] = []
+    variables: list[bool] = []
     brier: list[float] = []
     seconds: list[float] = []
     wrong: list[str] = []
@@ -255,6 +257,10 @@ def score(folder: Path) -> dict[str, Any]:
             )
         if truth["kind"] == "outside":
             outside.append(diagnosis["error"]["after"]["normalised"])
+            if diagnosis.get("learned"):
+                place, variable = _place_and_variable(truth, diagnosis)
+                places.append(place)
+                variables.append(variable)
         if result == "right" and diagnosis["verdict"] == "explained":
             ratios.append(diagnosis["error"]["after"]["normalised"])
             inside += _inside(truth, diagnosis)
@@ -268,6 +274,9 @@ def score(folder: Path) -> dict[str, Any]:
         "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
         "after_over_noise": _spread(ratios),
         "outside_after_over_noise": _spread(outside),
+        "outside_within_1.2": [float(np.mean(np.array(outside) <= 1.2)), len(outside)],
+        "place_right": [float(np.mean(places)), len(places)],
+        "variable_right": [float(np.mean(variables)), len(variables)],
         "brier": _spread(brier),
         "seconds": _spread(seconds),
         "wrong": wrong,
@@ -293,6 +302,26 @@ def _judge(truth: dict, diagnosis: dict) -> str:
     if truth["kind"] == "outside":
         return "right" if loose and claimed in accepted else "false claim"
     return "right" if claimed in accepted and claimed else "false claim"
+
+
+def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
+    """Whether some function learned is where, and of what, the hidden effect is."""
+    (effect,) = truth["effects"]
+    name, keys = effect["name"], [p["name"] for p in effect["parameters"]]
+    frames = {key.removesuffix(".amplitude").removesuffix(".phase") for key in keys}
+    at_reading = name in ("_stand", "_sag")
+    wanted = {"reading"} if at_reading else frames
+    of = {
+        "_humidity": {"cov.humidity"},
+        "_quadratic_temperature": {"cov.temperature"},
+    }.get(name, {f"q.{frame}" for frame in frames})
+    places = {one["where"] for one in diagnosis["learned"]}
+    for one in diagnosis["learned"]:
+        for same in one["equivalent_places"]:
+            places |= {part["where"] for part in same}
+    variables = {v for one in diagnosis["learned"] for v in one["variables"]}
+    loaded = at_reading and any(v.startswith("load.") for v in variables)
+    return bool(places & wanted), loaded or bool(variables & of)
 
 
 def _told(diagnosis: dict) -> str:
