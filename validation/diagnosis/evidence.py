@@ -17,7 +17,7 @@ Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -31,6 +31,8 @@ from validation.diagnosis.small_terms import SmallTerm
 _PASSES = 6  # of leaving out springs that would be stiffer than declared
 _LEAST, _MOST = -6.0, 14.0  # logarithms of sizes over those that show as noise does
 _FIRST = 1.5  # from which they are looked for
+_GLANCES = (-1.5, 0.0, 1.5)  # likewise, at which a further term is looked at
+_NEAR = 20.0  # by how much less likely a choice may look that is then fitted
 _FURTHER = np.log(10.0)  # of each term: a tenth as likely
 
 
@@ -114,15 +116,56 @@ class Evidence:
         Returns:
             The prior.
         """
-        choices: Iterable[Sequence[bool]]
         if start is None:
             choices = product(*((True,) if s else (False, True) for s in self._sure))
-        else:
-            on = [bool(used.any()) for used in start.used]
-            free = [None, *(i for i, sure in enumerate(self._sure) if not sure)]
-            choices = [[o ^ (i == k) for i, o in enumerate(on)] for k in free]
-        priors = [self._fitted(chosen, along, squares, start) for chosen in choices]
+            priors = [self._fitted(chosen, along, squares) for chosen in choices]
+            return max(priors, key=lambda prior: prior.evidence)
+        on = [bool(used.any()) for used in start.used]
+        priors = [self._fitted(on, along, squares, start)]
+        for k in np.flatnonzero(~np.array(self._sure, dtype=bool)):
+            other = [o ^ (i == k) for i, o in enumerate(on)]
+            near = self._at_a_glance(other, priors[0], along, squares)
+            if near > priors[0].evidence - _NEAR:
+                priors.append(self._fitted(other, along, squares, start))
         return max(priors, key=lambda prior: prior.evidence)
+
+    def _at_a_glance(
+        self, chosen: Sequence[bool], near: Prior, along: NDArray, squares: float
+    ) -> float:
+        """About the evidence of a choice, at the sizes of another one near to it."""
+        mask = np.concatenate([np.zeros(0, bool), *self._of(chosen, near)])
+        G, b = self._gram[np.ix_(mask, mask)], along[mask]
+        group, given = self._group[mask], self._given[mask]
+        known, shows = self._scales(near), self._shows(G, group)
+        evidence = -np.inf
+        for log in _GLANCES:
+            scales = np.where(np.isfinite(known), known, shows * np.exp(log))
+            s = np.where(group < 0, given, scales[group])
+            x, cost, _ = _solved(G, s, b)
+            evidence = max(evidence, -0.5 * (squares - float(x @ (s * b))) - cost)
+        return evidence
+
+    def _of(self, chosen: Sequence[bool], near: Prior) -> list[NDArray]:
+        """Unknowns of chosen terms: those that another prior uses, where it does."""
+        return [
+            was if on and was.any() else np.full(len(was), on)
+            for on, was in zip(chosen, near.used, strict=True)
+        ]
+
+    def _scales(self, prior: Prior) -> NDArray:
+        """Sizes that a prior found, by group of unknowns; NaN of others."""
+        unknown = np.nan, np.nan
+        return np.array([
+            s for t in self.terms for s in prior.scales.get(t.name, unknown)
+        ])
+
+    def _shows(self, G: NDArray, group: NDArray) -> NDArray:
+        """Sizes that show as much as noise does, by group of unknowns."""
+        shows = np.ones(2 * len(self.terms))
+        for g in np.unique(group[group >= 0]):
+            shown = float(np.mean(np.diag(G)[group == g]))
+            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
+        return shows
 
     @property
     def always(self) -> bool:
@@ -161,10 +204,7 @@ class Evidence:
         used = [np.full(len(t), on) for t, on in zip(self.terms, chosen, strict=True)]
         scales = np.full(2 * len(self.terms), np.nan)
         if start is not None:
-            kept = zip(start.used, used, strict=True)
-            used = [was if was.any() and now.any() else now for was, now in kept]
-            for i, term in enumerate(self.terms):
-                scales[2 * i : 2 * i + 2] = start.scales.get(term.name, np.nan)
+            used, scales = self._of(chosen, start), self._scales(start)
         for turn in range(_PASSES):
             prior, values, scales = self._sized(used, along, squares, scales)
             parts = np.split(values, self._begin[1:-1])
@@ -195,10 +235,7 @@ class Evidence:
         G, b = self._gram[np.ix_(mask, mask)], along[mask]
         group, given = self._group[mask], self._given[mask]
         asked = np.unique(group[group >= 0])
-        shows = np.ones(2 * len(self.terms))  # sizes that show as much as noise does
-        for g in asked:
-            shown = float(np.mean(np.diag(G)[group == g]))
-            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
+        shows = self._shows(G, group)
 
         def sizes(logs: NDArray) -> NDArray:
             return np.where(group < 0, given, (shows * np.exp(logs))[group])
