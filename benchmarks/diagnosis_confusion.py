@@ -271,12 +271,12 @@ def score(folder: Path) -> dict[str, Any]:
     return {
         "outcome": {k: dict(v) for k, v in sorted(outcome.items())},
         "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
-        "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
+        "coverage_90": _share(inside),
         "after_over_noise": _spread(ratios),
         "outside_after_over_noise": _spread(outside),
-        "outside_within_1.2": [float(np.mean(np.array(outside) <= 1.2)), len(outside)],
-        "place_right": [float(np.mean(places)), len(places)],
-        "variable_right": [float(np.mean(variables)), len(variables)],
+        "outside_within_1.2": _share([ratio <= 1.2 for ratio in outside]),
+        "place_right": _share(places),
+        "variable_right": _share(variables),
         "brier": _spread(brier),
         "seconds": _spread(seconds),
         "wrong": wrong,
@@ -358,6 +358,11 @@ def _inside(truth: dict, diagnosis: dict) -> list[bool]:
                 away = abs(parameter["value"] - known[key])
                 inside.append(away <= WITHIN_90 * parameter["std"])
     return inside
+
+
+def _share(right: list[bool]) -> list[float | int | None]:
+    """Share of what is right, and of how many."""
+    return [float(np.mean(right)) if right else None, len(right)]
 
 
 def _spread(values: list[float]) -> dict[str, float | int]:
