@@ -182,14 +182,20 @@ def _plain(one: Alternative) -> list[str]:
     return [name.partition("(")[0] for name in one.names]
 
 
-def make(folder: Path, seed: int, only: str | None = None) -> None:
-    """Write a case's campaign and truth, unless it is there."""
+def make(
+    folder: Path, seed: int, only: str | None = None, understated: float = 1.0
+) -> None:
+    """Write a case's campaign and truth, unless it is there.
+
+    The campaign states a sigma that is too small by the factor ``understated``.
+    """
     name = f"c{seed:04d}"
     if (folder / "truths" / f"{name}.json").exists():
         return
     kind, campaign = draw_case(seed, only)
     shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
-    write_campaign(campaign, folder / "campaigns" / name)
+    stated = replace(campaign, sigma=campaign.sigma / understated)
+    write_campaign(stated, folder / "campaigns" / name)
     truth = plain(truth_with_rivals(kind, campaign))
     write_json({name: truth}, str(folder / "truths" / f"{name}.json"))
 
@@ -227,6 +233,8 @@ def score(folder: Path) -> dict[str, Any]:
     inside: list[bool] = []
     ratios: list[float] = []
     outside: list[float] = []
+    places: list[bool] = []
+    variables: list[bool] = []
     brier: list[float] = []
     seconds: list[float] = []
     wrong: list[str] = []
@@ -249,6 +257,10 @@ def score(folder: Path) -> dict[str, Any]:
             )
         if truth["kind"] == "outside":
             outside.append(diagnosis["error"]["after"]["normalised"])
+            if diagnosis.get("learned"):
+                place, variable = _place_and_variable(truth, diagnosis)
+                places.append(place)
+                variables.append(variable)
         if result == "right" and diagnosis["verdict"] == "explained":
             ratios.append(diagnosis["error"]["after"]["normalised"])
             inside += _inside(truth, diagnosis)
@@ -259,9 +271,12 @@ def score(folder: Path) -> dict[str, Any]:
     return {
         "outcome": {k: dict(v) for k, v in sorted(outcome.items())},
         "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
-        "coverage_90": [float(np.mean(inside)) if inside else None, len(inside)],
+        "coverage_90": _share(inside),
         "after_over_noise": _spread(ratios),
         "outside_after_over_noise": _spread(outside),
+        "outside_within_1.2": _share([ratio <= 1.2 for ratio in outside]),
+        "place_right": _share(places),
+        "variable_right": _share(variables),
         "brier": _spread(brier),
         "seconds": _spread(seconds),
         "wrong": wrong,
@@ -287,6 +302,26 @@ def _judge(truth: dict, diagnosis: dict) -> str:
     if truth["kind"] == "outside":
         return "right" if loose and claimed in accepted else "false claim"
     return "right" if claimed in accepted and claimed else "false claim"
+
+
+def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
+    """Whether some function learned is where, and of what, the hidden effect is."""
+    (effect,) = truth["effects"]
+    name, keys = effect["name"], [p["name"] for p in effect["parameters"]]
+    frames = {key.removesuffix(".amplitude").removesuffix(".phase") for key in keys}
+    at_reading = name in ("_stand", "_sag")
+    wanted = {"reading"} if at_reading else frames
+    of = {
+        "_humidity": {"cov.humidity"},
+        "_quadratic_temperature": {"cov.temperature"},
+    }.get(name, {f"q.{frame}" for frame in frames})
+    places = {one["where"] for one in diagnosis["learned"]}
+    for one in diagnosis["learned"]:
+        for same in one["equivalent_places"]:
+            places |= {part["where"] for part in same}
+    variables = {v for one in diagnosis["learned"] for v in one["variables"]}
+    loaded = at_reading and any(v.startswith("load.") for v in variables)
+    return bool(places & wanted), loaded or bool(variables & of)
 
 
 def _told(diagnosis: dict) -> str:
@@ -325,6 +360,11 @@ def _inside(truth: dict, diagnosis: dict) -> list[bool]:
     return inside
 
 
+def _share(right: list[bool]) -> list[float | int | None]:
+    """Share of what is right, and of how many."""
+    return [float(np.mean(right)) if right else None, len(right)]
+
+
 def _spread(values: list[float]) -> dict[str, float | int]:
     """Median, 90 % and number."""
     if not values:
@@ -345,6 +385,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--kind", choices=MIX, help="campaigns of one kind alone")
     parser.add_argument("--step", type=int, default=1, help="for several at a time")
+    parser.add_argument(
+        "--understated", type=float, default=1.0, help="sigma stated too small by it"
+    )
     parser.add_argument("--make", action="store_true", help="make campaigns only")
     parser.add_argument("--answer", action="store_true", help="of those made already")
     parser.add_argument("--score", action="store_true", help="score answers only")
@@ -356,7 +399,7 @@ def main() -> None:
             started = time.perf_counter()
             try:
                 if not asked.answer:
-                    make(asked.folder, seed, asked.kind)
+                    make(asked.folder, seed, asked.kind, asked.understated)
             except SimulationFailed as error:
                 print(f"case {seed}: left out, {error}", flush=True)
             made = (asked.folder / "truths" / f"c{seed:04d}.json").exists()

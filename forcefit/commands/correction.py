@@ -169,22 +169,23 @@ def carry(
 ) -> None:
     """Carry a saved robot over to a new session.
 
-    Where the device stands (and what --fit names) is fitted to the set-up rows of each
-    session; the error is that of its other rows, beside the declared robot's.  Exit
-    status 1, and no robot written, where the set-up rows do not suffice or the saved
-    robot is worse than the declared one.
+    Where the device stands, what changed with time (and what --fit names) is fitted to
+    the set-up rows of each session; the error is that of its other rows, beside the
+    declared robot's.  Exit status 1, and no robot written, where the set-up rows do not
+    suffice or the saved robot is worse than the declared one.
     """
     from assembly.files.robot_file import write_robot
     from assembly.robots import load_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
     from validation.correction import carrying, carrying_table
+    from validation.correction.session_unknowns import OF_A_SESSION
 
     if output is not None:
         check_writable(output, ROBOT)
     fitted = [name.strip() for name in fit.split(",")]
     for name in fitted:
-        if name not in carrying.OF_A_SESSION:
-            hint = nearest(name, carrying.OF_A_SESSION)
+        if name not in OF_A_SESSION:
+            hint = nearest(name, OF_A_SESSION)
             raise BadInput(f"--fit: found {quoted(name)}{hint}")
     declared = read_campaign(campaign)
     data = read_commands(campaign, load_robot(robot))

@@ -1,8 +1,9 @@
 r"""A saved robot in a new session: what belongs to the session from set-up rows.
 
-Of a session are where the measuring device stands and, if asked for, the measured point
-and the zeros of the joints; everything else is the robot's.  They are fitted to the
-set-up rows of each session, and judged on all its other rows.
+Of a session are where the measuring device stands, what changed with time and, if asked
+for, the measured point and the zeros of the joints (:mod:`.session_unknowns`);
+everything else is the robot's.  They are fitted to the set-up rows of each session, and
+judged on all its other rows.
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
@@ -12,9 +13,9 @@ J       ``slopes``     (R,6,k)    change of the readings per unit of it
 C       ``covariance`` (k, k)     of the values
 ======  =============  =========  ====================================================
 
-The covariance grows with what the set-up rows leave unexplained, and as if rows of one
-configuration told the same.  Where it lets the other rows move by more than the set-up
-rows are off, the set-up rows do not suffice.
+The set-up rows weigh less, and the covariance grows, with what they leave unexplained,
+and as if rows of one configuration told the same.  Where the covariance lets the other
+rows move by more than the set-up rows are off, the set-up rows do not suffice.
 """
 
 from collections.abc import Sequence
@@ -24,8 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.registration import BASE, TOOL
+from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.model.robot import Robot
@@ -33,12 +33,16 @@ from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from validation.campaign.campaign import Campaign
 from validation.correction.prediction import error_of, finite_conditions
+from validation.correction.session_unknowns import (
+    DRIFT,
+    SessionUnknowns,
+    of_one_session,
+    session_unknowns,
+    without_session,
+)
 from validation.diagnosis.registration import coarse_frame
 
-OF_A_SESSION = ("registration", "tool", "zeros")
-_ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set anew
 _STEPS = 8
-_STEP = 1e-6  # [rad, m] for slopes
 _SETTLED = 1e-3  # [sigma of the value] a step that changes nothing
 
 
@@ -48,7 +52,7 @@ class Carried:
 
     Attributes:
         session: its name, None where the campaign has but one.
-        names: of the k values: effect and parameter.
+        unknowns: the k values that were fitted.
         values: (k,) [rad, m].
         std: (k,) of them.
         rows: numbers of set-up rows and of others.
@@ -58,10 +62,12 @@ class Carried:
             rms.
         left: [m] rms of what they leave unexplained in themselves.
         open_: names of the values that are known least, if they do not suffice.
+        left_behind: what changed with time where the robot was learned, and is not
+            fitted here: without a clock nobody can say how it goes on.
     """
 
     session: str | None
-    names: tuple[tuple[str, str], ...]
+    unknowns: SessionUnknowns
     values: NDArray
     std: NDArray
     rows: tuple[int, int]
@@ -70,6 +76,7 @@ class Carried:
     uncertainty: float
     left: float
     open_: tuple[str, ...]
+    left_behind: tuple[str, ...]
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -83,14 +90,6 @@ class Carried:
         """Whether the robot foretells the other rows better than the declared one."""
         known = np.isfinite(self.declared)
         return bool(np.all(self.error[known][-1:] <= self.declared[known][-1:]))
-
-    @property
-    def effects(self) -> dict[str, dict[str, float]]:
-        """What was fitted, by effect."""
-        values: dict[str, dict[str, float]] = {}
-        for (effect, name), value in zip(self.names, self.values.tolist(), strict=True):
-            values.setdefault(effect, {})[name] = value
-        return values
 
 
 def carry(
@@ -123,55 +122,55 @@ def carry(
         if not chosen.any() or chosen.all():
             rows = "no set-up rows" if not chosen.any() else "nothing but set-up rows"
             raise BadInput(f"--setup: found {rows} in {which}; expected some, not all")
-        own = replace(campaign.take(of_it), robot=_unregistered(campaign.robot))
-        answers.append(_carried(own, declared.take(of_it), chosen, fitted, session))
+        clock = "time" in campaign.covariates
+        unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
+        own = replace(campaign.take(of_it), robot=without_session(campaign.robot))
+        one = _carried(own, declared.take(of_it), chosen, unknowns, session)
+        behind = _left_behind(campaign.robot, unknowns)
+        answers.append(replace(one, left_behind=behind))
     return answers
 
 
+def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
+    """Titles of what changed with time and is not among a session's unknowns."""
+    drift, functions = of_one_session(robot)
+    whole = [DRIFT] if drift and unknowns.constant is None else []
+    return (*whole, *(f.title for f in functions if f not in unknowns.functions))
+
+
 def carried_robot(robot: Robot, carried: Sequence[Carried]) -> Robot:
-    """The robot with what was found of its sessions, its old registration gone."""
-    robot = _unregistered(robot)
+    """The robot with what was found of its sessions, what was of its old one gone."""
+    robot = without_session(robot)
     for one in carried:
+        effects = one.unknowns.effects(one.values)
+        functions = one.unknowns.functions_with(one.values, one.session)
+        robot = replace(robot, functions=(*robot.functions, *functions))
         if one.session is None:
-            merged = _added(robot.effects, one.effects)
-            robot = replace(robot, effects=merged)
+            robot = replace(robot, effects=_added(robot.effects, effects))
         else:
             before = robot.session_effects.get(one.session, {})
-            sessions = {
-                **robot.session_effects,
-                one.session: _added(before, one.effects),
-            }
+            sessions = {**robot.session_effects, one.session: _added(before, effects)}
             robot = replace(robot, session_effects=sessions)
     return robot
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Effects with more added to their parameters; these are all sums."""
+    """Effects with more added to their parameters; these are all sums but a drift's."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})
         for name, value in values.items():
-            own[name] = own.get(name, 0.0) + value
+            own[name] = value if effect == DRIFT else own.get(name, 0.0) + value
     return merged
 
 
-def _unregistered(robot: Robot) -> Robot:
-    """The robot without the device's place, which is of the session it was found in."""
-    effects = {name: dict(values) for name, values in robot.effects.items()}
-    tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
-    if tool:
-        effects["registration"] = tool
-    return replace(robot, effects=effects)
-
-
 def _carried(
-    campaign: Campaign, declared: Campaign, setup: NDArray, fitted: Sequence[str],
+    campaign: Campaign, declared: Campaign, setup: NDArray, unknowns: SessionUnknowns,
     session: str | None,
 ) -> Carried:  # fmt: skip
     """One session, its rows alone."""
-    names, prior = _names(campaign.robot, fitted)
-    fit = _fitted(campaign, setup, names, prior)
-    other = _fitted(declared, setup, names, prior)
+    fit = _fitted(campaign, setup, unknowns)
+    other = _fitted(declared, setup, unknowns)
     rest = campaign.take(~setup)
     spread = np.einsum("rck,kl,rcl->rc", fit.slopes, fit.covariance, fit.slopes)
     cells = campaign.cells & ~setup[:, None]
@@ -187,10 +186,10 @@ def _carried(
         mean = np.einsum("rck,rc->k", fit.slopes**2, cells.astype(float))
         blame = np.diag(fit.covariance) * mean
         worst = np.flatnonzero(blame > 0.1 * blame.max())
-        open_ = tuple(names[k][1] for k in worst)
+        open_ = tuple(unknowns.names[k][1] for k in worst)
     return Carried(
         session=session,
-        names=tuple(names),
+        unknowns=unknowns,
         values=fit.values,
         std=np.sqrt(np.diag(fit.covariance)),
         rows=(int(setup.sum()), int((~setup).sum())),
@@ -199,23 +198,8 @@ def _carried(
         uncertainty=uncertainty,
         left=left,
         open_=open_,
+        left_behind=(),
     )
-
-
-def _names(
-    robot: Robot, fitted: Sequence[str]
-) -> tuple[list[tuple[str, str]], NDArray]:  # fmt: skip
-    """Parameters to be fitted, and (k,) 1 / variance of what is known of them."""
-    names: list[tuple[str, str]] = []
-    if "registration" in fitted:
-        names += [("registration", name) for name in BASE]
-    if "tool" in fitted:
-        names += [("registration", name) for name in TOOL]
-    places = LIBRARY["encoder_offset"].frames
-    assert places is not None
-    zeros = [("encoder_offset", n) for n in places(robot)] if "zeros" in fitted else []
-    prior = np.r_[np.zeros(len(names)), np.full(len(zeros), _ZERO**-2)]
-    return names + zeros, prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,56 +220,82 @@ class _SessionFit:
 
 
 def _fitted(
-    campaign: Campaign, setup: NDArray, names: list[tuple[str, str]], prior: NDArray
+    campaign: Campaign, setup: NDArray, unknowns: SessionUnknowns
 ) -> _SessionFit:
-    """Gauss-Newton's method on the set-up rows."""
+    """Gauss-Newton's method on the set-up rows; again, with what they then weigh."""
     conditions = finite_conditions(campaign)
-    x = np.zeros(len(names))
-    registered = any(name in BASE for _, name in names)
-    if registered:
+    x = unknowns.mean.copy()
+    if any(name in BASE for _, name in unknowns.names):
         start = coarse_frame(campaign.take(setup), conditions.take(setup))
-        x = np.array([start.get(name, 0.0) for _, name in names])
-    cells = campaign.cells & setup[:, None]
-    sigma = campaign.sigma
-    for _ in range(_STEPS):
-        deviation, slopes = _tangent(conditions, names, x)
-        A = (slopes / sigma[:, :, None])[cells]
+        x += [start.get(name, 0.0) for _, name in unknowns.names]
+    rows = _SetUp(campaign, conditions, setup)
+    fit, weight = rows.settled(unknowns, x, 1.0)
+    if unknowns.prior.any() and weight < 1.0:
+        fit, _ = rows.settled(unknowns, fit.values, weight)
+    return fit
+
+
+@dataclass(frozen=True, eq=False)
+class _SetUp:
+    """Set-up rows of a session of R rows, and the conditions of all.
+
+    Attributes:
+        campaign: of the session.
+        conditions: of its rows, without what is fitted.
+        rows: (R,) bool, the set-up rows.
+    """
+
+    campaign: Campaign
+    conditions: Conditions
+    rows: NDArray
+
+    def settled(
+        self, unknowns: SessionUnknowns, x: NDArray, weight: float
+    ) -> tuple[_SessionFit, float]:
+        """A fit from values (k,), and what the rows weigh by what it leaves."""
+        campaign, prior = self.campaign, unknowns.prior
+        cells, sigma = campaign.cells & self.rows[:, None], campaign.sigma
+        for _ in range(_STEPS):
+            deviation, slopes = self._tangent(unknowns, x)
+            A = (slopes / sigma[:, :, None])[cells]
+            b = ((campaign.measured - deviation) / sigma)[cells]
+            inverse = _inverse(A, prior / weight)
+            step = inverse @ (A.T @ b - prior / weight * (x - unknowns.mean))
+            x = x + step
+            if np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))):
+                break
+        deviation, slopes = self._tangent(unknowns, x)
         b = ((campaign.measured - deviation) / sigma)[cells]
-        size = np.linalg.norm(A, axis=0)
-        unit = np.where(size > 0, size, 1.0)
-        H = (A / unit).T @ (A / unit) + np.diag(prior / unit**2)
-        H += 1e-14 * np.eye(len(x))  # a direction that nothing tells stays finite
-        inverse = np.linalg.inv(H) / np.outer(unit, unit)
-        step = inverse @ (A.T @ b - prior * x)
-        x = x + step
-        if np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))):
-            break
-    deviation, slopes = _tangent(conditions, names, x)
-    b = ((campaign.measured - deviation) / sigma)[cells]
-    excess = max(1.0, float(b @ b) / max(len(b) - len(x), 1))
-    distinct = len(np.unique(campaign.configuration[setup]))
-    alike = float(setup.sum()) / distinct
-    return _SessionFit(x, inverse * excess * alike, slopes, deviation)
+        excess = max(1.0, float(b @ b) / max(len(b) - len(x), 1))
+        distinct = len(np.unique(campaign.configuration[self.rows]))
+        told = excess * float(self.rows.sum()) / distinct
+        covariance = told * _inverse(A, told * prior)
+        return _SessionFit(x, covariance, slopes, deviation), 1 / told
+
+    def _tangent(
+        self, unknowns: SessionUnknowns, x: NDArray
+    ) -> tuple[NDArray, NDArray]:
+        """(R, 6) readings foretold with values, and their (R, 6, k) slopes."""
+
+        def read(values: NDArray) -> NDArray:
+            return predict(unknowns.applied(self.conditions, values)).deviation
+
+        middle = read(x)
+        slopes = np.empty((*middle.shape, len(x)))
+        for k in range(len(x)):
+            moved = x.copy()
+            moved[k] += unknowns.step[k]
+            slopes[:, :, k] = (read(moved) - middle) / unknowns.step[k]
+        return middle, slopes
 
 
-def _tangent(
-    conditions: Conditions, names: list[tuple[str, str]], x: NDArray
-) -> tuple[NDArray, NDArray]:
-    """(R, 6) readings foretold with values, and their (R, 6, k) slopes."""
-
-    def read(values: NDArray) -> NDArray:
-        effects: dict[str, dict[str, float]] = {}
-        for (effect, name), value in zip(names, values.tolist(), strict=True):
-            effects.setdefault(effect, {})[name] = value
-        return predict(apply_effects(conditions, effects)).deviation
-
-    middle = read(x)
-    slopes = np.empty((*middle.shape, len(x)))
-    for k in range(len(x)):
-        moved = x.copy()
-        moved[k] += _STEP
-        slopes[:, :, k] = (read(moved) - middle) / _STEP
-    return middle, slopes
+def _inverse(A: NDArray, prior: NDArray) -> NDArray:
+    """(A'A + diag(prior))^-1, columns of A (N, k) brought to size one."""
+    size = np.linalg.norm(A, axis=0)
+    unit = np.where(size > 0, size, 1.0)
+    H = (A / unit).T @ (A / unit) + np.diag(prior / unit**2)
+    H += 1e-14 * np.eye(len(size))  # a direction that nothing tells stays finite
+    return np.linalg.inv(H) / np.outer(unit, unit)
 
 
 def setup_rows(campaign: Campaign, text: str) -> NDArray:

@@ -20,12 +20,16 @@ def table(sessions: Sequence[Carried]) -> dict[str, Any]:
                 "open": list(one.open_),
                 "uncertainty": one.uncertainty,
                 "left_in_setup": one.left,
+                "left_behind": list(one.left_behind),
                 "error": _error(one.error),
                 "declared": _error(one.declared),
                 "parameters": [
                     {"effect": effect, "name": name, "value": value, "std": std}
                     for (effect, name), value, std in zip(
-                        one.names, one.values.tolist(), one.std.tolist(), strict=True
+                        one.unknowns.names,
+                        one.values.tolist(),
+                        one.std.tolist(),
+                        strict=True,
                     )
                 ],
             }
@@ -52,6 +56,10 @@ def text(sessions: Sequence[Carried]) -> str:
             f"  open by the set-up rows: {1e6 * one.uncertainty:.4g} um; "
             f"they are off by {1e6 * one.left:.4g} um themselves"
         )
+        lines += [
+            f"  left behind, the session has no time: {title}"
+            for title in one.left_behind
+        ]
         if not one.suffices:
             lines.append(
                 f"  the set-up rows do not suffice: they leave {', '.join(one.open_)} "

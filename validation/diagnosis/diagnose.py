@@ -12,7 +12,7 @@ Order of things, each opened once:
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ from validation.diagnosis.registration import register
 from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, screws_of
-from validation.diagnosis.teaching import taught
+from validation.diagnosis.teaching import cost_of, taught
 
 _PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
 _LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
@@ -75,6 +75,7 @@ def diagnose(
     outliers = impossible.copy()
     factor, inflation, bends = np.ones(6), 1.0, 0
     learned: tuple[Learned, ...] = ()
+    straight: _Straight | None = None
     for _ in range(_PASSES):
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
@@ -90,12 +91,20 @@ def diagnose(
         if bends < _BENDS:
             bent = _with_errors(campaign, conditions, used, selection, complete)
             if bent is not conditions:
+                straight = straight or _Straight(conditions, used, selection)
                 conditions, bends = bent, bends + 1
                 continue
         known = learned if inflation > 1.0 else None
         selection, learned = taught(
             campaign, conditions, used, selection, update, known
         )
+        if learned and straight is not None and np.array_equal(used, straight.used):
+            # errors may have stood for what was learned, and finite ones hide it
+            other, same = taught(
+                campaign, straight.conditions, used, straight.selection, update, learned
+            )
+            if same and cost_of(other) < cost_of(selection):
+                conditions, selection = straight.conditions, other
         left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
         lack = lack_of_fit(
@@ -109,7 +118,7 @@ def diagnose(
             larger = np.full(6, inflation)
         else:
             break
-        campaign = replace(campaign, sigma=campaign.sigma * larger)
+        campaign, straight = replace(campaign, sigma=campaign.sigma * larger), None
     return judge(
         Settled(
             campaign=campaign,
@@ -124,6 +133,21 @@ def diagnose(
             finite=finite,
         )
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Straight:
+    """What a campaign's rows looked like before finite errors were added.
+
+    Attributes:
+        conditions: of all rows.
+        used: (R,) bool, the rows fitted.
+        selection: on these.
+    """
+
+    conditions: Conditions
+    used: NDArray
+    selection: Selection
 
 
 def _with_errors(

@@ -17,6 +17,7 @@ from validation.diagnosis.holdout import Split
 from validation.diagnosis.kept_aside import Errors, FittedModel, Rung
 from validation.diagnosis.lack_of_fit import LackOfFit
 from validation.diagnosis.next_measurement import NextMeasurement
+from validation.diagnosis.noise_in_time import NoiseInTime
 from validation.diagnosis.refit import Fit
 from validation.diagnosis.scoring import Scored, Screen
 from validation.diagnosis.structure import Trend
@@ -43,6 +44,8 @@ class Diagnosis:
         noise: by sigma.
         trimmed: before and after without the rows called outliers.
         noise_factor: (6,) by which repeats scatter more than the sigma stated.
+        noise_in_time: how noise is correlated in time, None if it is not; intervals of
+            the effects are the wider for it.
         ladder: what each step bought on the rows kept aside.
         split: which rows were kept aside.
         outliers: (R,) bool, rows left out of everything.
@@ -74,6 +77,7 @@ class Diagnosis:
     noise: Errors
     trimmed: tuple[Errors, Errors]
     noise_factor: NDArray
+    noise_in_time: NoiseInTime | None
     ladder: tuple[Rung, ...]
     split: Split
     outliers: NDArray

@@ -31,6 +31,8 @@ from validation.diagnosis.small_terms import SmallTerm
 _PASSES = 6  # of leaving out springs that would be stiffer than declared
 _LEAST, _MOST = -6.0, 14.0  # logarithms of sizes over those that show as noise does
 _FIRST = 1.5  # from which they are looked for
+_GLANCES = (-1.5, 0.0, 1.5)  # likewise, at which a further term is looked at
+_NEAR = 20.0  # by how much less likely a choice may look that is then fitted
 _FURTHER = np.log(10.0)  # of each term: a tenth as likely
 
 
@@ -107,18 +109,63 @@ class Evidence:
         Args:
             along: (k,) of columns and residual.
             squares: of the residual.
-            start: of the same terms with nearly the same residual: the choice of terms
-                is kept, sizes are looked for from there.
+            start: of the same terms with nearly the same residual: its choice of terms,
+                and those that differ by one, are looked at, sizes from there; unknowns
+                that it left out come in where they are called for now.
 
         Returns:
             The prior.
         """
-        if start is not None:
-            on = [bool(used.any()) for used in start.used]
-            return self._fitted(on, along, squares, start)
-        choices = product(*((True,) if s else (False, True) for s in self._sure))
-        priors = [self._fitted(chosen, along, squares) for chosen in choices]
+        if start is None:
+            choices = product(*((True,) if s else (False, True) for s in self._sure))
+            priors = [self._fitted(chosen, along, squares) for chosen in choices]
+            return max(priors, key=lambda prior: prior.evidence)
+        on = [bool(used.any()) for used in start.used]
+        priors = [self._fitted(on, along, squares, start)]
+        for k in np.flatnonzero(~np.array(self._sure, dtype=bool)):
+            other = [o ^ (i == k) for i, o in enumerate(on)]
+            near = self._at_a_glance(other, priors[0], along, squares)
+            if near > priors[0].evidence - _NEAR:
+                priors.append(self._fitted(other, along, squares, start))
         return max(priors, key=lambda prior: prior.evidence)
+
+    def _at_a_glance(
+        self, chosen: Sequence[bool], near: Prior, along: NDArray, squares: float
+    ) -> float:
+        """About the evidence of a choice, at the sizes of another one near to it."""
+        mask = np.concatenate([np.zeros(0, bool), *self._of(chosen, near)])
+        G, b = self._gram[np.ix_(mask, mask)], along[mask]
+        group, given = self._group[mask], self._given[mask]
+        known, shows = self._scales(near), self._shows(G, group)
+        evidence = -np.inf
+        for log in _GLANCES:
+            scales = np.where(np.isfinite(known), known, shows * np.exp(log))
+            s = np.where(group < 0, given, scales[group])
+            x, cost, _ = _solved(G, s, b)
+            evidence = max(evidence, -0.5 * (squares - float(x @ (s * b))) - cost)
+        return evidence
+
+    def _of(self, chosen: Sequence[bool], near: Prior) -> list[NDArray]:
+        """Unknowns of chosen terms: those that another prior uses, where it does."""
+        return [
+            was if on and was.any() else np.full(len(was), on)
+            for on, was in zip(chosen, near.used, strict=True)
+        ]
+
+    def _scales(self, prior: Prior) -> NDArray:
+        """Sizes that a prior found, by group of unknowns; NaN of others."""
+        unknown = np.nan, np.nan
+        return np.array([
+            s for t in self.terms for s in prior.scales.get(t.name, unknown)
+        ])
+
+    def _shows(self, G: NDArray, group: NDArray) -> NDArray:
+        """Sizes that show as much as noise does, by group of unknowns."""
+        shows = np.ones(2 * len(self.terms))
+        for g in np.unique(group[group >= 0]):
+            shown = float(np.mean(np.diag(G)[group == g]))
+            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
+        return shows
 
     @property
     def always(self) -> bool:
@@ -157,17 +204,24 @@ class Evidence:
         used = [np.full(len(t), on) for t, on in zip(self.terms, chosen, strict=True)]
         scales = np.full(2 * len(self.terms), np.nan)
         if start is not None:
-            used = list(start.used)
-            for i, term in enumerate(self.terms):
-                scales[2 * i : 2 * i + 2] = start.scales.get(term.name, np.nan)
-        for _ in range(_PASSES):
+            used, scales = self._of(chosen, start), self._scales(start)
+        for turn in range(_PASSES):
             prior, values, scales = self._sized(used, along, squares, scales)
             parts = np.split(values, self._begin[1:-1])
             wrong = [x < t.lower for t, x in zip(self.terms, parts, strict=True)]
-            if not any(w.any() for w in wrong):
+            again = self._called_for(used, along, values) if start and not turn else []
+            if not any(w.any() for w in (*wrong, *again)):
                 break
             used = [u & ~w for u, w in zip(used, wrong, strict=True)]
+            used = [u | a for u, a in zip(used, again or used, strict=True)]
         return prior
+
+    def _called_for(
+        self, used: Sequence[NDArray], along: NDArray, values: NDArray
+    ) -> list[NDArray]:
+        """Unknowns left out of terms in use that what is left would make positive."""
+        left = np.split(along - self._gram @ values, self._begin[1:-1])
+        return [u.any() & ~u & (b > 0.0) for u, b in zip(used, left, strict=True)]
 
     def _sized(
         self, used: Sequence[NDArray], along: NDArray, squares: float, start: NDArray
@@ -181,10 +235,7 @@ class Evidence:
         G, b = self._gram[np.ix_(mask, mask)], along[mask]
         group, given = self._group[mask], self._given[mask]
         asked = np.unique(group[group >= 0])
-        shows = np.ones(2 * len(self.terms))  # sizes that show as much as noise does
-        for g in asked:
-            shown = float(np.mean(np.diag(G)[group == g]))
-            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
+        shows = self._shows(G, group)
 
         def sizes(logs: NDArray) -> NDArray:
             return np.where(group < 0, given, (shows * np.exp(logs))[group])

@@ -22,6 +22,7 @@ from validation.diagnosis.kept_aside import (
 from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
 from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
+from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
 from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.refit import refit
 from validation.diagnosis.responses import responses
@@ -111,7 +112,8 @@ def judge(settled: Settled) -> Diagnosis:
     declared_model = predict(linear)
     before = campaign.measured - declared_model.deviation
     ranking = _ranked(settled, before)
-    selection = ranking.selection
+    selection, correlated = _with_noise_in_time(settled, ranking.selection)
+    ranking = replace(ranking, selection=selection)
     inflation = settled.inflation
     lack = _lack_of_fit(settled, selection)
     ranking, decision, claimed = _decided(settled, ranking, lack)
@@ -153,6 +155,7 @@ def judge(settled: Settled) -> Diagnosis:
         noise=errors_of(stated, stated.sigma, held_out),
         trimmed=(errors_of(stated, before, kept), errors_of(stated, shown, kept)),
         noise_factor=settled.noise_factor,
+        noise_in_time=correlated,
         ladder=tuple(_in_sigmas(rung, inflation) for rung in rungs),
         split=settled.split,
         outliers=outliers,
@@ -185,6 +188,19 @@ def _ranked(settled: Settled, before: NDArray) -> _Ranking:
         fit = refit(fitting, settled.conditions.take(used), motions, np.zeros(0))
         selection, best = replace(selection, fit=fit), (FINITE,)
     return _Ranking(sets, probability, best, selection)
+
+
+def _with_noise_in_time(
+    settled: Settled, selection: Selection
+) -> tuple[Selection, NoiseInTime | None]:
+    """The fit with the covariance that noise correlated in time leaves, if it is."""
+    fit, behind = selection.fit, selection.behind
+    noise = noise_in_time(settled.fitting, behind.left(fit.residual))
+    if noise is None or not len(fit.values):
+        return selection, noise
+    weights = behind.whitened(fit.slopes)
+    C = widened(fit.covariance, weights, settled.fitting, noise)
+    return replace(selection, fit=replace(fit, covariance=C)), noise
 
 
 def _lack_of_fit(settled: Settled, selection: Selection) -> LackOfFit:

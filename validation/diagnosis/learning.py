@@ -77,9 +77,13 @@ class Lesson:
 
     @property
     def cost(self) -> float:
-        """[-] least is best: n ln(noise left) and the unknowns, as in BIC."""
-        n = len(self.terms[0].columns)
-        return n * np.log(max(self.left / n, 1.0)) + self.unknowns * np.log(n)
+        """[-] least is best."""
+        return cost(len(self.terms[0].columns), self.left, self.unknowns)
+
+
+def cost(count: int, left: float, unknowns: float) -> float:
+    """What n readings and unknowns cost as in BIC: n ln(noise left) + k ln n."""
+    return count * np.log(max(left / count, 1.0)) + unknowns * np.log(count)
 
 
 class _School:

@@ -46,6 +46,7 @@ class Fit:
         residual: (N,) whitened, what is left; by the covariance of small terms too,
             where there are any (:meth:`.evidence.Background.left`, ``raw``).
         conditions: the campaign's, with the effects fitted.
+        slopes: (N, k) change of that residual per unknown, its sign turned.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -53,6 +54,7 @@ class Fit:
     covariance: NDArray
     residual: NDArray
     conditions: Conditions
+    slopes: NDArray
 
     @property
     def rss(self) -> float:
@@ -324,4 +326,5 @@ def _refit(
     scale[scale == 0] = 1.0
     C = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-12, hermitian=True)
     x, residual = scaled * size, left_at(scaled.tobytes())
-    return Fit(tuple(members), x, C / np.outer(scale, scale), residual, there(x))
+    C = C / np.outer(scale, scale)
+    return Fit(tuple(members), x, C, residual, there(x), -J)

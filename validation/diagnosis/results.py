@@ -62,6 +62,9 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "noise_factor": dict(
             zip(KINDS, diagnosis.noise_factor[::3].tolist(), strict=True)
         ),
+        "noise_in_time": None
+        if diagnosis.noise_in_time is None
+        else asdict(diagnosis.noise_in_time),
         "ladder": steps(diagnosis),
         "geometry": small(diagnosis, GEOMETRY),
         "springs": small(diagnosis, SPRINGS),

@@ -18,7 +18,7 @@ from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, learn, term_name
+from validation.diagnosis.learning import Learned, cost, learn, term_name
 from validation.diagnosis.refit import refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.remainder import Unexplained
@@ -92,6 +92,13 @@ def taught(
     if not _foretells(campaign, ~used, before, after):
         return selection, ()
     return told, lesson.learned
+
+
+def cost_of(selection: Selection) -> float:
+    """What a fitted story costs, as :attr:`.learning.Lesson.cost`: least is best."""
+    left = selection.behind.left(selection.fit.residual)
+    unknowns = selection.unknowns + selection.behind.unknowns
+    return cost(len(left), float(left @ left), unknowns)
 
 
 def _foretells(

@@ -33,6 +33,13 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     lines += ["", *_ladder_text(diagnosis), *diagnosis.remarks]
     if np.any(diagnosis.noise_factor > 1):
         lines += ["", noise_text(diagnosis.noise_factor)]
+    if diagnosis.noise_in_time is not None:
+        noise = diagnosis.noise_in_time
+        lines += [
+            "",
+            f"noise is correlated in time: {100 * noise.share:.0f} % of its variance "
+            f"over {noise.constant:.3g} s; the effects' intervals are wider for it",
+        ]
     if diagnosis.outliers.any():
         ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
         left_out = ", ".join(label for label, outlier in ids if outlier)

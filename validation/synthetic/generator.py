@@ -11,6 +11,7 @@ kept apart from it, in the layout of the practice campaigns' truth.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
-from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_folder, write_text
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
@@ -28,6 +28,7 @@ from validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
+_DRAWS = 6  # of an effect's parameters, until the readings show it
 _CLOSE = 0.05  # relative, of a strength to the one asked for
 _MOST = (
     1000.0  # times its plausible size: an effect that needs more is hardly observable
@@ -36,6 +37,7 @@ _SMALL = 1e-2  # scale of errors and load at which the machine is linear
 _BLUNDER = 40.0  # [-] sigmas of an outlier
 
 Progress = Callable[[str, int, int], None]
+Draw = Callable[[str], Hidden]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def generate_campaign(
     Raises:
         BadInput: an unknown effect, or a design that the robot cannot do.
         NotApplicable: the robot has nothing that an effect could act on, or the
-            readings hardly show it.
+            readings hardly show it wherever it is drawn.
         SimulationFailed: a row has no equilibrium.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
@@ -132,8 +134,10 @@ def generate_campaign(
     point = np.array(design.reference_point, dtype=float)
     plan = plan_campaign(robot, design, rng)
     duration = plan.rows[-1].covariates["time"]
+    redraw: Draw | None = None
     if isinstance(wanted, Mapping):
-        drawn = {n: draw_effect(n, robot, duration, rng) for n in wanted}
+        redraw = partial(draw_effect, robot=robot, duration=duration, rng=rng)
+        drawn = {name: redraw(name) for name in wanted}
         wanted = [(drawn[name], multiple) for name, multiple in wanted.items()]
     # what has no strength of its own sets the noise, before the others follow it
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
@@ -144,8 +148,8 @@ def generate_campaign(
     sigma, exact = noise.sigma, declared
     effects, strength = [], {}
     for effect, multiple in wanted:
-        effect, exact, sigma = _scaled_effect(
-            machine, effect, multiple, sigma, declared
+        effect, exact, sigma = _shown_effect(
+            machine, effect, multiple, sigma, declared, redraw
         )
         effects.append(effect)
         strength[effect.name] = _rms((exact - declared) / sigma)
@@ -193,6 +197,22 @@ class _SimulatedMachine:
         )
 
 
+def _shown_effect(
+    machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
+    declared: NDArray, redraw: Draw | None,
+) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
+    """The effect scaled; drawn anew where the readings hardly show what was drawn."""
+    # a force whose line meets a drive's axis does not load its spring, say
+    for _ in range(_DRAWS - 1):
+        try:
+            return _scaled_effect(machine, effect, multiple, sigma, declared)
+        except NotApplicable:
+            if redraw is None:
+                raise
+            effect = redraw(effect.name)
+    return _scaled_effect(machine, effect, multiple, sigma, declared)
+
+
 def _scaled_effect(
     machine: _SimulatedMachine,
     effect: Hidden,
@@ -207,7 +227,9 @@ def _scaled_effect(
         exact = machine.read([tried], f"{effect.name}, strength {factor:.3g}")
         reached = _rms((exact - declared) / sigma)
         if reached == 0.0:
-            raise BadInput(f"{effect.name}: adds nothing to any reading; try another")
+            raise NotApplicable(
+                f"{effect.name}: adds nothing to any reading; try another"
+            )
         if effect.name in _GIVEN_STRENGTH:
             return tried, exact, sigma * (reached / multiple)
         if abs(reached / multiple - 1.0) < _CLOSE:

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import write_robot
+from assembly.model.function import Function
 from assembly.robots import load_robot
 from stiffness.screws import rotation_matrix, rotation_vector
 from tests.campaigns_for_tests import write_campaign
 from validation.campaign.campaign_file import read_campaign, read_commands
+from validation.correction.carrying import _inverse
 from validation.correction.prediction import foretell
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import corrected
 
 SIGMA = 2e-5
+HOUR = 3600.0
 DEVICE = np.array([0.3, -0.2, 0.5, 1.2, -0.4, 0.7])
 
 
@@ -30,10 +33,11 @@ def a_machine(tmp_path):
     return tmp_path
 
 
-def measured(folder, rows, reach, sessions=None, zero=0.0):
+def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
     """The machine measured by a device that stands somewhere else, noise added.
 
-    The device's place is put in by rigid motion of the points, not by the effect.
+    The device's place is put in by rigid motion of the points, not by the effect; so is
+    a wave (sine, cosine) [m] of an hour in its readings, with the clock beside it.
     """
     rng = np.random.default_rng(rows)
     saved = load_robot(folder / "saved.toml")
@@ -50,6 +54,12 @@ def measured(folder, rows, reach, sessions=None, zero=0.0):
     R = rotation_matrix(DEVICE[:3])
     read = (nominal + found[:, 3:]) @ R.T + DEVICE[3:] - nominal
     read += SIGMA * rng.normal(size=read.shape)
+    if wave is not None:
+        time = HOUR / rows * np.arange(rows)
+        turn = 2 * np.pi * time / HOUR
+        read[:, 0] += wave[0] * np.sin(turn) + wave[1] * np.cos(turn)
+        head += ",cov.time"
+        lines = [f"{line},{t!r}" for line, t in zip(lines, time.tolist(), strict=True)]
     cells = [[*map(repr, r.tolist())] for r in read]
     days = sessions or [""] * rows
     head += (",session" if sessions else "") + ",meas.tx,meas.ty,meas.tz"
@@ -61,6 +71,14 @@ def measured(folder, rows, reach, sessions=None, zero=0.0):
         folder / "day", head, body, robot=(folder / "declared.toml").read_text(),
         toml={"registration": '"unknown"'}, noise=f"[noise]\nposition = {SIGMA}\n",
     )  # fmt: skip
+
+
+def with_a_wave(machine, sine, cosine):
+    """The saved file has a slow wave, learned on another day."""
+    numbers = {"sine": sine, "cosine": cosine, "period": HOUR}
+    wave = Function("reading", ("tx",), ("time",), "slow_wave", numbers)
+    saved = load_robot(machine / "saved.toml")
+    write_robot(replace(saved, functions=(wave,)), machine / "saved.toml")
 
 
 def carried(run, machine, folder, *words):
@@ -141,6 +159,54 @@ def test_sessions_are_carried_one_by_one(machine, run):
     assert code == 0
     assert [(d["session"], d["setup_rows"]) for d in days] == [("a", 10), ("b", 10)]
     assert set(load_robot(out).session_effects) == {"a", "b"}
+
+
+def test_a_drift_stays_behind_where_there_is_no_clock(machine, run):
+    """The other day's wave of 15 sigma is not this day's, and is not written."""
+    folder = measured(machine, 60, 0.8)
+    with_a_wave(machine, 3e-4, 1e-4)
+    code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
+    assert code == 0
+    assert day["left_behind"] == ["reading tx of time"]
+    assert "left behind, the session has no time: reading tx of time" in said
+    assert 0.9 < day["error"]["normalised"] < 1.3
+    assert load_robot(out).functions == ()
+
+
+def test_a_drift_is_fitted_anew_to_set_up_rows_over_the_day(machine, run):
+    """Today's wave is another one; every fourth row tells it to a third of sigma."""
+    folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
+    with_a_wave(machine, 3e-4, 1e-4)
+    rows = ",".join(map(str, range(1, 81, 4)))
+    code, _, (day,), out = carried(run, machine, folder, "--setup", rows)
+    assert code == 0
+    assert 0.9 < day["error"]["normalised"] < 1.3
+    numbers = {p["name"]: p for p in day["parameters"] if "time" in p["effect"]}
+    for name, true in (("sine", -2e-4), ("cosine", 1e-4)):
+        value, std = numbers[name]["value"], numbers[name]["std"]
+        assert abs(value - true) < 4 * std
+        assert 0.2 * SIGMA < std < SIGMA
+    (written,) = load_robot(out).functions
+    assert written.parameters["sine"] == pytest.approx(numbers["sine"]["value"])
+
+
+def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
+    """As large as it was, 2e-4 m: half an hour later nobody knows."""
+    folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
+    with_a_wave(machine, 2e-4, 2e-4)
+    code, said, (day,), _ = carried(run, machine, folder, "--setup", "10")
+    assert code == 1
+    assert {"sine", "cosine"} & set(day["open"])
+    assert 3e-5 < day["uncertainty"] < 3e-4
+    assert "do not suffice" in said
+
+
+def test_what_is_known_beforehand_weighs_as_it_says():
+    """One zero, rows that tell it to s: the mean of both by their variances."""
+    told, known = 2.0, 1e6
+    A = np.full((4, 1), 1e3)
+    inverse = told * _inverse(A, told * np.array([known]))
+    assert inverse[0, 0] == pytest.approx(1 / (4e6 / told + known), rel=1e-9)
 
 
 @pytest.mark.parametrize(("words", "message"), [

@@ -94,6 +94,24 @@ def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
     assert found.noise.position == pytest.approx(SIGMA[3])
 
 
+def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
+    """Four fifths of the noise last 200 s; the effect is the same, less sure."""
+    exact = measured(tmp_path, seed=1, noise=0.0, **CASES["one"])
+    time = exact.covariates["time"]
+    R = 0.8 * np.exp(-np.abs(time[:, None] - time) / 200.0) + 0.2 * np.eye(len(time))
+    drawn = np.linalg.cholesky(R) @ np.random.default_rng(3).normal(size=(len(time), 6))
+    lasting = replace(exact, measured=exact.measured + SIGMA * drawn)
+    found = diagnose(lasting)
+    assert found.claimed == ("drive_compliance",)
+    noise = table(found)["noise_in_time"]
+    assert noise["share"] > 0.5
+    assert 70.0 < noise["constant"] < 600.0
+    assert "correlated in time" in text(found)
+    assert table(diagnosed("one"))["noise_in_time"] is None
+    ((value, std),) = numbers(found, "drive_compliance").values()
+    assert abs(value - 3e5) < 3 * std
+
+
 def test_a_sound_model_is_left_alone(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())

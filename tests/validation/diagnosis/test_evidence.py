@@ -86,6 +86,38 @@ def test_springs_stiffer_than_declared_are_left_out(rng):
     assert len(values) < 12
 
 
+def test_springs_left_out_come_in_when_what_hid_them_is_explained(rng):
+    """All twelve are soft; half of them look stiffer until something else is known."""
+    springs = term(rng, SPRINGS, 12, lower=0.0)
+    soft = np.where(springs.axis < 3, 1e-3, 4e-5)
+    hidden = springs.columns[:, ::2] @ (-2 * soft[::2])
+    noise = rng.normal(size=CELLS)
+    evidence = Evidence([springs], CELLS)
+    before = evidence.best(springs.columns @ soft + hidden + noise)
+    assert before.used[0].sum() < 12
+    z = springs.columns @ soft + noise
+    along, squares = springs.columns.T @ z, float(z @ z)
+    anew, after = evidence.best(z), evidence.best_of(along, squares, before)
+    assert after.used[0].all()
+    assert after.evidence == pytest.approx(anew.evidence, rel=1e-6)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_term_comes_and_goes_with_what_is_left(there, rng):
+    """From the prior of other readings: the choice is that of a search from nothing."""
+    geometry = term(rng, GEOMETRY, 60)
+    evidence = Evidence([geometry], CELLS)
+    noise = rng.normal(size=CELLS)
+    moved = noise + geometry.columns @ np.where(geometry.axis < 3, 2e-3, 5e-5)
+    was, now = (noise, moved) if there else (moved, noise)
+    before = evidence.best(was)
+    assert before.used[0].all() != there
+    along, squares = geometry.columns.T @ now, float(now @ now)
+    after = evidence.best_of(along, squares, before)
+    assert after.used[0].all() == there
+    assert after.evidence == pytest.approx(evidence.best(now).evidence, rel=1e-6)
+
+
 def test_noise_has_no_small_terms(rng):
     """One size in 100 draws would be much for a penalty of 8 nats and more."""
     evidence = Evidence([term(rng, GEOMETRY, 60), term(rng, SPRINGS, 24, 0.0)], CELLS)

@@ -77,6 +77,20 @@ def test_every_effect_reaches_its_strength(name):
     assert campaign.strength[name] == pytest.approx(5.0, rel=0.05)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_the_loads_do_not_show_is_drawn_anew(seed):
+    """Forces at a point on the wrist's axis do not twist it: another drive is soft."""
+    arm = two_axes()
+    wrist = Frame("j3", "tool", joint="revolute", actuated=True, joint_stiffness=SPRING)
+    robot = Robot("wristed", "j3", (*arm.frames, wrist))
+    alone = [(Hidden("drive_compliance", {"j3": 5e4}), 5.0)]
+    with pytest.raises(NotApplicable, match="drive_compliance"):
+        quick(alone, robot, seed=seed)
+    campaign = quick({"drive_compliance": 5.0}, robot, seed=seed)
+    assert campaign.strength["drive_compliance"] == pytest.approx(5.0, rel=0.05)
+    assert set(campaign.effects[0].parameters) & {"j1", "j2"}
+
+
 def test_noise_is_what_was_asked_for():
     """240 x 6 readings: their rms is 1 within 3/sqrt(2 x 1440) = 0.06 at 3 sigma."""
     design = replace(SMALL, rows=240)

@@ -1,0 +1,57 @@
+"""What belongs to a session: which numbers, how large, and what stays the robot's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.model.function import Function
+from assembly.robots import load_robot
+from validation.correction.session_unknowns import session_unknowns, without_session
+
+DRIFT = {"amplitude.tx": 3e-5, "amplitude.tz": -4e-5, "time_constant": 900.0}
+STEP = Function("reading", ("tx",), ("cov.time",), "step", {"size": 2e-5, "at": 600.0})
+SPRING = Function("base", ("rz",), ("load.mz",), "powers", {"1": 1e-6})
+FORMULA = replace(STEP, form="formula", formula="a*time", parameters={"a": 1e-9})
+OTHER_DAY = replace(STEP, session="monday")
+
+
+@pytest.fixture
+def saved():
+    return replace(
+        load_robot("arm6"),
+        effects={"drift": DRIFT, "registration": {"base.tx": 0.1, "tool.tx": 0.02}},
+        functions=(STEP, SPRING, FORMULA, OTHER_DAY),
+    )
+
+
+def test_the_robot_alone_has_neither_place_nor_time(saved):
+    """The tool is the robot's; what a session is named for stays in that session."""
+    alone = without_session(saved)
+    assert alone.effects == {"registration": {"tool.tx": 0.02}}
+    assert alone.functions == (SPRING, OTHER_DAY)
+
+
+def test_a_drift_begins_as_it_was_and_a_step_at_zero(saved):
+    """Rms of 3 and 4 is 5/sqrt 2; shapes are kept; a formula is not fitted."""
+    unknowns = session_unknowns(saved, (), clock=True)
+    names = [name for _, name in unknowns.names]
+    assert names == ["amplitude.tx", "amplitude.tz", "size"]
+    assert unknowns.mean.tolist() == [3e-5, -4e-5, 0.0]
+    sizes = unknowns.prior**-0.5
+    assert sizes == pytest.approx([5e-5 / 2**0.5, 5e-5 / 2**0.5, 2e-5])
+    x = np.array([1e-5, 2e-5, 7e-6])
+    assert unknowns.effects(x)["drift"] == {
+        "amplitude.tx": 1e-5, "amplitude.tz": 2e-5, "time_constant": 900.0,
+    }  # fmt: skip
+    (step,) = unknowns.functions_with(x, "today")
+    assert step.parameters == {"size": 7e-6, "at": 600.0}
+    assert step.session == "today"
+
+
+def test_without_a_clock_only_what_was_asked_for_is_fitted(saved):
+    unknowns = session_unknowns(saved, ("registration", "zeros"), clock=False)
+    owners = {owner for owner, _ in unknowns.names}
+    assert owners == {"registration", "encoder_offset"}
+    assert len(unknowns) == 12
+    assert unknowns.prior == pytest.approx([0.0] * 6 + [1e6] * 6)

@@ -1,0 +1,85 @@
+"""A base that rocks, and a tilt sensor on it: a motion with gain one, or one fitted.
+
+The machine is turned rigidly, by rotation matrices about its base; the model under test
+knows such a turn as a function of the base, to first order.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.model.function import Function
+from assembly.model.robot import Frame, Robot
+from stiffness.screws import rotation_matrix
+from tests.campaigns_for_tests import write_campaign
+from validation.campaign.campaign_file import read_campaign
+from validation.correction.prediction import foretell
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import learned
+
+SIGMA, ROWS, ROCKING = 2e-5, 80, 1e-3
+GAIN = 0.8  # of a sensor that is read in units of its own
+
+
+def arm():
+    """Two turning joints at right angles, half a metre up."""
+    frames = (
+        Frame("one", translation=[0, 0, 0.5], joint="revolute", actuated=True),
+        Frame("two", "one", [0.4, 0, 0], [np.pi / 2, 0, 0], joint="revolute",
+              actuated=True),
+        Frame("tip", "two", [0.3, 0, 0]),
+    )  # fmt: skip
+    return Robot("arm", "tip", frames)
+
+
+@pytest.fixture
+def rocking(tmp_path):
+    """The arm's tip seen by a tracker, while its base rocks about y as ``cov.tilt``."""
+    rng = np.random.default_rng(8)
+    q = rng.uniform(-1.2, 1.2, (ROWS, 2))
+    tilt = ROCKING * rng.normal(size=ROWS)
+    rows = []
+    for i, (a, b) in enumerate(q.tolist()):
+        out = np.array([np.cos(a), np.sin(a), 0.0])
+        tip = 0.4 * out + 0.3 * (np.cos(b) * out + np.sin(b) * np.array([0, 0, 1.0]))
+        tip = tip + [0, 0, 0.5]
+        turned = rotation_matrix(np.array([0, GAIN * tilt[i], 0])) @ tip
+        read = turned - tip + SIGMA * rng.normal(size=3)
+        rows.append(",".join(map(str, [f"m{i}", a, b, *read.tolist(), tilt[i]])))
+    head = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.tilt"
+    write_robot(arm(), tmp_path / "arm.toml")
+    folder = write_campaign(
+        tmp_path / "day", head, rows,
+        robot=(tmp_path / "arm.toml").read_text(),
+        noise=f"[noise]\nposition = {SIGMA}\n",
+    )  # fmt: skip
+    return read_campaign(folder)
+
+
+def with_gain(campaign, gain):
+    """The campaign of a robot whose file says that its base turns with the sensor."""
+    turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": gain})
+    return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
+
+
+def test_a_known_gain_leaves_noise(rocking):
+    """1 mrad at 0.7 m is some twenty sigma; 0.2 mrad of it too much, some four."""
+    assert foretell(rocking).error[2] > 8
+    assert 0.85 < foretell(with_gain(rocking, GAIN)).error[2] < 1.15
+    assert foretell(with_gain(rocking, 1.0)).error[2] > 2
+
+
+def test_an_unknown_gain_is_learned(rocking):
+    """Of 180 readings and more of turns of 1 mrad: the gain to a few thousandths."""
+    found = diagnose(rocking)
+    assert found.verdict == "learned"
+    assert 0.8 < found.after.normalised < 1.2
+    (one,) = learned(found)
+    assert (one["where"], one["variables"]) == ("base", ["cov.tilt"])
+    assert "ry" in one["components"]
+    numbers = one["parameters"]
+    (name,) = [n for n in numbers if n in ("1", "ry.1")]
+    assert 0 < one["std"][name] < 0.01
+    assert abs(numbers[name] - GAIN) < 4 * one["std"][name]

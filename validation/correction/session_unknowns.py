@@ -1,0 +1,183 @@
+"""What of a robot belongs to one session, and is fitted anew to the next.
+
+Where the device stands; if asked for, the measured point and the zeros of the joints;
+and whatever changed with time, the effect ``drift`` and functions of time.  A slow wave
+or a step of one day is not the machine's: in a new session its numbers are taken for
+zero, give or take as much as they once were.  What settled from a session's beginning
+may do so again: as it was, give or take as much.  Readings early in a session tell
+little of a drift later, and that is then among what set-up rows leave open.  A session
+without a clock has no drift.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.functions import (
+    CLOCKS,
+    FORMULA,
+    apply_functions,
+    columns_of,
+    parameters_of,
+)
+from assembly.effects.registration import BASE, TOOL
+from assembly.measurement.conditions import Conditions
+from assembly.model.function import Function
+from assembly.model.robot import Robot
+
+OF_A_SESSION = ("registration", "tool", "zeros")
+DRIFT = "drift"
+_ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set anew
+_SETTLING = ("lag", "creep")  # of time: they begin with the session
+_STEP = 1e-6  # [rad, m] of what is no drift
+_CONSTANT = "time_constant"
+
+
+def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
+    """Parameters of the drift, and functions of time, that no session is named for."""
+    functions = tuple(
+        f for f in robot.functions
+        if f.session is None and any(name in CLOCKS for name in f.variables)
+    )  # fmt: skip
+    return dict(robot.effects.get(DRIFT, {})), functions
+
+
+def without_session(robot: Robot) -> Robot:
+    """The robot alone: without the device's place and what changed with time."""
+    effects = {name: dict(values) for name, values in robot.effects.items()}
+    effects.pop(DRIFT, None)
+    tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
+    if tool:
+        effects["registration"] = tool
+    own = of_one_session(robot)[1]
+    kept = tuple(f for f in robot.functions if f not in own)
+    return replace(robot, effects=effects, functions=kept)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionUnknowns:
+    """The k numbers that are fitted to a session.
+
+    Attributes:
+        names: of each, what it belongs to (an effect, or a function's title) and its
+            own.
+        mean: (k,) what they are thought to be beforehand.
+        prior: (k,) 1 / variance of that; zero where nothing is known.
+        step: (k,) change that moves the readings by micrometres, for slopes.
+        constant: [s] the drift's, absent where none is fitted.
+        functions: of time, whose numbers are among them.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    mean: NDArray
+    prior: NDArray
+    step: NDArray
+    constant: float | None
+    functions: tuple[Function, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
+        """Effects of the library with values (k,)."""
+        values: dict[str, dict[str, float]] = {}
+        for (effect, name), value in zip(self.names, x.tolist(), strict=True):
+            if effect in LIBRARY:
+                values.setdefault(effect, {})[name] = value
+        if DRIFT in values and self.constant is not None:
+            values[DRIFT][_CONSTANT] = self.constant
+        return values
+
+    def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
+        """The functions of time with values (k,), in a session alone."""
+        known = dict(zip(self.names, x.tolist(), strict=True))
+        return tuple(
+            replace(
+                function,
+                parameters={
+                    key: known.get((_owner(i, function), key), value)
+                    for key, value in function.parameters.items()
+                },
+                std={},
+                session=session,
+            )
+            for i, function in enumerate(self.functions)
+        )
+
+    def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
+        """Conditions of the session's rows with values (k,)."""
+        known = apply_effects(conditions, self.effects(x))
+        return apply_functions(known, self.functions_with(x, None), conditions)
+
+
+def session_unknowns(
+    robot: Robot, fitted: Sequence[str], *, clock: bool
+) -> SessionUnknowns:
+    """What is fitted to a session.
+
+    Args:
+        robot: as it was saved, with what belonged to the session it was learned in.
+        fitted: of :data:`OF_A_SESSION`.
+        clock: whether the session's rows have a time.
+
+    Returns:
+        The unknowns; what changed with time among them where there is a clock.
+    """
+    names: list[tuple[str, str]] = []
+    if "registration" in fitted:
+        names += [("registration", name) for name in BASE]
+    if "tool" in fitted:
+        names += [("registration", name) for name in TOOL]
+    sizes = [np.inf] * len(names)
+    places = LIBRARY["encoder_offset"].frames
+    assert places is not None
+    zeros = [("encoder_offset", n) for n in places(robot)] if "zeros" in fitted else []
+    names += zeros
+    sizes += [_ZERO] * len(zeros)
+    step, mean = [_STEP] * len(names), [0.0] * len(names)
+    drift, functions = of_one_session(robot) if clock else ({}, ())
+    constant = drift.pop(_CONSTANT, None)
+    # a formula is not linear in its numbers: it is left behind
+    functions = tuple(f for f in functions if f.form != FORMULA)
+    alone = {name: (name[-2], value) for name, value in drift.items()}
+    owned = [(DRIFT, True, alone)]
+    owned += [
+        (_owner(i, f), f.form in _SETTLING, _numbers(f))
+        for i, f in enumerate(functions)
+    ]
+    for owner, settles, numbers in owned:
+        for name, (unit, value) in numbers.items():
+            if value:
+                alike = [v for u, v in numbers.values() if u == unit]
+                names.append((owner, name))
+                mean.append(value if settles else 0.0)
+                sizes.append(float(np.sqrt(np.mean(np.square(alike)))))
+    step += sizes[len(step) :]
+    return SessionUnknowns(
+        names=tuple(names),
+        mean=np.array(mean),
+        prior=np.array(sizes) ** -2.0,
+        step=np.array(step),
+        constant=constant,
+        functions=functions,
+    )
+
+
+def _owner(number: int, function: Function) -> str:
+    """What the numbers of a function of time are said to belong to."""
+    return f"function of time {number + 1}: {function.title}"
+
+
+def _numbers(function: Function) -> dict[str, tuple[str, float]]:
+    """Numbers in which a function is linear: first letter of component, and value."""
+    numbers = {}
+    for component in function.components:
+        own = parameters_of(function, component)
+        for name in columns_of(function, component):
+            full = f"{component}.{name}"
+            full = full if full in function.parameters else name
+            numbers[full] = component[0], own[name]
+    return numbers

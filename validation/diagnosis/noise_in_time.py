@@ -1,0 +1,149 @@
+r"""Noise correlated in time: is there any, and how much wider are intervals for it?
+
+Within a session each component of a reading has noise that is partly white and partly
+an Ornstein-Uhlenbeck process.  Over sigma, between times t_i and t_j,
+
+    R_ij = (1 - a) delta_ij + a exp(-|t_i - t_j| / tau).
+
+======  =============  =========  ====================================================
+symbol  code           shape      meaning
+======  =============  =========  ====================================================
+a       ``share``                 of the variance that is correlated
+tau     ``constant``              [s] time over which it is
+G       ``slopes``     (N, k)     change of the whitened readings per unknown
+H       ``covariance`` (k, k)     (G'G)^-1, of the unknowns by white noise
+======  =============  =========  ====================================================
+
+Fits stay those of white noise; with R instead of 1 their covariance is H G'R G H.  The
+likelihood of a and tau is the Kalman filter's, over a grid of both at once.
+
+Sources:
+    Uhlenbeck, Ornstein (1930), On the theory of the Brownian motion, Phys. Rev. 36.
+    Harvey (1989), Forecasting, Structural Time Series Models and the Kalman Filter.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.lack_of_fit import SIGNIFICANT
+
+_SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
+_CONSTANTS = 12  # time constants from the usual step of time to the longest session
+_FEWEST = 30  # rows with a time
+
+
+@dataclass(frozen=True)
+class NoiseInTime:
+    """Noise that is partly an Ornstein-Uhlenbeck process.
+
+    Attributes:
+        share: [-] of the variance that is correlated.
+        constant: [s] time over which it is.
+        probability: that white noise looks as correlated.
+    """
+
+    share: float
+    constant: float
+    probability: float
+
+
+def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
+    """How a residual is correlated in time.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        residual: (N,) whitened.
+
+    Returns:
+        Share and time constant of the largest likelihood; None where the rows have no
+        time, are few, or white noise looks as correlated in one case in 10^4.
+    """
+    if "time" not in campaign.covariates or len(campaign) < _FEWEST:
+        return None
+    series = [(times, residual[cells]) for times, cells in _series(campaign)]
+    steps = np.concatenate([np.diff(times) for times, _ in series])
+    longest = max((np.ptp(times) for times, _ in series if len(times)), default=0.0)
+    if not (steps > 0).any():
+        return None
+    constants = np.geomspace(float(np.median(steps[steps > 0])), longest, _CONSTANTS)
+    squares, logs = np.zeros((2, len(_SHARES), len(constants)))
+    for times, z in series:
+        more = _innovations(times, z, constants)
+        squares, logs = squares + more[0], logs + more[1]
+    # the size of the noise is free: a sigma that is too large does not look white
+    count = len(residual)
+    gain = count * np.log(residual @ residual / squares) - logs
+    best = np.unravel_index(np.argmax(gain), gain.shape)
+    chance = float(chi2.sf(gain[best], 2))
+    if chance > SIGNIFICANT:
+        return None
+    return NoiseInTime(float(_SHARES[best[0]]), float(constants[best[1]]), chance)
+
+
+def widened(
+    covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
+) -> NDArray:
+    """The covariance of unknowns that were fitted as if noise were white.
+
+    Args:
+        covariance: (k, k) by white noise.
+        slopes: (N, k) of the estimates' weights: what the unknowns are is the
+            covariance times their products with the whitened readings.
+        campaign: of R rows, N measured cells.
+        noise: as it is.
+
+    Returns:
+        (k, k).
+    """
+    along = np.zeros_like(slopes)  # (R - 1) G
+    for times, cells in _series(campaign):
+        fading = np.exp(-np.diff(times) / noise.constant)
+        for own, fades in ((cells, fading), (cells[::-1], fading[::-1])):
+            before = np.zeros(slopes.shape[1])
+            for last, now, fade in zip(own[:-1], own[1:], fades, strict=True):
+                before = fade * (before + slopes[last])
+                along[now] += noise.share * before
+    return covariance + covariance @ (slopes.T @ along) @ covariance
+
+
+def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
+    """Every component of every point in every session: its times, and its cells."""
+    time = campaign.covariates["time"]
+    rows, columns = np.nonzero(campaign.cells)
+    names = [np.zeros(len(campaign), dtype=int)]
+    for labels in (campaign.session, campaign.point):
+        if labels is not None:
+            names.append(np.unique(labels, return_inverse=True)[1])
+    group = np.column_stack([*(n[rows] for n in names), columns])
+    for one in np.unique(group, axis=0):
+        own = np.flatnonzero((group == one).all(axis=1))
+        own = own[np.argsort(time[rows[own]], kind="stable")]
+        yield time[rows[own]], own
+
+
+def _innovations(
+    times: NDArray, z: NDArray, constants: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Sums over a series of v^2/S and ln S, (shares, constants)."""
+    share = _SHARES[:, None]
+    fading = np.exp(-np.diff(times)[:, None] / constants)
+    mean = np.zeros((len(_SHARES), len(constants)))
+    variance = np.broadcast_to(share, mean.shape).copy()
+    squares, logs = np.zeros_like(mean), np.zeros_like(mean)
+    for i, value in enumerate(z):
+        if i:
+            mean = fading[i - 1] * mean
+            variance = fading[i - 1] ** 2 * (variance - share) + share
+        S = variance + 1 - share
+        wrong = value - mean
+        squares += wrong**2 / S
+        logs += np.log(S)
+        gain = variance / S
+        mean = mean + gain * wrong
+        variance = variance * (1 - gain)
+    return squares, logs
