@@ -380,7 +380,7 @@ def caught(fault: Fault, tree: Path, traces: dict[bool, Trace]) -> str | None:
                 if chosen and total > share:
                     break
                 chosen.append(test)
-            run = Run(tree, fault.compiled, 60 + 5 * min(total, share))
+            run = Run(tree, fault.compiled, 15 + 3 * min(total, share))
             if chosen and (test := run(chosen)) is not None:
                 return test
             tests = tests[len(chosen) :]
