@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from assembly.kinematics.posture import place_many
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, transform
@@ -25,6 +26,14 @@ def irsbot2_with(case, scale=1.0):
     for key, value in case["dl"].items():
         errors[robot.index(paper_frame(key))] = value
     return robot.with_errors(scale * errors)
+
+
+def irsbot2_over(x, z):
+    """The paper's robot with the first draw, and its postures at x by z [m]."""
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    poses = np.full((len(x) * len(z), 6), np.nan)
+    poses[:, 0], poses[:, 2] = (axis.ravel() for axis in np.meshgrid(x, z))
+    return robot, place_many(robot, poses)[0]
 
 
 def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):

@@ -5,6 +5,8 @@ The reduction is shared: only h differs from draw to draw.  The certificate is t
 any elimination: y proves ``f gain - f^2 cost / 2`` for every factor f.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,28 +22,55 @@ _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
 _PROJECTIONS, _INWARDS = 30, 0.8
 
 
-@kernel
-def least_energies(
-    Gt: NDArray, starts: NDArray, h: NDArray, inverse: NDArray,
-    cones: NDArray, gram: NDArray, slip: float, u: NDArray, y: NDArray,
-    energy: NDArray, bound: NDArray, outcome: NDArray,
-) -> None:  # fmt: skip
-    """Minimise |G u + h|^2 / 2 for every row of h.
+class Reduced(NamedTuple):
+    """What all draws at a posture share; writable arrays.
 
-    Args:
+    Attributes:
         Gt: (nu, r) columns of G as rows [sqrt(2 J)].
         starts: (cones + 1,) first clearance of each cone, and nu.
-        h: (k, r) [sqrt(2 J)].
         inverse: (nu, r) pseudoinverse of G.
         cones: (nu, r) generalised force of y on each clearance, before elimination.
         gram: (r, r) the springs' complementary energy is y.gram y / 2.
         slip: [per size of y] how much the free motions may gain by rounding.
-        u: (k, nu) to fill: clearances in units of their cones.
-        y: (k, r) to fill: multipliers, scaled to the best proof.
-        energy: (k,) to fill [J].
-        bound: (k,) to fill [J], certified lower bound.
-        outcome: (k,) to fill: SOLVED or UNCERTIFIED.
     """
+
+    Gt: NDArray
+    starts: NDArray
+    inverse: NDArray
+    cones: NDArray
+    gram: NDArray
+    slip: float
+
+
+class Energies(NamedTuple):
+    """Arrays filled by :func:`least_energies`, one row a draw.
+
+    Attributes:
+        u: (k, nu) clearances in units of their cones.
+        y: (k, r) multipliers, scaled to the best proof.
+        energy: (k,) [J].
+        bound: (k,) [J], certified lower bound.
+        outcome: (k,) SOLVED or UNCERTIFIED.
+    """
+
+    u: NDArray
+    y: NDArray
+    energy: NDArray
+    bound: NDArray
+    outcome: NDArray
+
+
+@kernel
+def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
+    """Minimise |G u + h|^2 / 2 for every row of h.
+
+    Args:
+        reduced: of the posture.
+        h: (k, r) [sqrt(2 J)].
+        out: arrays to fill.
+    """
+    Gt, starts, inverse, cones, gram, slip = reduced
+    u, y, energy, bound, outcome = out
     nu, r = Gt.shape
     norm = 0.0
     for c in range(nu):

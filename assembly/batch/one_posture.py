@@ -119,7 +119,7 @@ class OnePosture:
 
 def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     """Least energies of k draws without loads."""
-    from assembly.batch.compiled_draws import least_energies
+    from assembly.batch.compiled_draws import Energies, Reduced, least_energies
 
     count, n = len(errors), len(one.posture.robot.frames)
     flat = errors.reshape(-1, 6 * n)
@@ -134,12 +134,16 @@ def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     # nothing is larger than this in any draw, which saves a look at each one
     most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
     slip = np.abs(one.free).T @ (np.abs(motions) @ most)
-    least_energies(
-        np.ascontiguousarray(one.G.T), one.starts,
-        e @ one.misfit[:, erring].T, np.linalg.pinv(one.G), one.cones,
-        one.on_springs.T @ one.on_springs,
-        float(np.linalg.norm(slip)), u, y, energy, bound, outcome,
-    )  # fmt: skip
+    reduced = Reduced(
+        Gt=np.ascontiguousarray(one.G.T),
+        starts=one.starts,
+        inverse=np.linalg.pinv(one.G),
+        cones=one.cones,
+        gram=one.on_springs.T @ one.on_springs,
+        slip=float(np.linalg.norm(slip)),
+    )
+    h = e @ one.misfit[:, erring].T
+    least_energies(reduced, h, Energies(u, y, energy, bound, outcome))
     parts = np.hstack([u, e])
     fallback = (outcome > 0) | bool(len(one.H))
     for rows, limit in ((left, np.full(len(left), OPEN)), (motions, one.ranges)):

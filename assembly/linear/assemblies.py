@@ -1,9 +1,9 @@
 """Many least energies, problem (22), each with its certificate."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,9 @@ from assembly.linear.certificate import unproved
 from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.fallback import CannotAssemble
 from assembly.linear.reduction import FreeMotion
+from assembly.model.points import Points
 from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
-from forcefit.inputs.display import html_table, short_repr
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 # by the codes of assembly.linear.compiled_energy: the solver that solved, or, after the
 # second, why the point went to the fallback
@@ -36,8 +32,8 @@ _STATUS: dict[type[Exception], str] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Assemblies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assemblies(Points[Assembly]):
     """Least energies of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:
@@ -74,38 +70,20 @@ class Assemblies:
     joints: VirtualJoints
     one: Callable[[int], Assembly]
 
-    __repr__, _repr_html_ = short_repr, html_table
-
-    def __len__(self) -> int:
-        return len(self.energy)
+    VARIABLES: ClassVar = {
+        "energy": "energy",
+        "duality_gap": "gap",
+        "energy_without_play": "energy_without_clearance",
+        "platform_screw": "platform_screw",
+        "closure_residual": "closure_residual",
+        "clearance_excess": "clearance_excess",
+        "status": "status",
+        "reason": "reason",
+    }
 
     def __getitem__(self, i: int) -> Assembly:
         """Point i with its wrenches; raises where there is no solution."""
         return self.one(range(len(self))[i])
-
-    def __iter__(self) -> Iterator[Assembly]:
-        return map(self.one, range(len(self)))
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import points_dataset
-
-        return points_dataset({
-            "energy": self.energy,
-            "duality_gap": self.gap,
-            "energy_without_play": self.energy_without_clearance,
-            "platform_screw": self.platform_screw,
-            "closure_residual": self.closure_residual,
-            "clearance_excess": self.clearance_excess,
-            "status": self.status,
-            "reason": self.reason,
-        })
-
-    def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each point, columns (variable, component)."""
-        from assembly.model.tables import frame_table
-
-        return frame_table(self.to_xarray(), "point")
 
     @property
     def loaded(self) -> NDArray:

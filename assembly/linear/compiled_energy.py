@@ -30,9 +30,9 @@ from assembly.solvers.compiled import (
     part,
 )
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
-from assembly.solvers.dual_newton import dual_newton
+from assembly.solvers.dual_newton import Dual, dual_newton
 from assembly.solvers.householder import turn
-from assembly.solvers.interior import interior_point
+from assembly.solvers.interior import Programme, interior_point
 from assembly.solvers.vectors import (
     copy,
     divide,
@@ -270,22 +270,19 @@ def small_answer(
 ) -> int:  # fmt: skip
     """Newton alone where all constraints are active, else after an interior point."""
     r, d = len(h), vector(len(u))
-    if dual_newton(
-        Gt, h, d, r, starts, relative, absolute, _STEPS_ALONE, 0.0, u, y
-    ) >= 0:  # fmt: skip
+    dual = Dual(Gt, h, d, r, starts, relative, absolute)
+    if dual_newton(dual, _STEPS_ALONE, 0.0, u, y) >= 0:
         return NEWTON
-    G, none = np.ascontiguousarray(Gt.T), vector(0)
-    H = matrix(0, len(u))
+    G, H = np.ascontiguousarray(Gt.T), matrix(0, len(u))
+    programme = Programme(G, h, d, H, vector(0), starts)
     near = _NEAR_WITHOUT_CLEARANCE * 0.5 * inner(h, h)
     # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (
         (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
-        inside, _, _ = interior_point(G, h, d, H, none, starts, most, stop)
+        inside, _, _ = interior_point(programme, most, stop)
         copy(inside, u)
         into_cones(starts, u)
-        if dual_newton(
-            Gt, h, d, r, starts, relative, absolute, steps, _FIRST_SIGMA, u, y
-        ) >= 0:  # fmt: skip
+        if dual_newton(dual, steps, _FIRST_SIGMA, u, y) >= 0:
             break
     return INTERIOR

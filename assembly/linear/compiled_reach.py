@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import (
+    Triangle,
     least_motions,
     orthogonal_rows,
     small_problem,
@@ -59,6 +60,20 @@ class ClearanceLoads(NamedTuple):
     cone_of: Indices
 
 
+class Centres(NamedTuple):
+    """Where the solution of (22) leaves k points.
+
+    Attributes:
+        screws: (k, 6) [rad, m] of the platform at its origin.
+        clearances: (k, nu) in the cones of the reading.
+        motions: (k, nq) [rad, m] where they have a bound, else anything.
+    """
+
+    screws: Matrix
+    clearances: Matrix
+    motions: Matrix
+
+
 class Bounds(NamedTuple):
     """Rows of arrays filled by :func:`bound_all`, one row a point.
 
@@ -81,9 +96,8 @@ class Bounds(NamedTuple):
 
 @kernel
 def bound_all(
-    s: Structure, T: NDArray, mismatch: NDArray, centre: NDArray,
-    clearances: NDArray, motions: NDArray, loads: ClearanceLoads, offset: NDArray,
-    tolerance: NDArray, out: Bounds,
+    s: Structure, T: NDArray, mismatch: NDArray, centres: Centres,
+    loads: ClearanceLoads, asked: tuple[NDArray, NDArray], out: Bounds,
 ) -> None:  # fmt: skip
     """Bracket the largest pose errors of all points not left to the fallback.
 
@@ -91,22 +105,19 @@ def bound_all(
         s: the robot, without springs.
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
-        centre: (k, 6) [rad, m] platform screws of (22) at the platform's origin.
-        clearances: (k, nu) of (22), in these cones.
-        motions: (k, nq) [rad, m] of (22) where they have a bound, else anything.
-        loads: which of them are held.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant.
-        tolerance: (2,) [rad, m] asked of upper minus lower bounds.
+        centres: the solution of (22).
+        loads: which of its clearances are held.
+        asked: (3,) [m] from the platform's origin to the point whose error is meant;
+            (2,) [rad, m] asked of upper minus lower bounds.
         out: arrays to fill; rows whose outcome is FALLBACK are left out.
     """
-    outer = empty_polytope()
+    outer, (offset, tolerance) = empty_polytope(), asked
     for i in range(len(T)):
         if out.outcome[i] != SOLVED:
             continue
         decided, loaded = loaded_cones(loads, paths_of(T[i], s), i)
-        bounded, body = body_of(
-            s, T[i], mismatch[i], centre[i], clearances[i], motions[i], loaded, offset
-        )
+        rank_tolerance = RANK + MISMATCH_FACTOR * mismatch[i]
+        bounded, body = body_of(s, T[i], rank_tolerance, centres, i, loaded, offset)
         if not (decided and bounded):
             out.outcome[i] = FALLBACK
             continue
@@ -164,40 +175,38 @@ def loaded_cones(loads: ClearanceLoads, P: Matrices, point: int) -> tuple[bool, 
 
 @part
 def body_of(
-    s: Structure, T: Matrices, mismatch: float, centre: Vector, clearances: Vector,
-    motions: Vector, loaded: Mask, offset: Vector,
+    s: Structure, T: Matrices, tolerance: float, centres: Centres, point: int,
+    loaded: Mask, offset: Vector,
 ) -> tuple[bool, ConvexBody]:  # fmt: skip
     """The set of platform screws of one point, and whether it is valid.
 
     Args:
-        s: as in :func:`bound_all`, like all others, for one point.
-        T: see there.
-        mismatch: see there.
-        centre: see there.
-        clearances: see there.
-        motions: see there.
-        loaded: see there.
-        offset: see there.
+        s: the robot, without springs.
+        T: (n, 4, 4) frames of the point.
+        tolerance: of ranks.
+        centres: the solution of (22).
+        point: which one.
+        loaded: (cones,) the clearances that are held.
+        offset: (3,) [m] to the point of the platform whose error is meant.
 
     Returns:
         Whether ranks are unambiguous, the platform moves within bounds, and no passive
         joint comes to the bound of its own motion; the set.
     """
-    tolerance = RANK + MISMATCH_FACTOR * mismatch
     P = paths_of(T, s)
     m, nq = 6 * s.patterns.shape[1], len(s.free_frame)
     F = free_columns(s, P, m)
     turns, diagonal, order = vector(nq), vector(nq), indices(nq)
     rank = triangulate(F, turns, diagonal, order, tolerance, 0.0, 1e-11)
-    centre = centre.copy()
+    centre, clearances = centres.screws[point].copy(), centres.clearances[point]
     _shift(centre.reshape(6, 1), offset)
     nothing = matrix(6, 0), matrix(0, 0), vector(0), indices(1)
     if rank < 0:
         return False, ConvexBody(centre, *nothing)
-    bounded, follow = _follow(s, P, F, turns, diagonal, order, rank, m)
-    if not bounded or not _within_bounds(
-        s, P, F, turns, diagonal, order, rank, clearances, motions, loaded
-    ):
+    free = Triangle(F, turns, diagonal, order, rank)
+    bounded, follow = _follow(s, P, free, m)
+    motions = centres.motions[point]
+    if not bounded or not _within_bounds(s, P, free, clearances, motions, loaded):
         return False, ConvexBody(centre, *nothing)
     Z = orthogonal_rows(F, turns, rank, m)
     columns, _ = small_problem(s, P, Z, len(Z), vector(m))
@@ -227,15 +236,13 @@ def body_of(
 
 
 @part
-def _follow(
-    s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
-    order: Indices, rank: int, m: int,
-) -> tuple[bool, Matrix]:  # fmt: skip
+def _follow(s: Structure, P: Matrices, free: Triangle, m: int) -> tuple[bool, Matrix]:
     """Scaled platform screws (6, m) as free motions follow the closures.
 
     Returns:
         False where free motions move the platform and no closure; the screws.
     """
+    F, turns, diagonal, order, rank = free
     nq = len(s.free_frame)
     follow, largest = matrix(m, LANES), 0.0
     for a in range(6):
@@ -255,10 +262,11 @@ def _follow(
 
 @part
 def _within_bounds(
-    s: Structure, P: Matrices, F: Matrix, turns: Vector, diagonal: Vector,
-    order: Indices, rank: int, clearances: Vector, motions: Vector, loaded: Mask,
+    s: Structure, P: Matrices, free: Triangle, clearances: Vector, motions: Vector,
+    loaded: Mask,
 ) -> bool:  # fmt: skip
     """Whether no passive joint passes its bound; see :mod:`assembly.linear.reach`."""
+    F, turns, diagonal, order, rank = free
     nq, m = F.shape
     bounded = False
     for q in range(nq):

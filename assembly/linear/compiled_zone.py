@@ -29,7 +29,7 @@ from assembly.linear.thresholds import (
 )
 from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
 from assembly.solvers.householder import triangulate, turn
-from assembly.solvers.interior import interior_point
+from assembly.solvers.interior import Programme, interior_point
 from assembly.solvers.vectors import divide, indices, inner, matrices, matrix, vector
 
 SOLVED, FALLBACK = range(2)
@@ -174,10 +174,10 @@ def farthest(B: Matrix, starts: Indices) -> tuple[Vector, Vector]:
     """U within the cones with the most B[0].u and no B[1:] u; the reduced gradient."""
     nu = B.shape[1]
     rest = np.ascontiguousarray(B[1:])
-    u, n, _ = interior_point(
-        matrix(0, nu), vector(0), B[0].copy(), rest, vector(len(rest)), starts,
-        _STOP, 0.0,
-    )  # fmt: skip
+    programme = Programme(
+        matrix(0, nu), vector(0), B[0].copy(), rest, vector(len(rest)), starts
+    )
+    u, n, _ = interior_point(programme, _STOP, 0.0)
     gradient = B[0].copy()
     for i in range(len(rest)):
         for c in range(nu):

@@ -63,6 +63,7 @@ def compiled_bounds(
         FALLBACK,
         SOLVED,
         Bounds,
+        Centres,
         ClearanceLoads,
         bound_all,
     )
@@ -100,12 +101,14 @@ def compiled_bounds(
     )
     motions = np.zeros((count, len(places.moving.free_bound)))
     motions[:, places.bounded] = energies.motions[:, places.motions]
+    centres = Centres(
+        screws=energies.platform_screw.copy(),
+        clearances=np.ascontiguousarray(energies.clearances[:, places.columns]),
+        motions=motions,
+    )
     tolerance = [asked.tolerance_rotation, asked.tolerance_translation]
-    bound_all(
-        places.moving, T, off, energies.platform_screw.copy(),
-        np.ascontiguousarray(energies.clearances[:, places.columns]), motions, loads,
-        np.array(asked.offset, dtype=float), np.array(tolerance, dtype=float), bounds,
-    )  # fmt: skip
+    point_and_tolerance = np.array(asked.offset, float), np.array(tolerance, float)
+    bound_all(places.moving, T, off, centres, loads, point_and_tolerance, bounds)
     return bounds
 
 

@@ -21,10 +21,10 @@ tenths of a millisecond a point.  ``budget``, and a point that this does not cov
 left to numpy and counted.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,7 @@ from assembly.linear.fallback import CannotAssemble
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.reach import reachable_screws
 from assembly.linear.robot_structure import structure_of
+from assembly.model.points import Points
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import (
@@ -45,10 +46,6 @@ from forcefit.inputs.display import (
     html_table,
     short_repr,
 )
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +90,8 @@ class PoseError:
         return figures | ({"not proved": self.unproved} if self.unproved else {})
 
 
-@dataclass(frozen=True, eq=False)
-class PoseErrors:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseErrors(Points[PoseError]):
     """Certified bounds of the largest pose errors of k points; ``[i]`` is one of them.
 
     Attributes:
@@ -120,10 +117,14 @@ class PoseErrors:
     status: NDArray
     reason: NDArray
 
-    __repr__, _repr_html_ = short_repr, html_table
-
-    def __len__(self) -> int:
-        return len(self.status)
+    VARIABLES: ClassVar = {
+        "rotation_error": "rotation_error",
+        "translation_error": "translation_error",
+        "rotation_screw": "rotation_screw",
+        "translation_screw": "translation_screw",
+        "status": "status",
+        "reason": "reason",
+    }
 
     def __getitem__(self, i: int) -> PoseError:
         """Point i; NaN, and why, where there is no solution."""
@@ -136,28 +137,6 @@ class PoseErrors:
             cuts=int(self.supports[i]),
             proof=partial(str, self.reason[i]),
         )
-
-    def __iter__(self) -> Iterator[PoseError]:
-        return (self[i] for i in range(len(self)))
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import points_dataset
-
-        return points_dataset({
-            "rotation_error": self.rotation_error,
-            "translation_error": self.translation_error,
-            "rotation_screw": self.rotation_screw,
-            "translation_screw": self.translation_screw,
-            "status": self.status,
-            "reason": self.reason,
-        })
-
-    def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each point, columns (variable, component)."""
-        from assembly.model.tables import frame_table
-
-        return frame_table(self.to_xarray(), "point")
 
 
 def bound_pose_error(

@@ -8,9 +8,9 @@ As printed, (21) makes compliant joints rigid in every direction (``"rigid"``, t
 literal reading); ``"free"`` lets them turn about their own axis, as a hinge does.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,13 +21,12 @@ from assembly.linear.fallback import reference_margin
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
+from assembly.model.points import Points
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import html_table, short_repr
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
+    pass
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins
@@ -65,8 +64,8 @@ class Zone:
         return f"the margin {self.margin:.9g} is proved down to {self.bound:.9g} only"
 
 
-@dataclass(frozen=True, eq=False)
-class Margins:
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(Points[Zone]):
     """Zone margins of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:
@@ -84,10 +83,11 @@ class Margins:
     fallback: NDArray
     reason: NDArray
 
-    __repr__, _repr_html_ = short_repr, html_table
-
-    def __len__(self) -> int:
-        return len(self.margin)
+    VARIABLES: ClassVar = {
+        "margin": "margin",
+        "margin_bound": "bound",
+        "reason": "reason",
+    }
 
     def __getitem__(self, i: int) -> Zone:
         """Point i; raises where the solver failed."""
@@ -95,25 +95,6 @@ class Margins:
         if np.isnan(margin):
             raise SolverFailed("least factor on the clearances", self.reason[i])
         return Zone(None, None) if np.isinf(margin) else Zone(margin, bound)
-
-    def __iter__(self) -> Iterator[Zone]:
-        return (self[i] for i in range(len(self)))
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Over ``point``; see :mod:`assembly.model.tables`."""
-        from assembly.model.tables import points_dataset
-
-        return points_dataset({
-            "margin": self.margin,
-            "margin_bound": self.bound,
-            "reason": self.reason,
-        })
-
-    def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each point, columns (variable, component)."""
-        from assembly.model.tables import frame_table
-
-        return frame_table(self.to_xarray(), "point")
 
 
 @overload

@@ -25,7 +25,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite.binding import add_symbol
-from numba import njit, types
+from numba import config, njit, types
 from numba.core import event, funcdesc
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.dispatcher import Dispatcher
@@ -66,6 +66,8 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(kernel, **options)
+    if config.DISABLE_JIT:  # run as Python, to be followed line by line
+        return function
     compiled = njit(no_cfunc_wrapper=True, **_OPTIONS, **options)(function)
     _survive_moves(compiled)
     compile_one = compiled.compile

@@ -160,14 +160,16 @@ def _compiled(
     """The interior-point method of this package; its solution must satisfy H."""
     from assembly.solvers.cone_solvers import interior_point
 
-    u, n, _ = interior_point(
-        np.ascontiguousarray(G), h, d, np.ascontiguousarray(H), k,
-        _starts(group), 1e-12,
-    )  # fmt: skip
+    u, n, _ = interior_point(*_writable(G, h, d, H, k), _starts(group), 1e-12)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
         return None, None, "no feasible point found"
     return u, -n, "Solved"
+
+
+def _writable(*arrays: NDArray) -> tuple[NDArray, ...]:
+    """Arrays as compiled loops take them."""
+    return tuple(np.require(array, requirements=["C", "W"]) for array in arrays)
 
 
 def _starts(group: NDArray) -> NDArray:
@@ -215,18 +217,20 @@ def _certified(
 ) -> Iterator[LeastEnergy]:
     """A solution with the bound of its own springs; the same refined by Newton."""
     from assembly.solvers.cone_solvers import newton
+    from assembly.solvers.dual_newton import Dual
 
     G, h, d, H, k, group = problem
     yield _certify(problem, u, G @ u + h, rigid)
     if group.max() >= 0 and np.bincount(group).max() > 2:
         return  # Newton's method knows discs and intervals only
-    Gt = np.ascontiguousarray(np.vstack([G, H]).T)
-    right, size = np.concatenate([h, -k]), float(h @ h) / 2
+    size = float(h @ h) / 2
     u, y = u.copy(), np.concatenate([h, -rigid])
-    newton(
-        Gt, right, d, len(h), _starts(group), _STOP * GAP,
-        _STOP * GAP_WITHOUT_CLEARANCE * size, _STEPS, _FIRST_SIGMA, u, y,
+    Gt, right, d = _writable(np.vstack([G, H]).T, np.concatenate([h, -k]), d)
+    dual = Dual(
+        Gt=Gt, h=right, d=d, springs=len(h), starts=_starts(group),
+        relative=_STOP * GAP, absolute=_STOP * GAP_WITHOUT_CLEARANCE * size,
     )  # fmt: skip
+    newton(dual, _STEPS, _FIRST_SIGMA, u, y)
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():
         if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:

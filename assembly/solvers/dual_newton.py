@@ -18,17 +18,11 @@ Sources:
     Newton augmented Lagrangian method for solving lasso problems.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from assembly.solvers.compiled import (
-    GivenIndices,
-    GivenMatrix,
-    GivenVector,
-    Indices,
-    Matrix,
-    Vector,
-    part,
-)
+from assembly.solvers.compiled import Indices, Matrix, Vector, part
 from assembly.solvers.layers import LANES, add, dot, layers_of
 from assembly.solvers.vectors import matrix, vector
 
@@ -39,15 +33,10 @@ _INNER_SHARE = 0.1  # of the gap that may be the inner problem's
 _RESIDUAL = 1e-13  # accepted of a row that no spring enters
 
 
-@part(fastmath=FAST)
-def dual_newton(
-    Gt: GivenMatrix, h: GivenVector, d: GivenVector, springs: int, starts: GivenIndices,
-    relative: float, absolute: float, steps: int, first_sigma: float, u: Vector,
-    y: Vector,
-) -> int:  # fmt: skip
-    """Maximise the dual; ``u`` and ``y`` are overwritten with the solution.
+class Dual(NamedTuple):
+    """What is maximised, and how far.
 
-    Args:
+    Attributes:
         Gt: (nu, r) columns of G, of order 1, and of H.
         h: (r,) and -k.
         d: (nu,) work of the load along the clearances.
@@ -55,6 +44,63 @@ def dual_newton(
         starts: (cones + 1,) first column of each cone (one or two each), and nu.
         relative: gap asked for, relative to the energy ..
         absolute: .. plus this.
+    """
+
+    Gt: Matrix
+    h: Vector
+    d: Vector
+    springs: int
+    starts: Indices
+    relative: float
+    absolute: float
+
+
+class Layered(NamedTuple):
+    """The same with its columns in layers, padded with zeros.
+
+    Attributes:
+        M: (r, width) rows of G and H.
+        h: (r,).
+        linear: (width,) -d.
+        springs: r of G alone.
+        layers: first place of each layer, and nu.
+    """
+
+    M: Matrix
+    h: Vector
+    linear: Vector
+    springs: int
+    layers: Indices
+
+
+class Iterate(NamedTuple):
+    """Where the method stands; all but ``y`` and ``old`` follow from these.
+
+    Attributes:
+        y: (r,) multipliers.
+        old: (width,) the proximal clearances, in layers like all columns.
+        u: (width,) clearances.
+        z: (width,) M^T y - d.
+        g: (r,) gradient of the smooth dual.
+        B: (r, width) a root of minus its curvature but for the springs' own.
+    """
+
+    y: Vector
+    old: Vector
+    u: Vector
+    z: Vector
+    g: Vector
+    B: Matrix
+
+
+@part(fastmath=FAST)
+def dual_newton(
+    dual: Dual, steps: int, first_sigma: float, u: Vector, y: Vector
+) -> int:
+    """Maximise the dual; ``u`` and ``y`` are overwritten with the solution.
+
+    Args:
+        dual: the problem.
         steps: most Newton steps.
         first_sigma: times the mean |G_k^T h|; the larger, the better u must be.  0
             leaves the dual as it is, with its kinks, and stops at the first one.
@@ -64,14 +110,15 @@ def dual_newton(
     Returns:
         Steps taken; -1 if it did not converge.
     """
+    Gt, h, springs = dual.Gt, dual.h, dual.springs
     r, nu = len(h), len(u)
-    order, layers = layers_of(starts)
+    order, layers = layers_of(dual.starts)
     # as in the interior-point method: rows of G, columns in layers, padded with zeros
     width = nu + -nu % LANES
     M, B, columns = matrix(r, width), matrix(r, width), matrix(4, width)
     old, own, linear, z = columns[0], columns[1], columns[2], columns[3]
     for j in range(nu):
-        old[j], linear[j] = u[order[j]], -d[order[j]]
+        old[j], linear[j] = u[order[j]], -dual.d[order[j]]
         for i in range(r):
             M[i, j] = Gt[order[j], i]
     g, S, step, start = vector(r), matrix(r, r), vector(r), vector(r)
@@ -85,15 +132,14 @@ def dual_newton(
     for j in range(nu):
         mean += abs(z[j]) / nu
     sigma = first_sigma / max(mean, 1e-12) if first_sigma > 0.0 else 1e30
+    rows, at = Layered(M, h, linear, springs, layers), Iterate(y, old, own, z, g, B)
     before, halvings, taken = -np.inf, 0, 0
     while True:
-        smooth, residual, kink, primal = _slopes(
-            M, h, linear, springs, layers, old, sigma, own, y, g, z, B
-        )
+        smooth, residual, kink, primal = _slopes(rows, at, sigma)
         closed = True
         for i in range(springs, r):
             closed = closed and abs(g[i]) <= _RESIDUAL
-        if closed and residual + kink <= relative * primal + absolute:
+        if closed and residual + kink <= dual.relative * primal + dual.absolute:
             break
         if not smooth >= before - 1e-14:
             halvings += 1
@@ -113,7 +159,7 @@ def dual_newton(
                 old[j] = own[j]
             sigma *= _SIGMA_GROWTH
             before = -np.inf
-            _slopes(M, h, linear, springs, layers, old, sigma, own, y, g, z, B)
+            _slopes(rows, at, sigma)
         _curvature(B, springs, S)
         if not _solve(S, g, step):
             taken = -1
@@ -128,20 +174,16 @@ def dual_newton(
 
 @part(fastmath=FAST)
 def _slopes(
-    M: Matrix, h: GivenVector, linear: Vector, springs: int, layers: Indices,
-    old: Vector, sigma: float, u: Vector, y: Vector, g: Vector, z: Vector, B: Matrix,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Value and derivatives of the smooth dual at y.
-
-    ``u`` is overwritten with the clearances, ``g`` with the gradient, ``B`` with a root
-    of minus the curvature but for the springs' own; ``old`` are the proximal
-    clearances, ``sigma`` the proximal parameter.  Columns are in layers, rows all those
-    of M.
+    rows: Layered, at: Iterate, sigma: float
+) -> tuple[float, float, float, float]:
+    """Value and derivatives of the smooth dual at y, with the parameter sigma.
 
     Returns:
         The smooth dual, the gap from the gradient and from the kinks, the springs'
         energy.
     """
+    M, h, linear, springs, layers = rows
+    y, old, u, z, g, B = at
     for j in range(len(z)):
         z[j] = linear[j]
     for i in range(len(y)):

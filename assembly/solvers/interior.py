@@ -21,15 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import (
-    GivenIndices,
-    GivenMatrix,
-    GivenVector,
-    Matrix,
-    Vector,
-    kernel,
-    part,
-)
+from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
 from assembly.solvers.layers import FAST, LANES, add, cone_sums, dot, layers_of
 from assembly.solvers.nesterov_todd import (
     Point,
@@ -46,6 +38,26 @@ _BACK_OFF = 0.99  # of the step to the nearest boundary of a cone
 # 3 is usual; on these problems 2 takes a seventh, 1.5 a sixth less iterations
 _CENTRING = 1.5
 _FAR = 1e30
+
+
+class Programme(NamedTuple):
+    """What is minimised; all numbers of order 1 (scale before).
+
+    Attributes:
+        G: (r, nu).
+        h: (r,).
+        d: (nu,).
+        H: (p, nu) of full row rank.
+        k: (p,).
+        starts: (cones + 1,) first column of each cone, and nu.
+    """
+
+    G: Matrix
+    h: Vector
+    d: Vector
+    H: Matrix
+    k: Vector
+    starts: Indices
 
 
 class System(NamedTuple):
@@ -72,24 +84,19 @@ class System(NamedTuple):
 
 @part(fastmath=FAST)
 def interior_point(
-    G: GivenMatrix, h: GivenVector, d: GivenVector, H: GivenMatrix, k: GivenVector,
-    starts: GivenIndices, tolerance: float, relative: float,
-) -> tuple[Vector, Vector, int]:  # fmt: skip
-    """Minimise; all arguments of order 1 (scale before).
+    programme: Programme, tolerance: float, relative: float
+) -> tuple[Vector, Vector, int]:
+    """Minimise.
 
     Args:
-        G: (r, nu).
-        h: (r,).
-        d: (nu,).
-        H: (p, nu) of full row rank.
-        k: (p,).
-        starts: (cones + 1,) first column of each cone, and nu.
+        programme: the problem.
         tolerance: of the gap ..
         relative: .. plus this part of the springs' energy |G u + h|^2 / 2.
 
     Returns:
         u (nu,), multipliers of H (p,), and the iterations taken; -1 if it broke down.
     """
+    G, h, d, H, k, starts = programme
     r, nu = G.shape
     p, cones = len(k), len(starts) - 1
     m = r + p

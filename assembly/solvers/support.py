@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
-from assembly.solvers.interior import interior_point
+from assembly.solvers.interior import Programme, interior_point
 from assembly.solvers.vectors import divide, inner, matrix, vector
 
 _SYMMETRIC = 1e-14  # H start counts as zero
@@ -88,10 +88,11 @@ def support(
         for i in range(p):
             for j in range(nv):
                 right[i] += body.rows[i, j] * body.start[j]
-        v, n, _ = interior_point(
+        programme = Programme(
             matrix(0, nv), vector(0), divide(gradient, size), body.rows, right,
-            body.starts, tolerance / size, 0.0,
+            body.starts,
         )  # fmt: skip
+        v, n, _ = interior_point(programme, tolerance / size, 0.0)
         for i in range(p):
             n[i] *= size
             height += n[i] * right[i]

@@ -4,6 +4,8 @@ Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,23 +37,37 @@ def start_chains(
             walks[chain, c] = u[c] + _FRACTION * reach * direction[c]
 
 
-@kernel
-def walk(
-    M: NDArray, gram: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
-    every: int, rng: np.random.Generator, trace: NDArray,
-) -> None:  # fmt: skip
-    """Continue a chain; its platform screw is kept every so many trajectories.
+class Positions(NamedTuple):
+    """The set of clearance positions.
 
-    Args:
+    Attributes:
         M: (nu, n) axes of Dikin's ellipsoid.
         gram: (nu, nu) M M^T.
         starts: (cones + 1,) first column of each cone, and nu.
         to_screw: (6, nu) [rad, m] from u to the platform's screw.
+    """
+
+    M: NDArray
+    gram: NDArray
+    starts: NDArray
+    to_screw: NDArray
+
+
+@kernel
+def walk(
+    positions: Positions, u: NDArray, every: int, rng: np.random.Generator,
+    trace: NDArray,
+) -> None:  # fmt: skip
+    """Continue a chain; its platform screw is kept every so many trajectories.
+
+    Args:
+        positions: the set.
         u: (nu,) the chain's point, overwritten.
         every: number of trajectories between two screws.
         rng: of random numbers.
         trace: (kept, 6) [rad, m] overwritten with the screws.
     """
+    M, gram, starts, to_screw = positions
     for k in range(len(trace)):
         for _ in range(every):
             _move(M, gram, starts, u, rng)

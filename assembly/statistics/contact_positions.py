@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solvers.compiled import kernel
-from assembly.solvers.interior import interior_point
+from assembly.solvers.interior import Programme, interior_point
 from assembly.solvers.vectors import matrix, vector
 
 
@@ -43,9 +43,10 @@ def move_to_contact(
             for c in range(nu):
                 if free[c]:
                     right_side[l] += rows[l, c] * positions[i, c]
-        position, _, steps = interior_point(
-            no_springs, no_offset, direction, rows, right_side, starts, 1e-9, 0.0
+        programme = Programme(
+            no_springs, no_offset, direction, rows, right_side, starts
         )
+        position, _, steps = interior_point(programme, 1e-9, 0.0)
         for c in range(nu):
             if free[c]:
                 ends[i, c] = position[c] if steps >= 0 else np.nan

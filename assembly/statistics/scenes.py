@@ -16,6 +16,7 @@ from forcefit.page.charts import Axis, Layer, value_map
 
 if TYPE_CHECKING:
     import xarray
+    from numpy.typing import ArrayLike
 
 _QUANTILE = 0.95
 _CAPTION = (
@@ -47,12 +48,10 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     drawn = experiment.sources.draw(draw, 1, experiment.seed)
     errors = experiment.sources.errors(drawn)[0]
     robot = experiment.posture.robot.with_errors(errors)
-    forced = solve_assembly(
-        replace(experiment.posture, robot=robot),
-        experiment.load, gravity=experiment.gravity,
+    return _forced_robot(
+        replace(experiment.posture, robot=robot), experiment.load, experiment.gravity,
+        why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
     )  # fmt: skip
-    text = f"{_CAPTION} Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them."
-    return robot_scene(forced, None, None, text)
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
@@ -66,12 +65,23 @@ def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> s
         HTML of a scene; empty where it cannot be assembled.
     """
     worst = postures[int(np.nanargmax(present["margins"]))]
+    why = "The posture of the largest margin, with the errors there are."
+    return _forced_robot(worst, why=why)
+
+
+def _forced_robot(
+    posture: Posture,
+    load: "ArrayLike | None" = None,
+    gravity: "ArrayLike | None" = None,
+    *,
+    why: str,
+) -> str:
+    """A robot assembled, and why it is this one; empty where it does not assemble."""
     try:
-        forced = solve_assembly(worst)
+        forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):
         return ""
-    text = f"{_CAPTION} The posture of the largest margin, with the errors there are."
-    return robot_scene(forced, None, None, text)
+    return robot_scene(forced, None, None, f"{_CAPTION} {why}")
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:

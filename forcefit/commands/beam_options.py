@@ -22,8 +22,13 @@ class BeamOptions:
     inner_radius: float | None = None
     width: float | None = None
     height: float | None = None
-    theory: str = "timoshenko"
     section_text: str | None = None
+    theory: str = "timoshenko"
+
+    def has_section(self) -> bool:
+        """Whether a section is given, in one form or another."""
+        lengths = (self.radius, self.inner_radius, self.width, self.height)
+        return {*lengths, self.section_text} != {None}
 
     def material(self) -> tuple[float, float]:
         """Young's modulus [Pa] and Poisson's ratio."""

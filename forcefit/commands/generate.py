@@ -5,6 +5,16 @@ from typing import Annotated, Any
 
 import typer
 
+from forcefit.commands.campaign_options import (
+    CommandedIn,
+    Force,
+    Point,
+    PositionNoise,
+    Reach,
+    RotationNoise,
+    Stroke,
+    Temperature,
+)
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
@@ -54,23 +64,17 @@ def generate(
     ] = None,
     configurations: Annotated[int, typer.Option(help="Different ones.")] = 24,
     rows: Annotated[int, typer.Option(help="Measurements, interleaved.")] = 116,
-    reach: Annotated[
-        float, typer.Option(help="[rad] Largest change of a drive from home.")
-    ] = 0.6,
-    stroke: Annotated[
-        float, typer.Option(help="[m/rad] What a sliding drive moves per rad of reach.")
-    ] = 0.1,
-    force: Annotated[float, typer.Option(help="[N] Largest load.")] = 40.0,
+    reach: Reach = 0.6,
+    stroke: Stroke = 0.1,
+    force: Force = 40.0,
     loads: Annotated[str, typer.Option(help="many | one")] = "many",
-    temperature: Annotated[
-        str, typer.Option(help="swing | around | constant")
-    ] = "swing",
-    command: Annotated[str, typer.Option(help="joints | pose")] = "joints",
+    temperature: Temperature = "swing",
+    command: CommandedIn = "joints",
     humidity: Annotated[
         bool, typer.Option("--humidity", help="Record it as a covariate.")
     ] = False,
-    rotation: Annotated[float, typer.Option(help="[rad] 1 sigma.")] = 1e-5,
-    position: Annotated[float, typer.Option(help="[m] 1 sigma.")] = 5e-6,
+    rotation: RotationNoise = 1e-5,
+    position: PositionNoise = 5e-6,
     error_size: Annotated[
         float,
         typer.Option(help="[rad] Declared errors drawn up to it, 0.5 mm per mrad."),
@@ -80,9 +84,7 @@ def generate(
     hidden_frame: Annotated[
         float, typer.Option(help="[rad, m] Size of an unknown measuring frame.")
     ] = 0.0,
-    point: Annotated[
-        str, typer.Option(help="[m] Measured point, platform axes.")
-    ] = "0,0,0",
+    point: Point = "0,0,0",
     program: Annotated[str, typer.Option(help="multibody | springs")] = "multibody",
     seed: Annotated[int, typer.Option(help="Of all draws.")] = 0,
     json: JsonOption = None,

@@ -5,6 +5,16 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.campaign_options import (
+    CommandedIn,
+    Force,
+    Point,
+    PositionNoise,
+    Reach,
+    RotationNoise,
+    Stroke,
+    Temperature,
+)
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
@@ -20,22 +30,14 @@ def plan(
     configurations: Annotated[
         int, typer.Option(help="Different ones to choose from.")
     ] = 120,
-    reach: Annotated[
-        float, typer.Option(help="[rad] Largest change of a drive from home.")
-    ] = 0.6,
-    stroke: Annotated[
-        float, typer.Option(help="[m/rad] What a sliding drive moves per rad of reach.")
-    ] = 0.1,
-    force: Annotated[float, typer.Option(help="[N] Largest load.")] = 40.0,
-    temperature: Annotated[
-        str, typer.Option(help="swing | around | constant")
-    ] = "swing",
-    command: Annotated[str, typer.Option(help="joints | pose")] = "joints",
-    rotation: Annotated[float, typer.Option(help="[rad] 1 sigma.")] = 1e-5,
-    position: Annotated[float, typer.Option(help="[m] 1 sigma.")] = 5e-6,
-    point: Annotated[
-        str, typer.Option(help="[m] Measured point, platform axes.")
-    ] = "0,0,0",
+    reach: Reach = 0.6,
+    stroke: Stroke = 0.1,
+    force: Force = 40.0,
+    temperature: Temperature = "swing",
+    command: CommandedIn = "joints",
+    rotation: RotationNoise = 1e-5,
+    position: PositionNoise = 5e-6,
+    point: Point = "0,0,0",
     seed: Annotated[int, typer.Option(help="Of the rows to choose from.")] = 0,
     json: JsonOption = None,
 ) -> None:

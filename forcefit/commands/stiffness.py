@@ -123,14 +123,7 @@ def beam(
     from stiffness.report.results import link_results, link_text
 
     options = BeamOptions(
-        young=young,
-        poisson=poisson,
-        radius=radius,
-        inner_radius=inner_radius,
-        width=width,
-        height=height,
-        theory=theory,
-        section_text=section,
+        young, poisson, radius, inner_radius, width, height, section, theory
     )
     along = parse_axis("--axis", axis)
     tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
@@ -233,18 +226,11 @@ def compare(
     from stiffness.report.results import comparison_results, comparison_text
 
     options = BeamOptions(
-        young=young,
-        poisson=poisson,
-        radius=radius,
-        inner_radius=inner_radius,
-        width=width,
-        height=height,
-        theory=theory,
-        section_text=section,
+        young, poisson, radius, inner_radius, width, height, section, theory
     )
     (E, nu), roll = options.material(), _up(up)
     if curve is not None:
-        if {radius, inner_radius, width, height, section, up} != {None}:
+        if options.has_section() or up is not None:
             raise BadInput("--curve: its file has the sections and their axes")
         bent = _curve_link(curve, options)
     else:
@@ -296,9 +282,7 @@ def slenderness(
     from stiffness.report.results import sweep_results, sweep_text
     from stiffness.report.slenderness import sweep_slenderness
 
-    options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, section_text=section
-    )
+    options = BeamOptions(young, poisson, radius, inner_radius, width, height, section)
     (E, nu), declared = options.material(), options.declared()
     wanted = parse_sizes("--ratios", ratios, "1")
     accuracy = _accuracy(accuracy)
@@ -358,16 +342,10 @@ def stress(
     from stiffness.report.results import stress_results, stress_text
     from stiffness.surface.surface import read_surface
 
-    options = BeamOptions(
-        young, poisson, radius, inner_radius, width, height, section_text=section
-    )
-    (E, nu), roll, load = (
-        options.material(),
-        _up(up),
-        np.array(parse_load(wrench, "--wrench")),
-    )
-    no_section = {radius, inner_radius, width, height, section} == {None}
-    declared = None if no_section else options.declared()
+    options = BeamOptions(young, poisson, radius, inner_radius, width, height, section)
+    (E, nu), roll = options.material(), _up(up)
+    load = np.array(parse_load(wrench, "--wrench"))
+    declared = options.declared() if options.has_section() else None
     held, moved = _interfaces(base, tip)
     accuracy = _accuracy(accuracy)
     if away is not None:

@@ -277,3 +277,16 @@ def test_play_in_an_open_chain_agrees_with_the_cone_solver():
     closed_form, open_ = with_clearances_taken_up(there)
     assert not open_.any()
     assert np.allclose(predict(closed_form).deviation, slow, atol=1e-13)
+
+
+@pytest.mark.parametrize("robot", ["arm6", "irsbot2", "delta"])
+@pytest.mark.parametrize("name", LIBRARY)
+def test_a_search_starts_and_may_go_as_far_as_is_plausible(name, robot):
+    """Where the search starts, and where it may go: a plausible size up or down."""
+    for unknown in LIBRARY[name].unknowns(load_robot(robot)):
+        assert unknown.scale > 0
+        starts = unknown.scan or (unknown.start,)
+        if not unknown.scan_by:  # else multiples of what is not known here
+            assert all(unknown.lower <= one <= unknown.upper for one in starts)
+        reach = max(unknown.upper - min(starts), max(starts) - unknown.lower)
+        assert reach >= unknown.scale

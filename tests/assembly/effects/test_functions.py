@@ -243,6 +243,18 @@ def test_units_follow_from_variables():
     assert units_of(RIGID, soft) == {"0": "rad/(N m)", "1": "rad/(N m)"}
     warm = Function("tip", ("tx",), ("cov.temperature",), "powers", {"2": 1.0})
     assert units_of(RIGID, warm) == {"2": "m/K^2"}
+    # a gain is per unit of what is followed, but of time, which only passes
+    memory = {"gain": 1.0, "start": 1.0, "time_constant": 1.0}
+    lag = at_drive(memory, "lag", ("cov.temperature",))
+    assert units_of(RIGID, lag) == {
+        "gain": "rad/K",
+        "start": "rad",
+        "time_constant": "s",
+    }
+    creep = at_drive(memory, "creep", ("time",))
+    assert units_of(RIGID, creep) == {
+        "gain": "rad", "start": "rad", "time_constant": "s"
+    }  # fmt: skip
     formula = at_drive(
         {"a": 1.0, "k": 1.0}, "formula", ("time",), formula="a*exp(-k*time)"
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many
+from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import reference_assembly
 from assembly.linear.moving_clearances import Asked
@@ -13,7 +13,11 @@ from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
 from tests.assembly.linear.test_pose_error import hinged_frame
-from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, random_robot
+from tests.robots_for_tests import (
+    coaxial_beams,
+    irsbot2_over,
+    random_robot,
+)
 
 PARTS = ("rotation_error", "translation_error")
 
@@ -21,11 +25,9 @@ PARTS = ("rotation_error", "translation_error")
 @pytest.fixture(scope="module")
 def grid():
     """The paper's robot with the first draw, at 15 poses of its workspace."""
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    poses = np.full((15, 6), np.nan)
-    mesh = np.meshgrid(np.linspace(-0.3, 0.3, 5), np.linspace(-0.6, -0.2, 3))
-    poses[:, 0], poses[:, 2] = (axis.ravel() for axis in mesh)
-    postures = place_many(robot, poses)[0]
+    robot, postures = irsbot2_over(
+        np.linspace(-0.3, 0.3, 5), np.linspace(-0.6, -0.2, 3)
+    )
     T = np.array([p.transforms for p in postures])
     return robot, postures, T, np.array([p.mismatch for p in postures])
 

@@ -7,8 +7,9 @@ from scipy import stats
 from assembly.batch.many_draws import prepare_energies
 from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import draw_generator, tolerance_sources
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import (
     clearance_constraints,
@@ -132,6 +133,30 @@ def test_a_walk_that_is_not_mixed_says_so():
     middle = np.zeros(2)
     assert not sample_uniform_position(along, starts, to_screw, middle, rng, 0)
     assert sample_uniform_position(along, starts, to_screw, middle, rng)
+
+
+def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
+    """Along z a pin of 2 mm on one side and of 1 mm on the other, errors 0.5 mm apart.
+
+    The platform, on the first, moves from -2 to 2 mm, and on the second from 0.5 - 1 to
+    0.5 + 1: what both let is -0.5 to 1.5, not even about the least clearances.
+    """
+    shift = [0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]
+    steel = MatrixLink(np.eye(6) * 1e6)
+    frames = (
+        Frame("one", link=steel, clearance=Clearance(axial=2e-3)),
+        Frame(
+            "two", link=steel, clearance=Clearance(axial=1e-3), geometric_error=shift
+        ),
+    )
+    robot = Robot("two pins", "one", frames, (("one", "two"),))
+    prepared = prepare_energies(home_posture(robot))
+    draws = prepared.solve(np.repeat(robot.errors[None], 300, axis=0))
+    assert draws.energy.max() == 0.0
+    screws, mixed = position_clearances(prepared, draws, "uniform", generators(300))
+    assert mixed.all()
+    z = screws[:, 5] * 1e3
+    assert stats.kstest((z + 0.5) / 2, "uniform").pvalue > 1e-3
 
 
 def near_the_edge(margin):

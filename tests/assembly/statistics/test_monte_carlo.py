@@ -233,6 +233,8 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
         assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
         assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
         assert len(tornado_figure(data).axes) == 6
+        with pytest.raises(ValueError, match="need a data set of draws"):
+            histogram_figure(data.drop_vars("energy"))
     with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
         allocation_figure(data)
         with pytest.raises(ValueError, match="need a data set of draws"):

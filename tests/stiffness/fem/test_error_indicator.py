@@ -11,6 +11,7 @@ from stiffness.fem.adaptive_step import (
     DEFAULT_EFFECTIVITY,
     SAFETY_FACTOR,
     estimated_error,
+    refine_level,
     solve_level,
 )
 from stiffness.fem.condensation import condense, rigid_motions
@@ -280,3 +281,12 @@ def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
     whole = condense(mesh, *constants(mesh), centers).stiffness
     cut = bar(2, 12).solution.stiffness
     assert whole[0, 0] / BENDING - 1 > 2 * (cut[0, 0] / BENDING - 1) > 0
+
+
+def test_refining_grows_by_what_was_asked_and_what_its_neighbours_need():
+    level = bar(1, 6)
+    count = len(level.solid.cells)
+    sizes = [len(refine_level(level, growth).cells) for growth in (1.0, 1.5, 3.0)]
+    assert sizes[0] == count
+    assert 1.5 * count <= sizes[1] < sizes[2]
+    assert 3.0 * count <= sizes[2] <= 20 * count

@@ -40,6 +40,14 @@ def test_a_twentieth_of_the_range_more_is_no_matter(tmp_path):
         assert [one.rows for one in left] == [1] * outside
 
 
+def test_what_a_campaign_does_not_record_is_not_outside(tmp_path):
+    path = tmp_path / "learned.toml"
+    path.write_text('learned_range = { "cov.tilt" = [0.2, 0.4] }\n' + ARM)
+    robot = read_robot(path)
+    folder = write_campaign(tmp_path / "c", "id,q.one,q.two,meas.tx", ["a,0.1,0.2,0"])
+    assert beyond(robot, read_commands(folder, robot)) == ()
+
+
 def test_the_file_keeps_it(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     write_robot(robot, tmp_path / "again.toml")

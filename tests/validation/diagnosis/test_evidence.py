@@ -125,6 +125,16 @@ def test_noise_has_no_small_terms(rng):
         assert not background(evidence.terms, evidence.best(rng.normal(size=CELLS)))
 
 
+def test_each_term_has_its_own_unknowns_back(rng):
+    terms = [term(rng, GEOMETRY, 12, given=1e-4), term(rng, SPRINGS, 6, given=2e-4)]
+    behind = background(terms, Evidence(terms, CELLS).best(rng.normal(size=CELLS)))
+    z = behind.whitened(rng.normal(size=CELLS))
+    for parts in (behind.values(z), behind.deviations(), behind.identified()):
+        assert [len(part) for part in parts] == [12, 6]
+    stacked = np.hstack([t.columns for t in terms]) @ np.concatenate(behind.values(z))
+    assert np.allclose(behind.raw(z) - behind.left(z), stacked, atol=1e-7)
+
+
 def test_a_tolerance_given_is_used_whatever_the_readings_say(rng):
     given = term(rng, GEOMETRY, 12, given=1e-4)
     behind = background([given], Evidence([given], CELLS).best(rng.normal(size=CELLS)))

@@ -41,6 +41,22 @@ def test_a_number_is_taken_or_doubted(campaign, effect, name, fair, absurd):
     assert "declared stiffness" in one
 
 
+@pytest.mark.parametrize(
+    ("effect", "name", "softest"),
+    [
+        # 3 N m and 29.93 N at the longest body's 0.6 m turn it by 0.2 rad
+        ("drive_compliance", "one", (3.0 + 29.9331 * 0.6) / 0.2),
+        ("base_compliance", "stiffness.tx", 29.9331 / (0.2 * 0.6)),
+    ],
+)
+def test_the_softest_spring_gives_a_fifth_under_the_largest_load(
+    campaign, effect, name, softest
+):
+    for value, count in ((1.001 * softest, 0), (0.999 * softest, 1)):
+        fit = SimpleNamespace(effects={effect: {name: value}})
+        assert len(implausible(campaign, fit, NOTHING)) == count
+
+
 def test_a_frame_that_is_fitted_anyway_may_be_anywhere(campaign):
     anywhere = replace(campaign, registration="unknown")
     fit = SimpleNamespace(effects={"registration": {"base.tx": 29.0}})
