@@ -36,7 +36,7 @@ _STAGES = (
 
 def solve(
     model: Model, closures: list[Closure], narrow: bool = False, steps: int = 0
-) -> None:
+) -> NDArray:
     """Close the closures in steps, then correct their targets until they are closed.
 
     Args:
@@ -44,6 +44,9 @@ def solve(
         closures: to be closed.
         narrow: whether there are contacts, whose smoothing is reduced in between.
         steps: least number of steps in which closures are closed.
+
+    Returns:
+        What :func:`close` goes on from, if loads change.
 
     Raises:
         SimulationFailed: no equilibrium was found; :class:`OutOfTime` if because the
@@ -55,6 +58,21 @@ def solve(
     equilibrate(model, 0.0, max(_LOAD_STEPS, steps))
     if narrow or model.idle:
         equilibrate(model, 1.0, _NARROWING_STEPS if narrow else _RELEASING_STEPS)
+    close(model, closures, shift)
+    return shift
+
+
+def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
+    """Correct the closures' targets until they are closed.
+
+    Args:
+        model: solved, but for the last gaps.
+        closures: to be closed.
+        shift: (2, closures, 6) [rad, m] of the targets, changed in place.
+
+    Raises:
+        SimulationFailed: as above.
+    """
     for _ in range(_CLOSING_STEPS):
         if largest_gap(model, closures) <= _CLOSED:
             _record(model)
@@ -115,7 +133,9 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
     timer = model.exu.special.solver
     timer.timeout = max(model.deadline - time.monotonic(), 0.0)
     try:
-        model.mbs.SolveStatic(_settings(model, start, steps), updateInitialValues=True)
+        model.mbs.SolveStatic(
+            static_settings(model, start, steps), updateInitialValues=True
+        )
     except model.exu.ExudynError as error:
         _raise_callback_error(model, stage)
         reason = str(error).splitlines()[0]
@@ -139,7 +159,7 @@ def _raise_callback_error(model: Model, stage: str) -> None:
         raise error
 
 
-def _settings(model: Model, start: float, steps: int) -> Any:
+def static_settings(model: Model, start: float, steps: int) -> Any:
     """Exudyn's settings of :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
