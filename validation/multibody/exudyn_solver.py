@@ -137,7 +137,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
             static_settings(model, start, steps), updateInitialValues=True
         )
     except model.exu.ExudynError as error:
-        _raise_callback_error(model, stage)
+        raise_callback_error(model, stage)
         reason = str(error).splitlines()[0]
         status = f"no equilibrium while {stage} (Exudyn: {reason})"
         raise SimulationFailed(model.robot, status) from None
@@ -145,11 +145,19 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
         timer.timeout = -1.0  # the timer is common to all models
     if model.mbs.sys["staticSolver"].output.simulationTimeout:
         model.callback_error = TimeoutError()
-    _raise_callback_error(model, stage)
+    raise_callback_error(model, stage)
 
 
-def _raise_callback_error(model: Model, stage: str) -> None:
-    """Raise the exception of a user function, if there was one."""
+def raise_callback_error(model: Model, stage: str) -> None:
+    """Raise the exception of a user function, if there was one.
+
+    Args:
+        model: whose function it was.
+        stage: in which, for the message.
+
+    Raises:
+        OutOfTime: its deadline has passed.
+    """
     error, model.callback_error = model.callback_error, None
     if isinstance(error, TimeoutError):
         raise OutOfTime(

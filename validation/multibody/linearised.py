@@ -28,14 +28,12 @@ from validation.multibody.exudyn_reading import (
     idle_motions,
     pose,
 )
-from validation.multibody.exudyn_solver import static_settings
+from validation.multibody.exudyn_solver import raise_callback_error, static_settings
 from validation.multibody.open_robot import Tree
 
-_STEPS = (
-    2e-4,
-    1e-4,
-    5e-5,
-)  # of Exudyn's coordinates, whose rotations are numbers of size 1
+# of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
+# within some nm, and pressed by less
+_STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 5e-9, 2.5e-9)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size of a gap's derivative that counts as none
 _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
@@ -54,6 +52,9 @@ def linearised_compliance(
     Returns:
         (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
         base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
+
+    Raises:
+        OutOfTime: the model's deadline has passed.
     """
     system = model.mbs.systemData
     start = system.GetSystemState()
@@ -62,6 +63,9 @@ def linearised_compliance(
         _freeze(model, closure)
     try:
         return _compliance(model, partial(_motion, model, tree, platform), tree)
+    except model.exu.ExudynError:
+        raise_callback_error(model, "the residual is differentiated")
+        raise
     finally:
         for closure in tree.closures:
             model.mbs.SetObjectParameter(closure.connector, _LAW, 0)
@@ -96,6 +100,8 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
+    # softer or harder pressed, a contact is another one: nothing is polished there
+    steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)
     solver.ComputeJacobianODE2RHS(
@@ -109,15 +115,15 @@ def _compliance(
     N = null_space(jacobian[count:, :count], rcond=1e-10)
     gaps = slice(0, 6 * len(tree.closures))
     if tree.closures:
-        N = N @ null_space(motion(q, N, _GAP_STEP)[gaps], rcond=_RANK)
+        N = N @ null_space(
+            motion(q, N, min(_GAP_STEP, 10 * steps[0]))[gaps], rcond=_RANK
+        )
     K = N.T @ jacobian[:count, :count] @ N
     Z = N @ np.linalg.eigh((K + K.T) / 2)[1]
-    K = stiffness(q, Z, _STEPS[-1])
-    for _ in range(_POLISH):
+    K = stiffness(q, Z, steps[-1])
+    for _ in range(polish):
         q = q - Z @ _solve(K, Z.T @ forces(q))
-    known = [
-        (stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in _STEPS
-    ]
+    known = [(stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in steps]
     rough, better = (
         _by_modes(model, (4 * K - K1) / 3, (4 * V - V1) / 3)
         for (K1, V1), (K, V) in pairwise(known)

@@ -5,7 +5,7 @@ by the gradient of their energy, so that the tangent is one of a potential.
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from validation.multibody.load_steps import add_step_loads, stepped_compliance
 from validation.multibody.open_robot import Case, PostureLike, build, link_springs
 from validation.multibody.simulation import (
     TIME_LIMIT,
+    WITH_CLEARANCES,
     SimulationModel,
     import_exudyn,
 )
@@ -62,8 +63,9 @@ def simulated_tangent(
     """The platform's compliance at the equilibrium of errors, load and weight.
 
     Args:
-        posture: where the robot stands; its errors count, its clearances do not.
-        model: of its links.
+        posture: where the robot stands; its errors count.
+        model: of its links; its clearances count if they do in the model, in contacts
+            of 1e12 N/m that are smoothed, and then there are no load steps.
         load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
             a moment as a couple of dead forces.
         gravity: (3,) [m/s^2] base axes.
@@ -82,7 +84,10 @@ def simulated_tangent(
     case = _case(posture, model, load, gravity)
     # where no spring is bent its law does not matter, and Exudyn's own is faster
     bent = is_bent(posture.robot.errors, load, gravity)
-    *first, last = (Regularisation(k, _IDLE, conservative=bent) for k in _CLOSING)
+    regularisations = [Regularisation(k, _IDLE) for k in _CLOSING]
+    if model.clearances:
+        regularisations = list(WITH_CLEARANCES[:2])
+    *first, last = (replace(one, conservative=bent) for one in regularisations)
     for regularisation in first:
         try:
             return _tangent(case, regularisation, steps, started, time_limit)
@@ -109,7 +114,8 @@ def _case(
     return Case(
         posture=posture, scale=1.0, meshes=solids, elements=model.elements,
         springs=link_springs(posture.robot, model.links, given, solids),
-        clearances=False, bushes=False, load=wrench * [0, 0, 0, 1, 1, 1],
+        clearances=model.clearances, bushes=model.bushes,
+        load=wrench * [0, 0, 0, 1, 1, 1],
         gravity=np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
         couple=wrench[:3],
     )  # fmt: skip
@@ -126,10 +132,10 @@ def _tangent(
     try:
         tree = build(program, case)
         loads = add_step_loads(program, tree, robot.platform)
-        shift = solve(program, tree.closures)
+        shift = solve(program, tree.closures, narrow=bool(tree.contacts))
         C, error = linearised_compliance(program, tree, robot.platform)
         stepped, own = np.full((6, 6), np.nan), np.nan
-        if steps:
+        if steps and not tree.contacts:
             sizes = np.abs(C).max(axis=0)
             stepped, own = stepped_compliance(
                 program, tree, robot.platform, loads, shift, sizes

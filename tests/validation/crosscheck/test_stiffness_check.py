@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.crosscheck.stiffness_check import check_stiffness
@@ -55,6 +56,26 @@ def test_a_loaded_robot_is_as_stiff_in_the_simulation(force):
     assert answer.passed
 
 
+def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
+    """By F/c, and by its arm; the simulation finds it by smoothed contacts."""
+    force, bound, k = 300.0, 5e-5, 1e6
+    link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
+    frames = (
+        Frame("arm", translation=[0.5, 0, 0], link=link),
+        Frame("pin", "arm", clearance=Clearance(radial=bound, axial=0.0, tilt=0.0)),
+        Frame("tip", "pin", [0.1, 0, 0]),
+    )
+    posture = home_posture(Robot("pin", "tip", frames, ()))
+    answer = check_stiffness(posture, [0, 0, 0, force, 0, 0], clearances=True)
+    assert answer.passed
+    assert np.isnan(answer.simulated.stepped).all()
+    # what the force adds by turning the arm is below 1e-3 of this
+    along = 1 / k + bound / force + 0.1**2 / 1e4
+    assert answer.simulated.linearised[4, 4] == pytest.approx(along, rel=1e-2)
+    assert answer.differences["linearised"] < 1e-3
+    assert answer.tolerance == 2e-2
+
+
 def test_a_wrong_stiffness_is_found_out():
     answer = check_stiffness(home_posture(load_robot("four_bar")))
     assert answer.passed
@@ -97,7 +118,7 @@ def test_the_command_says_what_it_compared(run):
     assert answer["passed"]
     assert np.array(answer["compliance"]["multibody"]).shape == (6, 6)
     status, _, err = run(
-        "validation", "crosscheck", "four_bar", "--stiffness", "--clearances"
+        "validation", "crosscheck", "four_bar", "--stiffness", "--figure", "x.png"
     )
     assert status == 2
     assert "--stiffness: not with" in err
