@@ -7,6 +7,7 @@ bodies, the tangent of the exact equilibrium, differences of the least energy (2
 steps in Exudyn with links as springs and as beams, and Exudyn's linearised system.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +21,7 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from validation.assumptions.platform_cost import solid_compliance
 from validation.crosscheck.link_models import link_models
-from validation.crosscheck.stiffness_check import check_stiffness
-from validation.multibody.linearised import linearised_compliance
+from validation.multibody.tangent import simulated_tangent
 
 POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None}
 
@@ -40,14 +40,15 @@ def methods(posture: Posture) -> dict[str, NDArray]:
         "displacement method": solid_compliance(posture, {}),
         "exact tangent": platform_stiffness(tight_posture, "exact").compliance,
         "(22), unit loads": np.array(moved).T,
-        "Exudyn, springs": check_stiffness(tight_posture).simulated,
-        "Exudyn, beams": check_stiffness(tight_posture, links="beam").simulated,
-    } | {
-        f"linearised, {links}s": linearised_compliance(
-            tight_posture, link_models(tight, links)
-        )
-        for links in ("spring", "beam")
-    }  # fmt: skip
+    } | dict(by_simulation(tight_posture))
+
+
+def by_simulation(posture: Posture) -> Iterator[tuple[str, NDArray]]:
+    """Both roads of the simulation, links as springs and as beams."""
+    for links in ("spring", "beam"):
+        answer = simulated_tangent(posture, link_models(posture.robot, links))
+        yield f"load steps, {links}s", answer.stepped
+        yield f"linearised, {links}s", answer.linearised
 
 
 def main() -> None:

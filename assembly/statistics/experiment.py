@@ -43,7 +43,8 @@ class Experiment:
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state of the platform's stiffness, one of
-            :data:`assembly.statistics.stiffness_spread.STATES`; empty for none.
+            :data:`assembly.sweeps.point_stiffness.STATES`, not the classical one;
+            empty for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
             upper minus lower bound; inf for one that is not needed.
     """
@@ -105,7 +106,7 @@ class Experiment:
             shapes |= {f"{name}_lower": () for name in POSE_ERRORS}
         shapes |= dict.fromkeys(self.zones, ())
         if self.stiffness:
-            shapes["stiffness"] = (6,)
+            shapes |= {"stiffness": (6,), "free_motion": (6, 6)}
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
         flags = ["play_mixed"] if self.clearance_model == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
@@ -178,7 +179,7 @@ class Experiment:
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:
-            rows["stiffness"] = draw_stiffnesses(
+            rows["stiffness"], rows["free_motion"] = draw_stiffnesses(
                 self.posture, errors, self.stiffness, self.load, self.gravity
             )
         return rows

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     import xarray
 
 BLOCK = 1024  # draws solved and journalled together
-_UNITS = UNITS | {"stiffness": "N m/rad, N/m"}  # by axis: no limit is one number
+# by axis: no limit is one number
+_UNITS = UNITS | {"stiffness": "N m/rad, N/m", "free_motion": "rad, m"}
 _QUEUED = 4  # blocks submitted ahead for each thread
 
 
@@ -194,7 +195,8 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     import xarray
 
     dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link"),
-            "stiffness": ("draw", "wrench_component")}  # fmt: skip
+            "stiffness": ("draw", "wrench_component"),
+            "free_motion": ("draw", "motion", "screw")}  # fmt: skip
     meanings = MEANINGS | {
         k: f"{MEANINGS[k]}; {CLEARANCE_MODELS[experiment.clearance_model]}"
         for k in POSE_ERRORS
@@ -214,7 +216,7 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         "link": list(experiment.links), "source": list(experiment.sources.labels),
     }  # fmt: skip
     if experiment.stiffness:
-        labels["wrench_component"] = list(WRENCH)
+        labels |= {"wrench_component": list(WRENCH), "motion": np.arange(6)}
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
     return xarray.Dataset(variables, labels, provenance(experiment) | at)

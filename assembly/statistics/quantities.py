@@ -23,6 +23,7 @@ MEANINGS = {
     "moment": "largest moment through any body",
     "stress": "largest von Mises stress in the link",
     "stiffness": "of the platform along each axis, the others free; 0 where free",
+    "free_motion": "of the platform, that nothing resists: unit screws, else NaN",
     "play_mixed": "1 where the walk that settles the clearances met its criterion",
     "status": "0 solved, 1 no answer",
 }

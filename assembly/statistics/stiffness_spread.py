@@ -20,18 +20,18 @@ from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import in_contact
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.estimates import mean, proportion, quantile
+from assembly.sweeps.point_stiffness import STATES
+from forcefit.inputs.display import numbers
 from stiffness.screws import WRENCH
 
-STATES = {
-    "contact": "tangent of (22), clearances free or pressed as they are",
-    "exact": "tangent of the exact equilibrium, with its internal forces",
-}
+_NAMED = 5  # free motions, those of most draws
+_ALIKE = 2  # decimals to which motions of draws are the same
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
-) -> NDArray:  # fmt: skip
+) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Stiffness along every axis, the others free, of each draw.
 
     Args:
@@ -43,10 +43,12 @@ def draw_stiffnesses(
 
     Returns:
         (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``; 0 where nothing resists, as
-        within a clearance, NaN where there is no equilibrium.
+        within a clearance, NaN where there is no equilibrium; and (k, 6, 6) [rad, m]
+        the unit screws that nothing resists, a row each, the others NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
-    for out, drawn in zip(stiffnesses, errors, strict=True):
+    motions = np.full((len(errors), 6, 6), np.nan)
+    for out, free, drawn in zip(stiffnesses, motions, errors, strict=True):
         forced = replace(posture, robot=posture.robot.with_errors(drawn))
         try:
             if state == "exact":
@@ -58,20 +60,24 @@ def draw_stiffnesses(
         except (CannotAssemble, FreeMotion, SolverFailed):
             continue
         out[:] = [tangent.along(axis)[0] for axis in np.eye(6)]
-    return stiffnesses
+        free[: tangent.free.shape[1]] = tangent.free.T
+    return stiffnesses, motions
 
 
-def stiffness_report(stiffnesses: NDArray, state: str, level: float) -> dict[str, Any]:
+def stiffness_report(
+    stiffnesses: NDArray, motions: NDArray, state: str, level: float
+) -> dict[str, Any]:
     """Spread of the stiffness along each axis.
 
     Args:
         stiffnesses: (k, 6) of :func:`draw_stiffnesses`.
+        motions: (k, 6, 6) of the same.
         state: of the tangents.
         level: of confidence.
 
     Returns:
         By axis: among how many draws with an answer, how often nothing resists, and of
-        the rest mean and quantiles with intervals.
+        the rest mean and quantiles with intervals; and the free motions of most draws.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):
@@ -89,7 +95,15 @@ def stiffness_report(stiffnesses: NDArray, state: str, level: float) -> dict[str
                     str(q): quantile(held, q, level) for q in (0.05, 0.5, 0.95)
                 },
             }
-    return {"state": state, "means": STATES[state], "axes": axes}
+    free = motions[np.isfinite(motions).all(axis=2)].round(_ALIKE) + 0.0
+    screws, counts = np.unique(free, axis=0, return_counts=True)
+    most = np.argsort(-counts, kind="stable")[:_NAMED]
+    return {
+        "state": state, "means": STATES[state], "axes": axes,
+        "free_motions": [
+            {"screw": screws[i], "draws": int(counts[i])} for i in most.tolist()
+        ],
+    }  # fmt: skip
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
@@ -106,4 +120,7 @@ def stiffness_spread_text(report: Mapping[str, Any]) -> str:
             )
         free = one["free"]["probability"]
         lines.append(f"  {name}: {text}" + (f"; free in {free:.3g}" if free else ""))
+    for one in report["free_motions"]:
+        screw = numbers(one["screw"])
+        lines.append(f"  nothing resists {screw} [rad, m] in {one['draws']} draws")
     return "\n".join(lines)

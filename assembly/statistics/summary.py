@@ -103,7 +103,10 @@ def summarise(
         report["safety"] = strength / np.maximum(largest, 1e-300)
     if "stiffness" in data:
         report["stiffness"] = stiffness_report(
-            data["stiffness"].values[solved], str(data.attrs["stiffness"]), level
+            data["stiffness"].values[solved],
+            data["free_motion"].values[solved],
+            str(data.attrs["stiffness"]),
+            level,
         )
     if "total_index" in data:
         report["importance"] = importance_report(data)

@@ -23,13 +23,16 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
     point_conditions,
+)
+from assembly.sweeps.point_stiffness import (
+    classical_stiffnesses,
+    tangent_stiffnesses,
 )
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.sweeps.targets import goals_of, of_joints
@@ -230,7 +233,8 @@ def _solve_reached(
         )
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
-        _record_stiffness(robot, T, mismatch, solved, rows)
+        tangents = replace(conditions, robot=robot, mismatch=mismatch)
+        _record_stiffness(question.stiffness, tangents, solved, rows)
     if question.frequencies:
         _record_frequencies(question.frequencies, robot, conditions, solved, rows)
     if question.linearisation:
@@ -290,25 +294,25 @@ def _note_singularities(
 
 
 def _record_stiffness(
-    robot: Robot, T: NDArray, mismatch: NDArray, solved: SolvedPoints, rows: NDArray
+    state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """K_C once a posture; errors do not change it, draws of a posture share it."""
+    """The classical K_C once a posture, its draws share it; a tangent at each point."""
+    T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
-    starts = [run.start for run in runs]
-    stiffnesses = platform_stiffnesses(robot, T[starts], mismatch[starts])
-    along = np.stack([stiffnesses.along(axis) for axis in np.eye(6)], axis=1)
-    by_axis = [list(stiffnesses.shares(axis).values()) for axis in np.eye(6)]
-    shares = np.array(by_axis).transpose(2, 1, 0)
-    out = solved.records
-    for i, run in enumerate(runs):
-        out["compliance"][rows[run]] = stiffnesses.compliance[i]
-        out["stiffness"][rows[run]] = along[i]
-        out["eigen_stiffness"][rows[run]] = stiffnesses.eigen_stiffnesses[i]
-        out["stiffness_condition"][rows[run]] = stiffnesses.condition[i]
-        out["share"][rows[run]] = shares[i]
-    for i, one in stiffnesses.singular.items():
+    if state == "classical":
+        starts = [run.start for run in runs]
+        quantities, reasons = classical_stiffnesses(
+            conditions.robot, T[starts], conditions.mismatch[starts]
+        )
+    else:
+        quantities, reasons = tangent_stiffnesses(conditions, state)
+        runs = [slice(i, i + 1) for i in range(len(T))]
+    for key, values in quantities.items():
+        for i, run in enumerate(runs):
+            solved.records[key][rows[run]] = values[i]
+    for i, reason in reasons.items():
         for row in rows[runs[i]].tolist():
-            solved.texts["reason"].setdefault(row, one.free_text)
+            solved.texts["reason"].setdefault(row, reason)
 
 
 def _record_frequencies(

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.linear.closure import virtual_joints
 from assembly.linear.singularity import KINDS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
-from assembly.platform_stiffness.linear_tangent import owners
 from assembly.sweeps.parameters import Design
+from assembly.sweeps.point_stiffness import STATES, stiffness_parts
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import SCREW, WRENCH
 
@@ -48,7 +47,8 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
-        stiffness: also K_C, clearances held at zero, and the shares of its parts.
+        stiffness: also K_C and the shares of its parts, in a state of
+            :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
         frequencies: how many natural frequencies, of the same K_C and declared masses.
     """
 
@@ -67,7 +67,7 @@ class Question:
     load: tuple[float, ...] = (0.0,) * 6
     gravity: tuple[float, ...] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
-    stiffness: bool = False
+    stiffness: str = ""
     frequencies: int = 0
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -147,7 +147,7 @@ def variables(question: Question) -> dict[str, Variable]:
         table["stress"] = Variable(links, "Pa", "largest von Mises stress in the link")
         table["safety"] = Variable({}, "1", "yield strength over the largest stress")
     if question.stiffness:
-        table |= _stiffness_variables(question.robot)
+        table |= _stiffness_variables(question.robot, question.stiffness)
     if question.frequencies:
         modes = tuple(str(k + 1) for k in range(question.frequencies))
         table["frequency"] = Variable(
@@ -164,13 +164,13 @@ def variables(question: Question) -> dict[str, Variable]:
     return table
 
 
-def _stiffness_variables(robot: Robot) -> dict[str, Variable]:
+def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
     """What is kept of K_C."""
     along = {"wrench_component": WRENCH}
     return {
         "compliance": Variable(
             {"screw": SCREW, **along}, "rad/(N m) .. m/N",
-            "of the platform at its origin, base axes, clearances held at zero",
+            f"of the platform at its origin, base axes, {STATES[state]}",
         ),
         "stiffness": Variable(
             along, "N m/rad, N/m", "along each axis, the others free"
@@ -181,16 +181,10 @@ def _stiffness_variables(robot: Robot) -> dict[str, Variable]:
         ),
         "stiffness_condition": Variable({}, "1", "stiffest over softest of them"),
         "share": Variable(
-            {"part": part_names(robot), **along}, "1",
+            {"part": stiffness_parts(robot, state), **along}, "1",
             "of every link and joint in the compliance along each axis",
         ),
     }  # fmt: skip
-
-
-def part_names(robot: Robot) -> tuple[str, ...]:
-    """Names of what gives way, such as ``"leg1.distal link"``."""
-    parts = dict.fromkeys(owners(virtual_joints(robot)))
-    return tuple(f"{part.frame} {part.kind}" for part in parts)
 
 
 def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:

@@ -19,6 +19,7 @@ from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.point_conditions import is_loaded, point_conditions
+from assembly.sweeps.point_stiffness import STATES
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.targets import (
     Targets,
@@ -60,6 +61,8 @@ class SweepOptions:
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
         stiffness: also K_C and the shares of its parts, clearances held at zero.
+        tangent: ``"contact"`` or ``"exact"``: instead the K_C of what is there, its
+            errors, loads and clearances.
         frequencies: how many natural frequencies.
     """
 
@@ -79,6 +82,7 @@ class SweepOptions:
     gravity: Sequence[float] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: bool = False
+    tangent: str | None = None
     frequencies: int | None = None
 
 
@@ -118,7 +122,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         load=tuple(options.load),
         gravity=tuple(options.gravity),
         under=dict(options.under),
-        stiffness=options.stiffness,
+        stiffness=options.tangent or ("classical" if options.stiffness else ""),
         frequencies=options.frequencies or 0,
     )
     _check_readings(question)
@@ -146,6 +150,12 @@ def _check(options: SweepOptions, machine: Robot) -> None:
                 f"--yield-strength: no link of {machine.name} has a shape from which "
                 "its stress follows"
             )
+    tangents = [state for state in STATES if state != "classical"]
+    if options.tangent is not None and options.tangent not in tangents:
+        hint = nearest(options.tangent, tangents)
+        raise BadInput(f'--tangent: found "{options.tangent[:60]}"{hint}')
+    if options.tangent is not None and options.stiffness:
+        raise BadInput("sweep: found --stiffness and --tangent, expected one of them")
     if options.frequencies is not None:
         if not 1 <= options.frequencies <= _MODES:
             raise BadInput(

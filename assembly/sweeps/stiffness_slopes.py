@@ -1,16 +1,23 @@
-"""How K_C answers to any number of a robot file."""
+"""How K_C answers to any number of a robot file, the file's effects applied."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from numpy.typing import NDArray
 
-from assembly.kinematics.posture import Posture, place_robot
+from assembly.effects.robot_effects import AppliedEffects, apply_robot_effects
+from assembly.kinematics.posture import place_robot
 from assembly.platform_stiffness.tangent_slopes import TangentState, compliance_slope
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
 _STEP = 1e-4  # of the number, or of a unit where it is zero: an error of 1e-8
 _SMALL_STEP = 1e-8  # [rad, m] of errors: contacts change within some um of them
+_AS_ERROR = {"translation": "t", "rotation": "r"}
+
+
+class CannotChange(BadInput):
+    """A number that cannot change alone: the robot does not exist beside it."""
 
 
 def stiffness_slopes(
@@ -19,32 +26,41 @@ def stiffness_slopes(
     pose: Mapping[str, float] | None = None,
     joints: Mapping[str, float] | None = None,
     asked: TangentState | None = None,
+    under: Mapping[str, float | str] | None = None,
 ) -> dict[str, NDArray]:
     """Derivatives of the platform's compliance by design numbers.
 
     Args:
-        design: the robot as its file says it.
+        design: the robot as its file says it, its effects too.
         paths: of numbers; a frame's name without its leg moves all legs at once.
         pose: nominal platform pose, which is kept.
         joints: actuated coordinates, which are kept, instead.
         asked: of which tangent; the classical one if absent.
+        under: covariates that effects depend on.
 
     Returns:
         By path, (6, 6) dC [rad/(N m) .. m/N per unit of the number], base axes; NaN
         where a motion of the platform is free, or at a change of contact.
 
     Raises:
-        BadInput: no such number, or the robot or its posture does not exist a step
-            beside it: a length in a closed loop cannot change alone.
+        BadInput: no such number.
+        CannotChange: the robot or its posture does not exist a step beside it, as with
+            a length in an overconstrained loop.
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
     """
-    asked = asked or TangentState()
+    state = asked or TangentState()
 
-    def at(values: Mapping[str, float]) -> Posture:
-        return place_robot(design.robot(values), pose, joints)
+    def at(values: Mapping[str, float]) -> AppliedEffects:
+        posture = place_robot(design.robot(values), pose, joints)
+        finite = state.state == "exact"
+        return apply_robot_effects(
+            posture, state.load, state.gravity, under, finite=finite
+        )
 
+    there = at({})
+    loaded = replace(state, load=there.load, gravity=there.gravity)
     slopes = {}
     for path in paths:
         values = [design.values[full] for full in design.find(path)]
@@ -55,6 +71,21 @@ def stiffness_slopes(
         step = _STEP * (abs(values[0]) or 1.0)
         if ".geometric_error." in path:
             step = _SMALL_STEP
-        ahead, back = (at({path: values[0] + sign * step}) for sign in (1, -1))
-        slopes[path] = compliance_slope(at({}), ahead, back, step, asked)
+        try:
+            ahead, back = (at({path: values[0] + sign * step}) for sign in (1, -1))
+        except BadInput as error:
+            raise CannotChange(_cannot_change(path, str(error))) from None
+        slopes[path] = compliance_slope(
+            there.posture, ahead.posture, back.posture, step, loaded
+        )
     return slopes
+
+
+def _cannot_change(path: str, reason: str) -> str:
+    """Which number, why, and what may stand for it."""
+    frame, *keys = path.rsplit(".", 2)
+    instead = ""
+    if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:
+        error = f"{frame}.geometric_error.{_AS_ERROR[keys[0]]}{keys[1]}"
+        instead = f"; forced together as an error it is --by {error}"
+    return f"{path} cannot change alone: {reason}{instead}"

@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     UnderOption,
     declared_under,
     parse_assignments,
+    parse_covariates,
     parse_direction,
     parse_point,
 )
@@ -90,17 +91,16 @@ def stiffness(
                 states["slopes_in_contact"] = "in contact"
             asked = (applied.load, applied.gravity, point)
             for key, state in states.items():
-                results[key] = _slopes(robot, by, pose, joint, (state, *asked))
+                results[key], results["cannot_change"] = _slopes(
+                    robot, by, pose, joint, (state, *asked), under
+                )
     write_json(results, json)
     if json != "-":
         print(stiffness_text(results))
-        for key in ("slopes", "slopes_in_contact"):
-            for path, slope in results.get(key, {}).items():
-                name = key.removeprefix("slopes").replace("_", " ")
-                print(f"dC/d({path}){name}, diagonal: {slope.diagonal()}")
+        _print_slopes(results)
     if output is not None and "shares" in results:
         save_figure(plot_shares(results), output)
-    if results["status"] != "ok":
+    if results["status"] != "ok" or results.get("cannot_change"):
         raise typer.Exit(1)
 
 
@@ -110,14 +110,36 @@ def _slopes(
     pose: list[str] | None,
     joint: list[str] | None,
     asked: tuple[Any, ...],
-) -> "dict[str, NDArray]":
-    """Derivatives of the compliance of one state, posture kept."""
+    under: list[str] | None,
+) -> "tuple[dict[str, NDArray], dict[str, str]]":
+    """Derivatives of the compliance of one state, posture kept; why some are none."""
     from assembly.platform_stiffness.tangent_slopes import TangentState
     from assembly.sweeps.parameters import load_design
-    from assembly.sweeps.stiffness_slopes import stiffness_slopes
+    from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 
-    return stiffness_slopes(
-        load_design(robot), by,
-        parse_assignments(pose, "--pose") if pose else None,
-        parse_assignments(joint, "--joint") if joint else None, TangentState(*asked),
-    )  # fmt: skip
+    design, state = load_design(robot), TangentState(*asked)
+    at = parse_assignments(pose, "--pose") if pose else None
+    joints = parse_assignments(joint, "--joint") if joint else None
+    covariates = parse_covariates(under)
+    slopes: dict[str, NDArray] = {}
+    reasons: dict[str, str] = {}
+    for path in by:
+        try:
+            slopes |= stiffness_slopes(design, [path], at, joints, state, covariates)
+        except CannotChange as error:
+            reasons[path] = str(error)
+    return slopes, reasons
+
+
+def _print_slopes(results: dict[str, Any]) -> None:
+    """A line for each derivative, and for each that there is not."""
+    for key in ("slopes", "slopes_in_contact"):
+        name = key.removeprefix("slopes").replace("_", " ")
+        for path, slope in results.get(key, {}).items():
+            text = f"dC/d({path}){name}"
+            if (slope != slope).all():  # NaN
+                print(f"{text}: none; motions are free, or clearances just touch")
+            else:
+                print(f"{text}, diagonal: {slope.diagonal()}")
+    for reason in results.get("cannot_change", {}).values():
+        print(reason)

@@ -70,6 +70,12 @@ def sweep(
         bool,
         typer.Option("--stiffness", help="K_C, and which part gives way."),
     ] = False,
+    tangent: Annotated[
+        str | None,
+        typer.Option(
+            help="contact | exact: K_C of what is there, errors, loads, clearances."
+        ),
+    ] = None,
     frequencies: Annotated[
         int | None, typer.Option(help="Natural frequencies, so many.")
     ] = None,
@@ -126,7 +132,7 @@ def sweep(
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
-                frequencies=frequencies,
+                tangent=tangent, frequencies=frequencies,
             ),
         )  # fmt: skip
         if figure is not None:

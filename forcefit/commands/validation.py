@@ -126,7 +126,7 @@ def crosscheck(
         bool,
         typer.Option(
             "--stiffness",
-            help="Compare the platform's stiffness with load steps instead.",
+            help="Compare the platform's stiffness instead, where the robot stands.",
         ),
     ] = False,
     grid: Annotated[
@@ -157,8 +157,8 @@ def crosscheck(
     g, covariates = parse_gravity(gravity), parse_covariates(under)
     if clearances and figure is not None:
         raise BadInput("--figure: with --clearances there is no slope to draw")
-    if stiffness and (clearances or figure is not None or grid is not None):
-        raise BadInput("--stiffness: not with --clearances, --figure or --grid")
+    if stiffness and (figure is not None or grid is not None):
+        raise BadInput("--stiffness: not with --figure or --grid")
     if figure is not None:
         check_writable(figure, PICTURE)
     if grid is not None and (pose or joint or figure):
@@ -169,7 +169,12 @@ def crosscheck(
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
         if stiffness:
             return check_stiffness(
-                applied.posture, applied.load, links, applied.gravity, time_limit
+                applied.posture,
+                applied.load,
+                links,
+                applied.gravity,
+                time_limit,
+                clearances,
             )
         return compare_models(
             applied.posture,

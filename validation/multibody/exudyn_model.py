@@ -9,13 +9,16 @@ The solution is in :mod:`validation.multibody.exudyn_solver`, its evaluation in
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from validation.multibody.conservative_springs import middle_wrench
 from validation.multibody.contact import NARROW, WIDE, JointClearance, cone_forces
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
@@ -34,12 +37,14 @@ class Regularisation:
         idle: [N m/rad, N/m] that remains on motions that nothing resists.
         narrow: [-] last width of the smoothing of contacts, which centres clearances.
         tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
+        conservative: springs act by the gradient of their energy, not half-way.
     """
 
     closing: float
     idle: float
     narrow: float = NARROW
     tolerance: float = 1e-10
+    conservative: bool = False
 
 
 class Model:
@@ -109,7 +114,11 @@ class Model:
             lock = [int(locked) for locked in ~soft[_SWAP]]
             joint = self.item.GenericJoint(markerNumbers=markers, constrainedAxes=lock)
             self.mbs.AddObject(joint)
-        spring = self._connect(markers, np.where(np.outer(soft, soft), K, 0.0))
+        K = np.where(np.outer(soft, soft), K, 0.0)
+        spring = self._connect(markers, K)
+        # about or along one axis Exudyn's own law is the gradient
+        if self.regularisation.conservative and soft.sum() > 1:
+            self.set_law(spring, partial(middle_wrench, K.tolist()))
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
@@ -134,24 +143,38 @@ class Model:
         spring = self.add_spring(place, np.diag(centring))
         weak = np.where(np.isfinite(centring), centring, 0.0).tolist()
 
-        def contact_wrench(
+        def contact_wrench(screw: list[float]) -> list[float]:
+            wrench = [k * s for k, s in zip(weak, screw, strict=True)]
+            for cone in clearance.cones:
+                for row, value in cone_forces(cone, screw, self.width):
+                    wrench[row] += value
+            return wrench
+
+        self.set_law(spring.parts[0], contact_wrench)
+        return Contact(place, spring.far, clearance)
+
+    def set_law(self, connector: int, law: Callable[[list[float]], Any]) -> None:
+        """Let a connector's wrench be any function.
+
+        Args:
+            connector: Exudyn's number of it.
+            law: from the screw between its ends to the wrench half-way between them,
+                (6,) [R T], which resists.
+        """
+
+        def wrench(
             mbs: Any, t: float, item: int, shift: Any, turn: Any, *_: Any
         ) -> Any:
             try:
                 self.check_time()
-                screw = [*turn, *shift]
-                wrench = [k * s for k, s in zip(weak, screw, strict=True)]
-                for cone in clearance.cones:
-                    for row, value in cone_forces(cone, screw, self.width):
-                        wrench[row] += value
+                moment_force = list(law([*turn, *shift]))
             except BaseException as error:
                 self.callback_error = error
                 raise
-            return wrench[3:] + wrench[:3]
+            return moment_force[3:] + moment_force[:3]
 
         name = "springForceTorqueUserFunction"
-        self.mbs.SetObjectParameter(spring.parts[0], name, contact_wrench)
-        return Contact(place, spring.far, clearance)
+        self.mbs.SetObjectParameter(connector, name, wrench)
 
     def add_beam(
         self, base: Place, length: float, K: NDArray, elements: int,

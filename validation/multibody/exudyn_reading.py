@@ -1,5 +1,7 @@
 """Evaluation of a solved Exudyn model: places, energies, wrenches."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,12 @@ def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
+def idle_motions(model: Model, idle: Mapping[str, Elastic]) -> NDArray:
+    """(j,) [rad or m] how far the joints have moved that nothing resists."""
+    axes = zip(idle.values(), model.idle, strict=True)
+    return np.array([screw_between(model, part)[axis] for part, (_, axis) in axes])
+
+
 def energy(model: Model, part: Elastic) -> float:
     """[J] stored in an elastic part."""
     if part.modes is not None:
@@ -52,7 +60,7 @@ def wrench(model: Model, part: Elastic) -> NDArray:
         halves = part.modes.wrench @ _mode_coordinates(model, part.modes)
         return np.concatenate([far.T @ near @ half for half in np.split(halves, 2)])
     if not part.beam:
-        return _connector_wrench(model, part.parts[0])
+        return connector_wrench(model, part.parts[0])
     last = model.exu.ObjectIndex(part.parts[-1])
     force = model.mbs.ComputeItem(last, model.exu.ComputeItemType.ODE2LHS)[7:]
     total = model.exu.OutputVariableType.CoordinatesTotal
@@ -66,12 +74,12 @@ def wrench(model: Model, part: Elastic) -> NDArray:
 def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
     """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
     T = pose(model, closure.second)
-    own = _connector_wrench(model, closure.connector).reshape(2, 3)
+    own = connector_wrench(model, closure.connector).reshape(2, 3)
     moment, force = (T[:3, :3] @ half for half in own)
     return np.concatenate([moment + np.cross(T[:3, 3] - point, force), force])
 
 
-def _connector_wrench(model: Model, number: int) -> NDArray:
+def connector_wrench(model: Model, number: int) -> NDArray:
     """(6,) [N m, N] K times the screw of its outer end."""
     kind, read = model.exu.OutputVariableType, model.mbs.GetObjectOutput
     return np.concatenate([

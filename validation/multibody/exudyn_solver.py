@@ -36,7 +36,7 @@ _STAGES = (
 
 def solve(
     model: Model, closures: list[Closure], narrow: bool = False, steps: int = 0
-) -> None:
+) -> NDArray:
     """Close the closures in steps, then correct their targets until they are closed.
 
     Args:
@@ -44,6 +44,9 @@ def solve(
         closures: to be closed.
         narrow: whether there are contacts, whose smoothing is reduced in between.
         steps: least number of steps in which closures are closed.
+
+    Returns:
+        What :func:`close` goes on from, if loads change.
 
     Raises:
         SimulationFailed: no equilibrium was found; :class:`OutOfTime` if because the
@@ -55,6 +58,21 @@ def solve(
     equilibrate(model, 0.0, max(_LOAD_STEPS, steps))
     if narrow or model.idle:
         equilibrate(model, 1.0, _NARROWING_STEPS if narrow else _RELEASING_STEPS)
+    close(model, closures, shift)
+    return shift
+
+
+def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
+    """Correct the closures' targets until they are closed.
+
+    Args:
+        model: solved, but for the last gaps.
+        closures: to be closed.
+        shift: (2, closures, 6) [rad, m] of the targets, changed in place.
+
+    Raises:
+        SimulationFailed: as above.
+    """
     for _ in range(_CLOSING_STEPS):
         if largest_gap(model, closures) <= _CLOSED:
             _record(model)
@@ -115,9 +133,11 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
     timer = model.exu.special.solver
     timer.timeout = max(model.deadline - time.monotonic(), 0.0)
     try:
-        model.mbs.SolveStatic(_settings(model, start, steps), updateInitialValues=True)
+        model.mbs.SolveStatic(
+            static_settings(model, start, steps), updateInitialValues=True
+        )
     except model.exu.ExudynError as error:
-        _raise_callback_error(model, stage)
+        raise_callback_error(model, stage)
         reason = str(error).splitlines()[0]
         status = f"no equilibrium while {stage} (Exudyn: {reason})"
         raise SimulationFailed(model.robot, status) from None
@@ -125,11 +145,19 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
         timer.timeout = -1.0  # the timer is common to all models
     if model.mbs.sys["staticSolver"].output.simulationTimeout:
         model.callback_error = TimeoutError()
-    _raise_callback_error(model, stage)
+    raise_callback_error(model, stage)
 
 
-def _raise_callback_error(model: Model, stage: str) -> None:
-    """Raise the exception of a user function, if there was one."""
+def raise_callback_error(model: Model, stage: str) -> None:
+    """Raise the exception of a user function, if there was one.
+
+    Args:
+        model: whose function it was.
+        stage: in which, for the message.
+
+    Raises:
+        OutOfTime: its deadline has passed.
+    """
     error, model.callback_error = model.callback_error, None
     if isinstance(error, TimeoutError):
         raise OutOfTime(
@@ -139,7 +167,7 @@ def _raise_callback_error(model: Model, stage: str) -> None:
         raise error
 
 
-def _settings(model: Model, start: float, steps: int) -> Any:
+def static_settings(model: Model, start: float, steps: int) -> Any:
     """Exudyn's settings of :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse

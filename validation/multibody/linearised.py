@@ -1,92 +1,167 @@
-"""The platform's compliance by Exudyn's own linearised system.
+"""The platform's compliance by the simulation's own linearised system.
 
-Exudyn differentiates its equations at the equilibrium, in the motions that its joints
-leave.  Closures are connectors there: their open gaps are projected out besides, so
-that how stiff the connectors are does not enter, and they may be soft.  That they must,
-since the derivatives are differences: of connectors a million times as stiff as what is
-looked for the noise alone is seen.
+Exudyn's residual is differentiated at its equilibrium, with the forces that are there:
+loads, and reactions of joints and closures, kept while everything else moves.  It is
+differentiated along the motions that joints and closures leave, so that nothing stiff
+that cannot move enters with its noise.  These are taken along the modes of Exudyn's own
+Jacobian, which keeps soft ones apart from stiff ones, and differences of two steps are
+extrapolated; what changes then is the uncertainty.
+
+Weak springs hold what nothing resists.  They take k theta theta' of the compliance,
+theta how a joint turns or slides under unit loads, which is added again.
 """
 
-import time
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from stiffness.screws import rotation_vector
-from validation.multibody.exudyn_model import Model, Regularisation
-from validation.multibody.exudyn_parts import Closure, Place
-from validation.multibody.exudyn_reading import pose
-from validation.multibody.exudyn_solver import closure_error, solve
-from validation.multibody.open_robot import Case, PostureLike, build, link_springs
-from validation.multibody.simulation import (
-    TIME_LIMIT,
-    SimulationModel,
-    import_exudyn,
-    without_clearance,
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import Closure
+from validation.multibody.exudyn_reading import (
+    closure_error,
+    connector_wrench,
+    idle_motions,
+    pose,
 )
+from validation.multibody.exudyn_solver import raise_callback_error, static_settings
+from validation.multibody.open_robot import Tree
 
-_SOFT = Regularisation(1e6, 1e-8)
-_STEP = 1e-6  # of Exudyn's coordinates, whose rotations are numbers of size 1
+# of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
+# within some nm, and pressed by less
+_STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 5e-9, 2.5e-9)
+_GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size of a gap's derivative that counts as none
+_POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
 
 
-def linearised_compliance(posture: PostureLike, model: SimulationModel) -> NDArray:
-    """Compliance of the nominal robot, drives held, no load.
+def linearised_compliance(
+    model: Model, tree: Tree, platform: str
+) -> tuple[NDArray, float]:
+    """Compliance at the equilibrium in which a model stands.
 
     Args:
-        posture: where it stands; its errors and clearances do not count.
-        model: of its links.
+        model: solved.
+        tree: what it consists of.
+        platform: its frame.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] at the platform's origin, base axes.
+        (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
+        base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
 
     Raises:
-        BadInput: a spring's stiffness is missing.
-        SimulationFailed: no equilibrium was found.
+        OutOfTime: the model's deadline has passed.
     """
-    robot = without_clearance(posture.robot)
-    robot = robot.with_errors(np.zeros_like(robot.errors))
-    posture = replace(posture, robot=robot)  # type: ignore[type-var]
-    given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
-    solids = dict(model.meshes)
-    case = Case(
-        posture=posture, scale=0.0, meshes=solids, elements=model.elements,
-        springs=link_springs(robot, model.links, given, solids), clearances=False,
-        bushes=False, load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
-    )  # fmt: skip
-    program = Model(*import_exudyn(), robot.name, _SOFT)
-    program.deadline = time.monotonic() + TIME_LIMIT
+    system = model.mbs.systemData
+    start = system.GetSystemState()
+    model.hold_idle(model.regularisation.idle)
+    for closure in tree.closures:
+        _freeze(model, closure)
     try:
-        tree = build(program, case)
-        solve(program, tree.closures)
-        return _compliance(program, tree.before[robot.platform], tree.closures)
+        return _compliance(model, partial(_motion, model, tree, platform), tree)
+    except model.exu.ExudynError:
+        raise_callback_error(model, "the residual is differentiated")
+        raise
     finally:
-        program.discard()
+        for closure in tree.closures:
+            model.mbs.SetObjectParameter(closure.connector, _LAW, 0)
+        system.SetSystemState(start)
 
 
-def _compliance(model: Model, platform: Place, closures: list[Closure]) -> NDArray:
+_LAW = "springForceTorqueUserFunction"
+
+
+def _freeze(model: Model, closure: Closure) -> None:
+    """Let a closed closure's wrench be what it is, whatever moves."""
+    wrench = connector_wrench(model, closure.connector).tolist()
+    local = model.transform(closure.first.local @ closure.closed)
+    model.mbs.SetMarkerParameter(closure.marker, "localHT", local)
+    model.set_law(closure.connector, lambda screw: wrench)
+
+
+def _compliance(
+    model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: Tree
+) -> tuple[NDArray, float]:
     """V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
-    _, K, *_, N = model.mbs.ComputeLinearizedSystem(
-        projectIntoConstraintNullspace=True, returnConstraintNullspace=True
-    )
-    K, N = (K + K.T) / 2, np.asarray(N)
-    N = N if N.shape[1] == len(K) else N.T
+    solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
+    solver.InitializeSolver(model.mbs, settings)
+    count = solver.GetODE2size()
+
+    def forces(q: NDArray) -> NDArray:
+        model.mbs.systemData.SetODE2Coordinates(q)
+        solver.ComputeNewtonResidual(model.mbs, settings)
+        return -np.array(solver.GetSystemResidual())[:count]
+
+    def stiffness(q: NDArray, Z: NDArray, step: float) -> NDArray:
+        ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
+        return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
+
+    # softer or harder pressed, a contact is another one: nothing is polished there
+    steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
-    V, G = np.zeros((6, len(K))), np.zeros((6 * len(closures), len(K)))
-    for k, way in enumerate(N.T):
-        places, gaps = [], []
-        for moved in (q + _STEP * way, q - _STEP * way):
-            model.mbs.systemData.SetODE2Coordinates(moved)
-            places.append(pose(model, platform))
-            gaps.append([closure_error(model, closure) for closure in closures])
-        ahead, back = places
-        V[:3, k] = rotation_vector(ahead[:3, :3] @ back[:3, :3].T)
-        V[3:, k] = (ahead - back)[:3, 3]
-        G[:, k] = np.ravel(np.array(gaps[0]) - np.array(gaps[1]))
-    model.mbs.systemData.SetODE2Coordinates(q)
-    Z = null_space(G, rcond=_RANK) if len(G) else np.eye(len(K))
-    V, K = V @ Z / (2 * _STEP), Z.T @ K @ Z
+    forces(q)
+    solver.ComputeJacobianODE2RHS(
+        model.mbs, scalarFactor_ODE2=-1, scalarFactor_ODE2_t=0, scalarFactor_ODE1=0
+    )
+    solver.ComputeJacobianAE(
+        model.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0,
+        scalarFactor_ODE1=0.0, velocityLevel=False,
+    )  # fmt: skip
+    jacobian = np.array(solver.GetSystemJacobian())
+    N = null_space(jacobian[count:, :count], rcond=1e-10)
+    gaps = slice(0, 6 * len(tree.closures))
+    if tree.closures:
+        N = N @ null_space(
+            motion(q, N, min(_GAP_STEP, 10 * steps[0]))[gaps], rcond=_RANK
+        )
+    K = N.T @ jacobian[:count, :count] @ N
+    Z = N @ np.linalg.eigh((K + K.T) / 2)[1]
+    K = stiffness(q, Z, steps[-1])
+    for _ in range(polish):
+        q = q - Z @ _solve(K, Z.T @ forces(q))
+    known = [(stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in steps]
+    rough, better = (
+        _by_modes(model, (4 * K - K1) / 3, (4 * V - V1) / 3)
+        for (K1, V1), (K, V) in pairwise(known)
+    )
+    size = np.sqrt(np.abs(np.diag(better)))
+    return better, float(np.abs((better - rough) / np.outer(size, size)).max())
+
+
+def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
+    """Compliance from the modes' stiffness and motions, idle springs taken off."""
+    moves = V @ _solve(K, V[:6].T)
+    idle = moves[6:]
+    return moves[:6] + model.regularisation.idle * idle.T @ idle
+
+
+def _solve(K: NDArray, right: NDArray) -> NDArray:
+    """K^-1 right, of stiffnesses far apart."""
+    K = (K + K.T) / 2
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
-    return V @ (size[:, None] * np.linalg.solve(K * np.outer(size, size), (V * size).T))
+    scaled = K * np.outer(size, size)
+    return (size * np.linalg.solve(scaled, (size * right.T).T).T).T
+
+
+def _motion(
+    model: Model, tree: Tree, platform: str, q: NDArray, Z: NDArray, step: float
+) -> NDArray:
+    """Derivatives along Z of gaps, of the platform's pose, of idle joints."""
+    system, place = model.mbs.systemData, tree.before[platform]
+
+    def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        system.SetODE2Coordinates(q)
+        gaps = [closure_error(model, closure) for closure in tree.closures]
+        return np.ravel(gaps), pose(model, place), idle_motions(model, tree.idle)
+
+    rows = []
+    for way in Z.T:
+        gaps, ahead, idle = read(q + step * way)
+        other, back, still = read(q - step * way)
+        turn = rotation_vector(ahead[:3, :3] @ back[:3, :3].T)
+        rows.append([*(gaps - other), *turn, *(ahead - back)[:3, 3], *(idle - still)])
+    return np.array(rows).T / (2 * step)

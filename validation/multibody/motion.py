@@ -25,7 +25,22 @@ def turned(rotation_vector: ArrayLike) -> NDArray:
 
 def turn_of(R: NDArray) -> NDArray:
     """(3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
-    return Rotation.from_matrix(R).as_rotvec()
+    # by the quaternion, of which the largest component comes first (Shepperd 1978)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
+    trace = xx + yy + zz
+    largest = max(trace, xx, yy, zz)
+    if largest == trace:
+        w, x, y, z = 1 + trace, zy - yz, xz - zx, yx - xy
+    elif largest == xx:
+        w, x, y, z = zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx
+    elif largest == yy:
+        w, x, y, z = xz - zx, xy + yx, 1 + yy - xx - zz, yz + zy
+    else:
+        w, x, y, z = yx - xy, xz + zx, yz + zy, 1 + zz - xx - yy
+    size = math.hypot(x, y, z)
+    angle = 2 * math.atan2(size, abs(w))
+    factor = math.copysign(angle / size if size else 0.0, w)
+    return np.array([factor * x, factor * y, factor * z])
 
 
 def placement(rotation_vector: ArrayLike, translation: ArrayLike) -> NDArray:

@@ -53,7 +53,7 @@ TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle cor
 _TIGHT = (Regularisation(1e10, 1e-6), Regularisation(1e10, HOLDING_STIFFNESS))
 # a joint without contact is undetermined within its clearance: rounding of forces moves
 # it by 1e-3 m in the first, by 1e-7 m in the second, which is a little smoother
-_WITH_CLEARANCES = (
+WITH_CLEARANCES = (
     Regularisation(1e12, 1e-6),
     Regularisation(1e9, 1e-6, narrow=5e-4, tolerance=1e-6),
     Regularisation(1e11, 1e-6),
@@ -196,7 +196,7 @@ def simulate_assembly(
         gravity=_vector(gravity, 3),
         couple=_vector(couple, 3),
     )
-    *first, last = _WITH_CLEARANCES if model.clearances else _TIGHT
+    *first, last = WITH_CLEARANCES if model.clearances else _TIGHT
     first = [] if model.hold else first
     for regularisation in first:
         try:

@@ -14,7 +14,11 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.stiffness_spread import draw_stiffnesses, stiffness_report
+from assembly.statistics.stiffness_spread import (
+    draw_stiffnesses,
+    stiffness_report,
+    stiffness_spread_text,
+)
 
 ERRORS = """
 [[errors]]
@@ -46,8 +50,9 @@ def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
     robot = Robot("bush", "platform", frames, (("platform", "end"),))
     errors = np.zeros((2, 5, 6))
     errors[:, 4, 3] = 2 * c, 0.5 * c
-    spread = draw_stiffnesses(home_posture(robot), errors, "contact")
+    spread, free = draw_stiffnesses(home_posture(robot), errors, "contact")
     np.testing.assert_allclose(spread[:, 3], [2 * k, k], rtol=1e-9)
+    assert np.isnan(free).all()
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
@@ -73,7 +78,14 @@ def test_a_draw_s_stiffness_is_that_of_its_robot(state):
 def test_the_report_tells_free_draws_from_stiff_ones():
     values = np.full((10, 6), 2e6)
     values[:4, 5], values[4, 5] = 0.0, np.nan
-    report = stiffness_report(values, "contact", 0.95)["axes"]
+    motions = np.full((10, 6, 6), np.nan)
+    motions[:4, 0] = [0, 0, 0, 0, 0, 1.0]
+    motions[3, 1] = [0, 0, 1.0, 0, 0.1234, 0]
+    whole = stiffness_report(values, motions, "contact", 0.95)
+    report, free = whole["axes"], whole["free_motions"]
+    assert [one["draws"] for one in free] == [4, 1]
+    np.testing.assert_array_equal(free[1]["screw"], [0, 0, 1, 0, 0.12, 0])
+    assert "[0 0 0 0 0 1] [rad, m] in 4 draws" in stiffness_spread_text(whole)
     assert report["fz"]["draws"] == 9
     assert report["fz"]["free"]["probability"] == pytest.approx(4 / 9)
     assert report["fz"]["mean"]["value"] == report["fx"]["mean"]["value"] == 2e6

@@ -1,14 +1,18 @@
 """K_C as quantities of sweeps, over postures and designs, and on maps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import sweep_in_memory
+from forcefit.inputs.table import BadInput
 
 
 def test_each_point_has_the_stiffness_of_its_posture():
@@ -55,3 +59,49 @@ def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
     )
     stiffness = data.stiffness.sel(wrench_component="FY").values.ravel()
     assert (np.diff(stiffness) > 0).all()
+
+
+LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
+
+
+@pytest.mark.parametrize(
+    ("tangent", "state"), [("contact", "in contact"), ("exact", "exact")]
+)
+def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(tangent, state):
+    """Of its own errors and of draws; loads and draws change it, the classical not."""
+    options = SweepOptions(
+        grid="tx=0.1,tz=-0.5", reading="none", tangent=tangent, load=LOAD,
+        vary=["leg1.link_a.geometric_error.rx=0,0.02"],
+    )  # fmt: skip
+    data = sweep_in_memory(ask_sweep("irsbot2", options)).squeeze()
+    robot = load_robot("irsbot2")
+    errors = np.zeros((len(robot.frames), 6))
+    errors[robot.index("leg1.link_a"), 0] = 0.02
+    posture = place_robot(robot.with_errors(errors), {"tx": 0.1, "tz": -0.5})
+    expected = platform_stiffness(posture, state, LOAD, side="letting go")
+    size = np.sqrt(np.diag(expected.compliance))
+    np.testing.assert_allclose(
+        data.compliance.values[1] / np.outer(size, size),
+        expected.compliance / np.outer(size, size), atol=1e-6,
+    )  # fmt: skip
+    np.testing.assert_allclose(data.share.sum("part"), 1.0)
+    assert np.ptp(data.stiffness.values, axis=0).max() > 0.0
+    assert tangent != "exact" or "forces already there" in data.part.values
+
+
+def test_a_tangent_names_the_motions_that_nothing_resists():
+    data = sweep_in_memory(
+        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", reading="none",
+                                          tangent="contact", load=LOAD))
+    )  # fmt: skip
+    assert "nothing resists the platform's motion" in str(data.reason.values.ravel()[0])
+    assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
+
+
+def test_a_wrong_tangent_is_refused():
+    options = SweepOptions(grid="tx=0,tz=-0.5", reading="none", tangent="exakt")
+    with pytest.raises(BadInput, match='--tangent: found "exakt"'):
+        ask_sweep("irsbot2", options)
+    options = replace(options, tangent="exact", stiffness=True)
+    with pytest.raises(BadInput, match="expected one of them"):
+        ask_sweep("irsbot2", options)

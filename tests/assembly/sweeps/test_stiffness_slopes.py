@@ -9,7 +9,7 @@ from assembly.kinematics.posture import place_robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.robots import load_robot
 from assembly.sweeps.parameters import load_design
-from assembly.sweeps.stiffness_slopes import stiffness_slopes
+from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 from forcefit.inputs.table import BadInput
 
 POSE = {"tx": 0.1, "tz": -0.5}
@@ -81,3 +81,47 @@ def test_the_command_gives_them_at_the_exact_equilibrium(run):
 def test_an_unknown_number_is_named():
     with pytest.raises(BadInput, match="no number"):
         stiffness_slopes(load_design("irsbot2"), ["link_a.link.beam.raduis"])
+
+
+def test_effects_of_the_file_are_in_them(tmp_path):
+    """A drive of 5e4 N m/rad under an arm of L: L^2/k more at its tip, by L 2 L/k."""
+    arm = """
+name = "arm"
+platform = "tip"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "tip"
+parent = "drive"
+translation = [0.5, 0.0, 0.0]
+link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
+"""
+    effect = """
+[[effect]]
+name = "drive_compliance"
+parameters = { drive = 5e4 }
+"""
+    slopes = []
+    for text in (arm, arm + effect):
+        path = tmp_path / "arm.toml"
+        path.write_text(text)
+        name = "tip.translation.x"
+        slopes.append(stiffness_slopes(load_design(path), [name])[name])
+    difference = np.zeros((6, 6))
+    difference[4, 4], difference[2, 4], difference[4, 2] = 2 * 0.5 / 5e4, 2e-5, 2e-5
+    np.testing.assert_allclose(slopes[1] - slopes[0], difference, atol=1e-11)
+
+
+def test_a_length_of_an_overconstrained_loop_is_named_with_what_stands_for_it(run):
+    path = "leg1.link_a.translation.x"
+    with pytest.raises(CannotChange, match="leg1.link_a.translation.x cannot change"):
+        stiffness_slopes(load_design("irsbot2"), [path], POSE)
+    status, out, _ = run(
+        "assembly", "stiffness", "irsbot2", "--by", path, "--by", "link_a.link.young",
+    )  # fmt: skip
+    assert status == 1
+    assert "--by leg1.link_a.geometric_error.tx" in out
+    assert "dC/d(link_a.link.young), diagonal" in out

@@ -1,0 +1,148 @@
+"""K_C at the points of a sweep: the classical one, or a tangent of what is there.
+
+Errors, loads and clearances do not change the classical K_C, so draws of a posture
+share it.  A tangent is found point by point: of problem (22), with its clearances free
+or pressed, or of the exact equilibrium, with its internal forces.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exact.exact import ExactAssembly
+from assembly.linear.closure import virtual_joints
+from assembly.linear.energy import CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import assemble_row
+from assembly.model.robot import Robot
+from assembly.platform_stiffness.exact_tangent import exact_tangent
+from assembly.platform_stiffness.linear_tangent import in_contact, owners
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from assembly.solvers.conic import SolverFailed
+
+STATES = {
+    "classical": "clearances held at zero",
+    "contact": "tangent of (22), clearances free or pressed as they are",
+    "exact": "tangent of the exact equilibrium, with its internal forces",
+}
+_FORCES = Part("", "forces")
+
+
+def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
+    """Names of what gives way, such as ``"leg1.distal link"``.
+
+    Args:
+        robot: of the sweep.
+        state: of :data:`STATES`.
+
+    Returns:
+        Links and joints; of a tangent pressed clearances, or forces already there, too.
+    """
+    return tuple(map(_name, _parts(robot, state)))
+
+
+def _parts(robot: Robot, state: str) -> list[Part]:
+    """The same as parts."""
+    joints = virtual_joints(robot)
+    parts = list(dict.fromkeys(owners(joints)))
+    if state == "contact":
+        rows = np.unique(np.abs(joints.cones).argmax(axis=0) // 6)
+        parts += [Part(robot.frames[row].name, "clearance") for row in rows.tolist()]
+    return parts + [_FORCES] * (state == "exact")
+
+
+def _name(part: Part) -> str:
+    """As a label."""
+    return f"{part.frame} {part.kind}" if part.frame else "forces already there"
+
+
+def classical_stiffnesses(
+    robot: Robot, T: NDArray, mismatch: NDArray
+) -> tuple[dict[str, NDArray], dict[int, str]]:
+    """The classical K_C of k postures, without errors and loads.
+
+    Args:
+        robot: of n frames.
+        T: (k, n, 4, 4) frames seen from the base.
+        mismatch: (k,) [rad, m] nominal closure errors.
+
+    Returns:
+        Quantities by name, k rows each; and the free motions by row.
+    """
+    many = platform_stiffnesses(robot, T, mismatch)
+    by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
+    quantities = {
+        "compliance": many.compliance,
+        "stiffness": np.stack([many.along(axis) for axis in np.eye(6)], axis=1),
+        "eigen_stiffness": many.eigen_stiffnesses,
+        "stiffness_condition": many.condition,
+        "share": np.array(by_axis).transpose(2, 1, 0),
+    }
+    return quantities, {i: one.free_text for i, one in many.singular.items()}
+
+
+def tangent_stiffnesses(
+    conditions: Conditions, state: str
+) -> tuple[dict[str, NDArray], dict[int, str]]:
+    """Tangents of k points under their errors, loads and effects.
+
+    Args:
+        conditions: of k rows.
+        state: ``"contact"`` or ``"exact"``.
+
+    Returns:
+        As :func:`classical_stiffnesses`; NaN where there is no equilibrium, 0 along
+        what nothing resists, and why.
+    """
+    parts = _parts(conditions.robot, state)
+    rows, reasons = [], {}
+    for i in range(len(conditions)):
+        try:
+            tangent = _tangent(conditions, i, state)
+        except (CannotAssemble, FreeMotion, SolverFailed) as error:
+            rows.append(_unknown(len(parts)))
+            reasons[i] = f"no tangent: {error}"
+            continue
+        rows.append(_quantities(tangent, parts))
+        if tangent.free.size:
+            reasons[i] = tangent.free_text
+        elif not tangent.stable:
+            reasons[i] = "the equilibrium is unstable"
+    keys = rows[0]
+    return {key: np.array([row[key] for row in rows]) for key in keys}, reasons
+
+
+def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
+    """Of one point; on the soft side of a change of contact."""
+    if conditions.laws or any(not place.linear for place in conditions.yields):
+        raise SolverFailed("tangent", "an effect gives by a law that is no spring")
+    assembly = assemble_row(replace(conditions, exact=state == "exact"), i)
+    if isinstance(assembly, ExactAssembly):
+        return exact_tangent(assembly, "letting go")
+    return in_contact(assembly, "letting go")
+
+
+def _quantities(tangent: PlatformStiffness, parts: list[Part]) -> dict[str, NDArray]:
+    """What is kept of a tangent."""
+    eigen = tangent.eigen
+    shares: list[Mapping[Part, float]] = [tangent.shares(axis) for axis in np.eye(6)]
+    return {
+        "compliance": tangent.compliance,
+        "stiffness": np.array([tangent.along(axis)[0] for axis in np.eye(6)]),
+        "eigen_stiffness": eigen.values,
+        "stiffness_condition": np.array(eigen.condition),
+        "share": np.array([[one.get(part, 0.0) for one in shares] for part in parts]),
+    }
+
+
+def _unknown(parts: int) -> dict[str, NDArray]:
+    """The same of no tangent."""
+    sizes = {
+        "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
+        "stiffness_condition": (), "share": (parts, 6),
+    }  # fmt: skip
+    return {key: np.full(size, np.nan) for key, size in sizes.items()}

@@ -1,0 +1,91 @@
+"""The platform's compliance at an equilibrium of the simulation, by two roads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.platform_stiffness.linear_tangent import without_clearance
+from assembly.robots import load_robot
+from validation.crosscheck.link_models import link_models
+from validation.multibody.conservative_springs import middle_wrench
+from validation.multibody.motion import exponential, logarithm, turn_of, turned
+from validation.multibody.simulation import SimulationModel
+from validation.multibody.tangent import simulated_tangent
+
+pytestmark = pytest.mark.exudyn
+
+
+def relative(C, other):
+    size = np.sqrt(np.abs(np.diag(C)))
+    return np.abs((C - other) / np.outer(size, size)).max()
+
+
+@pytest.mark.parametrize("links", ["spring", "beam"])
+@pytest.mark.parametrize("name", ["four_bar", "orthoglide"])
+def test_without_load_it_is_the_classical_compliance(name, links):
+    posture = home_posture(load_robot(name))
+    expected = without_clearance(posture).compliance
+    model = link_models(posture.robot, links)
+    simulated = simulated_tangent(posture, model, steps=False)
+    assert simulated.linearised_error < 1e-8
+    assert relative(expected, simulated.linearised) < 1e-8
+    assert np.isnan(simulated.stepped).all()
+
+
+def test_clearances_do_not_count_and_errors_do():
+    posture = home_posture(load_robot("four_bar"))
+    robot = posture.robot
+    model = link_models(robot, "spring")
+    nominal, erring = (
+        simulated_tangent(
+            replace(posture, robot=robot.with_errors(errors)), model, steps=False
+        ).linearised
+        for errors in (np.zeros((len(robot.frames), 6)),
+                       np.full((len(robot.frames), 6), 1e-3))
+    )  # fmt: skip
+    assert 1e-4 < relative(nominal, erring) < 0.1
+
+
+@pytest.mark.parametrize("share", [-0.8, 0.5, 0.9])
+def test_a_bar_on_a_torsion_spring_is_k_minus_its_load(share):
+    """A rigid bar of 1 m, pulled or pushed: 1 / C_yy = k - F."""
+    k = 50.0
+    link = MatrixLink(np.diag([1e9, 1e9, k, 1e9, 1e9, 1e9]))
+    frames = (Frame("foot", link=link), Frame("tip", "foot", [1.0, 0, 0]))
+    posture = home_posture(Robot("bar", "tip", frames, ()))
+    load = [0, 0, 0, -share * k, 0, 0]
+    answer = simulated_tangent(posture, SimulationModel("spring"), load)
+    expected = 1 / (k - share * k)
+    for C in (answer.linearised, answer.stepped):
+        # the other springs give way by 1e-9
+        assert C[4, 4] == pytest.approx(expected, rel=3e-7)
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.05, 0.3])
+def test_a_bent_spring_pulls_by_the_gradient_of_its_energy(size):
+    """Along six twists of its far end, but for the couple of the third order."""
+    rng = np.random.default_rng(3)
+    B = rng.normal(size=(6, 6))
+    K = B @ B.T + np.eye(6)
+    screw = size * rng.normal(size=6)
+    screw[3:] *= 1e-3
+    T, half = exponential(screw), turned(screw[:3] / 2)
+    wrench = np.array(middle_wrench(K.tolist(), screw.tolist()))
+    point = half @ screw[3:] / 2  # of the near end
+    slopes = []
+    for twist in np.eye(6):
+        about = np.concatenate([half @ twist[:3], half @ twist[3:]])
+        about[3:] += np.cross(point, about[:3])
+        ends = [logarithm(exponential(h * about) @ T) for h in (1e-5, -1e-5)]
+        slopes.append((ends[0] @ K @ ends[0] - ends[1] @ K @ ends[1]) / 4e-5)
+    np.testing.assert_allclose(wrench, slopes, atol=1e-8 * np.abs(slopes).max())
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
+def test_a_turn_is_read_from_its_matrix(angle):
+    for axis in np.vstack([np.eye(3), [[0.6, -0.8, 0.0], [-1 / 3, 2 / 3, 2 / 3]]]):
+        R = turned(angle * axis)
+        np.testing.assert_allclose(turn_of(R), angle * axis, rtol=1e-7, atol=1e-15)

@@ -1,0 +1,109 @@
+"""The platform's compliance by small loads, with an error of its own.
+
+At its equilibrium the simulation is loaded a little along each axis, both ways, by
+steps that fall; half the difference of the platform's motions per load is the
+compliance but for the steps' square.  How far that is depends on what moves inside:
+a joint may turn a hundred times as much as the platform.  So two steps each are
+extrapolated to none, and of all the two whose answers differ least are taken (Ridders):
+large steps leave terms of higher order, small ones the rounding of positions.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.screws import rotation_vector
+from validation.multibody.exudyn_model import Model
+from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
+from validation.multibody.exudyn_reading import idle_motions, pose
+from validation.multibody.exudyn_solver import close, equilibrate
+from validation.multibody.open_robot import Tree
+
+_LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4  # [rad, m] of the platform, and how they fall
+
+
+def add_step_loads(model: Model, tree: Tree, platform: str) -> tuple[int, int]:
+    """Moment and force on the platform, none at first; before the model is solved."""
+    marker = model.add_marker(tree.before[platform])
+    item = model.item
+    moment = item.LoadTorqueVector(markerNumber=marker, loadVector=[0.0] * 3)
+    force = item.LoadForceVector(markerNumber=marker, loadVector=[0.0] * 3)
+    return int(model.mbs.AddLoad(moment)), int(model.mbs.AddLoad(force))
+
+
+def stepped_compliance(
+    model: Model, tree: Tree, platform: str, loads: tuple[int, int], shift: NDArray,
+    sizes: NDArray,
+) -> tuple[NDArray, float]:  # fmt: skip
+    """Compliance by differences at the equilibrium in which a model stands.
+
+    Args:
+        model: solved.
+        tree: what it consists of.
+        platform: its frame.
+        loads: of :func:`add_step_loads`.
+        shift: of :func:`validation.multibody.exudyn_solver.solve`.
+        sizes: (6,) [rad or m per N m or N] largest motion under unit loads, about.
+
+    Returns:
+        (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
+        base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
+
+    Raises:
+        SimulationFailed: no equilibrium near by, not even under the smallest loads.
+        OutOfTime: the model's deadline has passed; a :class:`SimulationFailed`.
+    """
+    system, initial = model.mbs.systemData, model.exu.ConfigurationType.Initial
+    start, first = system.GetSystemState(), shift.copy()
+
+    def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
+        for number, part in zip(loads, np.split(step * unit, 2), strict=True):
+            model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
+        # targets move with the load: what a step before has shown is nearly right
+        shift[:] = first[1] + step * drift
+        system.SetSystemState(start, configuration=initial)
+        equilibrate(model, 2.0, 1)
+        close(model, tree.closures, shift)
+        return (
+            pose(model, tree.before[platform]),
+            idle_motions(model, tree.idle),
+            shift[1],
+        )
+
+    columns, changes, turns = [], [], []
+    for unit, size in zip(np.eye(6), sizes, strict=True):
+        slopes: list[NDArray] = []
+        drift = np.zeros_like(first[1])
+        for step in _LARGEST / size / _RATIO ** np.arange(_SIZES):
+            try:
+                ahead, idle, target = moved(step, unit, drift)
+                drift = (target - first[1]) / step
+                back, still, target = moved(-step, unit, drift)
+            except OutOfTime:
+                raise
+            except SimulationFailed:
+                # a large step may leave what any equilibrium carries
+                if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
+                    raise
+                slopes.clear()
+                continue
+            turn = rotation_vector(ahead[:3, :3] @ back[:3, :3].T)
+            motion = [*turn, *(ahead - back)[:3, 3], *(idle - still)]
+            slopes.append(np.array(motion) / (2 * step))
+        column, change = _limit(np.array(slopes))
+        columns.append(column[:6])
+        changes.append(change[:6])
+        turns.append(column[6:])
+    theta = np.array(turns)
+    C = np.column_stack(columns) + model.regularisation.idle * theta @ theta.T
+    size = np.sqrt(np.abs(np.diag(C)))
+    return C, float((np.column_stack(changes) / np.outer(size, size)).max())
+
+
+def _limit(slopes: NDArray) -> tuple[NDArray, NDArray]:
+    """(n,) differences at step zero, from (k, n) at falling steps, and their error."""
+    square = _RATIO**2
+    better = (square * slopes[1:] - slopes[:-1]) / (square - 1)
+    change = np.abs(np.diff(better, axis=0))
+    size = np.abs(better[:, :6]).max(axis=0) + 1e-300
+    best = int(np.argmin((change[:, :6] / size).max(axis=1)))
+    return better[best + 1], change[best]

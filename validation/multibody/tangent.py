@@ -1,0 +1,145 @@
+"""The platform's compliance in the simulation, at an equilibrium, by two roads.
+
+Errors, loads and weight count as in :func:`.simulation.simulate_assembly`; springs act
+by the gradient of their energy, so that the tangent is one of a potential.
+"""
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from validation.multibody.exudyn_model import Model, Regularisation
+from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
+from validation.multibody.exudyn_solver import solve
+from validation.multibody.linearised import linearised_compliance
+from validation.multibody.load_steps import add_step_loads, stepped_compliance
+from validation.multibody.open_robot import Case, PostureLike, build, link_springs
+from validation.multibody.simulation import (
+    TIME_LIMIT,
+    WITH_CLEARANCES,
+    SimulationModel,
+    import_exudyn,
+)
+
+# closures' forces are rounded to 1e-16 of their stiffness, and move soft robots by it
+_CLOSING = (1e8, 1e10)  # [N m/rad, N/m], tried in turn
+_IDLE = 1e-6  # [N m/rad, N/m]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTangent:
+    """A compliance found twice in one simulation.
+
+    Attributes:
+        linearised: (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present
+            origin, base axes, by the linearised system.
+        stepped: (6, 6) by small loads; NaN where they were not asked for.
+        linearised_error: [-] own uncertainty of the first, of entries over
+            sqrt(C_ii C_jj).
+        stepped_error: [-] of the second.
+        seconds: [s] taken.
+    """
+
+    linearised: NDArray
+    stepped: NDArray
+    linearised_error: float
+    stepped_error: float
+    seconds: float
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+
+def simulated_tangent(
+    posture: PostureLike,
+    model: SimulationModel,
+    load: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    steps: bool = True,
+    time_limit: float = TIME_LIMIT,
+) -> SimulatedTangent:
+    """The platform's compliance at the equilibrium of errors, load and weight.
+
+    Args:
+        posture: where the robot stands; its errors count.
+        model: of its links; its clearances count if they do in the model, in contacts
+            of 1e12 N/m that are smoothed, and then there are no load steps.
+        load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
+            a moment as a couple of dead forces.
+        gravity: (3,) [m/s^2] base axes.
+        steps: by small loads too.
+        time_limit: [s] of all of it.
+
+    Returns:
+        Both compliances.
+
+    Raises:
+        BadInput: a spring's stiffness is missing.
+        SimulationFailed: no equilibrium was found.
+        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+    """
+    started = time.monotonic()
+    case = _case(posture, model, load, gravity)
+    # where no spring is bent its law does not matter, and Exudyn's own is faster
+    bent = is_bent(posture.robot.errors, load, gravity)
+    regularisations = [Regularisation(k, _IDLE) for k in _CLOSING]
+    if model.clearances:
+        regularisations = list(WITH_CLEARANCES[:2])
+    *first, last = (replace(one, conservative=bent) for one in regularisations)
+    for regularisation in first:
+        try:
+            return _tangent(case, regularisation, steps, started, time_limit)
+        except OutOfTime:
+            raise
+        except SimulationFailed:
+            continue
+    return _tangent(case, last, steps, started, time_limit)
+
+
+def is_bent(*causes: ArrayLike | None) -> bool:
+    """Whether any of errors, load and weight is there, so that springs are bent."""
+    return any(np.any(cause) for cause in causes if cause is not None)
+
+
+def _case(
+    posture: PostureLike, model: SimulationModel,
+    load: ArrayLike | None, gravity: ArrayLike | None,
+) -> Case:  # fmt: skip
+    """What is to be built."""
+    given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
+    solids = dict(model.meshes)
+    wrench = np.zeros(6) if load is None else np.asarray(load, dtype=float)
+    return Case(
+        posture=posture, scale=1.0, meshes=solids, elements=model.elements,
+        springs=link_springs(posture.robot, model.links, given, solids),
+        clearances=model.clearances, bushes=model.bushes,
+        load=wrench * [0, 0, 0, 1, 1, 1],
+        gravity=np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float),
+        couple=wrench[:3],
+    )  # fmt: skip
+
+
+def _tangent(
+    case: Case, regularisation: Regularisation, steps: bool,
+    started: float, limit: float,
+) -> SimulatedTangent:  # fmt: skip
+    """Build, solve, differentiate, and give the memory back."""
+    robot = case.posture.robot
+    program = Model(*import_exudyn(), robot.name, regularisation)
+    program.deadline = started + limit
+    try:
+        tree = build(program, case)
+        loads = add_step_loads(program, tree, robot.platform)
+        shift = solve(program, tree.closures, narrow=bool(tree.contacts))
+        C, error = linearised_compliance(program, tree, robot.platform)
+        stepped, own = np.full((6, 6), np.nan), np.nan
+        if steps and not tree.contacts:
+            sizes = np.abs(C).max(axis=0)
+            stepped, own = stepped_compliance(
+                program, tree, robot.platform, loads, shift, sizes
+            )
+        return SimulatedTangent(C, stepped, error, own, time.monotonic() - started)
+    finally:
+        program.discard()
