@@ -161,6 +161,13 @@ def look_up(
     for name in wanted:
         if name not in names:
             raise BadInput(f'look-up: unknown parameter "{name}"{nearest(name, names)}')
+    for entry in entries:
+        if entry.parameters.keys() != entries[0].parameters.keys():
+            raise BadInput(
+                f"look-up: {entry.key} has the parameters "
+                f"{', '.join(entry.parameters) or 'none'}, {entries[0].key} "
+                f"{', '.join(names) or 'none'}; expected the same in all of a grid"
+            )
     axes = [sorted({e.parameters[name] for e in entries}) for name in names]
     single = {n: a[0] for n, a in zip(names, axes, strict=True) if len(a) == 1}
     wanted = single | dict(wanted)

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,17 @@ def test_a_grid_with_a_hole_is_refused(spec):
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
     with pytest.raises(BadInput, match="do not fill a grid"):
         look_up(read_library(spec.folder), wanted)
+
+
+def test_an_entry_of_other_parameters_is_named(spec):
+    """A key renamed by hand in one file, or entries of two libraries in one folder."""
+    build_library(spec)
+    *others, last = read_library(spec.folder)
+    renamed = {"*" if k == "young" else k: v for k, v in last.parameters.items()}
+    mixed = [*others, replace(last, parameters=renamed)]
+    with pytest.raises(BadInput) as caught:
+        look_up(mixed, {"length": 0.2})
+    assert f"{last.key} has the parameters length, radius, *," in str(caught.value)
 
 
 @pytest.mark.parametrize(
