@@ -139,9 +139,13 @@ class Evidence:
         known, shows = self._scales(near), self._shows(G, group)
         evidence = -np.inf
         for log in _GLANCES:
-            scales = np.where(np.isfinite(known), known, shows * np.exp(log))
+            new = np.minimum(shows * np.exp(log), self._most)
+            scales = np.where(np.isfinite(known), known, new)
             s = np.where(group < 0, given, scales[group])
-            x, cost, _ = _solved(G, s, b)
+            try:
+                x, cost, _ = _solved(G, s, b)
+            except np.linalg.LinAlgError:  # what shows by rounding alone
+                continue
             evidence = max(evidence, -0.5 * (squares - float(x @ (s * b))) - cost)
         return evidence
 
