@@ -57,7 +57,7 @@ def text(sessions: Sequence[Carried]) -> str:
             f"they are off by {1e6 * one.left:.4g} um themselves"
         )
         lines += [
-            f"  left behind, the session has no time: {title}"
+            f"  left behind, of the session it was learned in: {title}"
             for title in one.left_behind
         ]
         if not one.suffices:

@@ -18,6 +18,7 @@ Sources:
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 
@@ -124,9 +125,10 @@ class Evidence:
         priors = [self._fitted(on, along, squares, start)]
         for k in np.flatnonzero(~np.array(self._sure, dtype=bool)):
             other = [o ^ (i == k) for i, o in enumerate(on)]
-            near = self._at_a_glance(other, priors[0], along, squares)
-            if near > priors[0].evidence - _NEAR:
-                priors.append(self._fitted(other, along, squares, start))
+            with suppress(np.linalg.LinAlgError):  # it would show by rounding alone
+                near = self._at_a_glance(other, priors[0], along, squares)
+                if near > priors[0].evidence - _NEAR:
+                    priors.append(self._fitted(other, along, squares, start))
         return max(priors, key=lambda prior: prior.evidence)
 
     def _at_a_glance(
@@ -139,7 +141,8 @@ class Evidence:
         known, shows = self._scales(near), self._shows(G, group)
         evidence = -np.inf
         for log in _GLANCES:
-            scales = np.where(np.isfinite(known), known, shows * np.exp(log))
+            new = np.minimum(shows * np.exp(log), self._most)
+            scales = np.where(np.isfinite(known), known, new)
             s = np.where(group < 0, given, scales[group])
             x, cost, _ = _solved(G, s, b)
             evidence = max(evidence, -0.5 * (squares - float(x @ (s * b))) - cost)

@@ -1,11 +1,13 @@
 """Small unknowns with a Gaussian prior, against the normal distribution itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from validation.diagnosis.background import NOTHING, background
-from validation.diagnosis.evidence import Evidence
+from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
 
 CELLS = 300
@@ -116,6 +118,21 @@ def test_a_term_comes_and_goes_with_what_is_left(there, rng):
     after = evidence.best_of(along, squares, before)
     assert after.used[0].all() == there
     assert after.evidence == pytest.approx(evidence.best(now).evidence, rel=1e-6)
+
+
+def test_a_term_that_shows_by_rounding_alone_stays_away(rng):
+    """Its columns are another's, but for the last digit: no size of it can be told."""
+    function = replace(term(rng, "function 1", 4), sure=True)
+    residue = function.columns[:, :2] * 1e-15 + 1e-17 * rng.normal(size=(CELLS, 2))
+    ghost = SmallTerm(GEOMETRY, np.zeros(2, int), np.zeros(2, int), residue,
+                      np.full(2, np.nan), -np.inf)  # fmt: skip
+    z = function.columns @ np.full(4, 1.0) + rng.normal(size=CELLS)
+    evidence = Evidence([ghost, function], CELLS)
+    start = Prior((np.zeros(2, bool), np.ones(4, bool)), {}, 0.0, 0.0)
+    along = np.concatenate([t.columns.T @ z for t in evidence.terms])
+    after = evidence.best_of(along, float(z @ z), start)
+    assert not after.used[0].any()
+    assert after.used[1].all()
 
 
 def test_noise_has_no_small_terms(rng):
