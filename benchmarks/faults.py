@@ -127,12 +127,13 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
     rows = range(last.lineno, max(end, row) + 1)
     functions = [n for n in within if isinstance(n, ast.FunctionDef)]
     if functions and functions[-1] is last:  # a default value
-        return range(0), last.name
+        return range(last.body[0].lineno, (last.end_lineno or row) + 1), None
     if functions:
         return rows, None
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
-    return range(0), names[0] if names else path_name(last)
+    # a lambda's rows are passed later
+    return rows, names[0] if names else path_name(last)
 
 
 def path_name(node: ast.AST) -> str | None:
