@@ -3,8 +3,9 @@
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
 [--foreign]``. Each input is a sound command of ``fuzz_seeds.py``, or of
 ``fuzz_foreign.py``, with its files or its words changed by
-``fuzz_mutations.py``, run in a process forked from one that has imported and compiled
-everything. Input i of a seed is always the same; ``--only I`` shows one.
+``fuzz_mutations.py``, run in a process
+forked from one that has imported and compiled everything, and judged by
+``fuzz_faults.py``. Input i of a seed is always the same; ``--only I`` shows one.
 
 What is asked of each: an exit status of 0, 1, 2 or 130; with 2 one line that begins
 ``forcefit: `` and no new file; nothing on stderr but that and progress; only whole
@@ -14,7 +15,6 @@ Ctrl-C, and asked the same.
 """
 
 import argparse
-import json
 import os
 import pickle
 import re
@@ -38,6 +38,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import typer  # noqa: E402
+from fuzz_faults import faults  # noqa: E402
 from fuzz_foreign import FOREIGN, MADE_FOREIGN, write_foreign  # noqa: E402
 from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
@@ -47,11 +48,6 @@ PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
 BATCH = 50  # inputs to a process
 MEMORY = 8 << 30  # [byte] of addresses
 _HEAD = struct.Struct("<Q")
-# progress, verdicts and what meshing says
-_OURS = re.compile(
-    r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
-    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
-)
 
 
 class Asked(NamedTuple):
@@ -192,73 +188,6 @@ def snapshot() -> dict[str, bytes]:
         for p in sorted(Path().rglob("*"))
         if p.is_file() or not any(p.iterdir())
     }
-
-
-def faults(words, status, out, err, before, after, left) -> list[str]:
-    """What is wrong with a result; nothing if it is as it should be."""
-    faults = []
-    if status not in {0, 1, 2, 130}:
-        faults.append(f"status {status}")
-    if "Traceback" in err:
-        last = [line for line in err.splitlines() if line.strip()][-1]
-        places = re.findall(r'File "([^"]+)", line (\d+)', err)
-        ours = [f"{Path(f).name}:{n}" for f, n in places if "site-packages" not in f]
-        return [f"traceback at {ours[-1] if ours else '?'}: {last[:100]}"]
-    strange = [line for line in err.splitlines() if not _OURS.match(line)]
-    if strange:
-        faults.append(f"on stderr: {strange[0][:100]}")
-    messages = [line for line in err.splitlines() if line.startswith("forcefit: ")]
-    if status == 2 and len(messages) != 1:
-        faults.append(f"{len(messages)} messages")
-    if any(len(line) > 1000 for line in messages):
-        faults.append("a message of more than 1000 characters")
-    if status in {0, 1} and "-" in words[-1:] and "--json" in words[-2:]:
-        try:
-            json.loads(out)
-        except ValueError:
-            faults.append("stdout is not JSON")
-    new = {name: content for name, content in after.items() if name not in before}
-    other = [
-        n for n in before if after.get(n) != before[n] and not may_change(n, after)
-    ]
-    if other:
-        faults.append(f"changed: {other[0]}")
-    if left:
-        faults.append(f"left in the temporary folder: {left[0]}")
-    for name, content in new.items():
-        journal = name.endswith(".journal") and status in {1, 2, 130}
-        library = name.startswith(("built", "links", "newfolder"))
-        if status == 2 and not journal and not library:
-            faults.append(f"written although refused: {name}")
-        elif not journal and not is_whole(name, content):
-            faults.append(f"not whole: {name}")
-    return faults
-
-
-def may_change(name: str, after: dict[str, bytes]) -> bool:
-    """Whether a file that was there may be another now: ours, of the same kind."""
-    journal = name.endswith(".journal")
-    return journal or (name in after and is_whole(name, after[name]))
-
-
-def is_whole(name: str, content: bytes) -> bool:
-    """Whether a file is one of those that commands write, from end to end."""
-    path = Path(name)
-    if path.suffix == ".json":
-        try:
-            return isinstance(json.loads(content), dict)
-        except ValueError:
-            return False
-    ends = {
-        ".png": (b"\x89PNG", b"IEND\xaeB`\x82"), ".svg": (b"<?xml", b"</svg>\n"),
-        ".pdf": (b"%PDF", b"%%EOF\n"), ".html": (b"<!doctype", b"</html>\n"),
-        ".toml": (b"", b"\n"), ".csv": (b"", b"\n"), ".nc": (b"\x89HDF", b""),
-        ".jpg": (b"\xff\xd8", b"\xff\xd9"), ".tif": (b"II", b""), ".bmp": (b"BM", b""),
-        ".urdf": (b"<", b">\n"), ".xml": (b"<", b">\n"), ".yaml": (b"", b"\n"),
-        "": (b"", b"\n"), ".pch": (b"", b"\n"), ".mtx": (b"", b"\n"),
-    }  # fmt: skip
-    first, last = ends.get(path.suffix.lower(), (None, b""))
-    return first is not None and content.startswith(first) and content.endswith(last)
 
 
 def one(number: int, asked: Asked, seeds: Path) -> dict:

@@ -13,7 +13,6 @@ their module.  Printed: the share caught, and every survivor.
 """
 
 import argparse
-import ast
 import importlib
 import json
 import os
@@ -37,20 +36,9 @@ import numba
 import pytest
 from coverage import Coverage, CoverageData
 
-ROOT = Path(__file__).parents[1]
+from benchmarks.faults import ROOT, Fault, drawn, files_of, has_loops
+
 PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
-CHAPTERS = (
-    "stiffness/beam", "stiffness/surface", "stiffness/mesh", "stiffness/fem",
-    "assembly/solvers", "assembly/kinematics", "assembly/linear", "assembly/batch",
-    "assembly/exact", "assembly/measurement", "assembly/effects",
-    "assembly/statistics", "validation/diagnosis",
-)  # fmt: skip
-SWAPS: dict[type, type] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt,
-    ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
-    ast.MatMult: ast.Add, ast.Pow: ast.Mult,
-}  # fmt: skip
 # imported once, before the forks
 LIBRARIES = (
     "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial",
@@ -63,126 +51,6 @@ AT_MOST = 400  # tests that run in the first share
 UNCOMPILED_SECONDS = 3.0  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A wrong expression: in which file, on which row, the new line, what it is.
-
-    Its statement's rows are those that a trace may name; the name is what the
-    statement gives a value to, where that happens as the module is imported.
-    """
-
-    chapter: str
-    path: Path
-    row: int
-    line: str
-    what: str
-    rows: range
-    name: str | None
-
-    @property
-    def compiled(self) -> bool:
-        """Whether its file has compiled loops."""
-        return has_loops(ROOT / self.path)
-
-    def __str__(self) -> str:
-        return f"{self.path}:{self.row}  {self.what}"
-
-
-def places(tree: ast.Module) -> Iterator[ast.AST]:
-    """Nodes that can be made wrong: not in messages, annotations or docstrings."""
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom):
-            continue
-        if isinstance(node, ast.BinOp | ast.BoolOp | ast.Compare | ast.UnaryOp):
-            yield node
-        if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
-            yield node
-        for field, value in ast.iter_fields(node):
-            if field in {"annotation", "returns", "decorator_list"}:
-                continue
-            children = value if isinstance(value, list) else [value]
-            waiting += [child for child in children if isinstance(child, ast.AST)]
-
-
-def wrong(node: ast.AST, random: Random) -> ast.AST | None:
-    """The node with one fault; None where it has none of ours."""
-    if isinstance(node, ast.Constant):
-        value = node.value
-        assert isinstance(value, int | float)
-        other = value + 1 if isinstance(value, int) else (2 * value if value else 1.0)
-        return ast.Constant(other)
-    if isinstance(node, ast.UnaryOp):
-        return node.operand if isinstance(node.op, ast.USub | ast.Not) else None
-    if isinstance(node, ast.BinOp):
-        swap = SWAPS.get(type(node.op))
-        return swap and ast.BinOp(node.left, swap(), node.right)
-    if isinstance(node, ast.BoolOp):
-        return ast.BoolOp(SWAPS[type(node.op)](), node.values)
-    assert isinstance(node, ast.Compare)
-    k = random.randrange(len(node.ops))
-    swap = SWAPS.get(type(node.ops[k]))
-    ops = [*node.ops[:k], *([swap()] if swap else []), *node.ops[k + 1 :]]
-    return swap and ast.Compare(node.left, ops, node.comparators)
-
-
-def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
-    """A fault in a file; None where the expression drawn has none of ours."""
-    source = (ROOT / path).read_text(encoding="utf-8")
-    tree = ast.parse(source)
-    nodes = list(places(tree))
-    if not nodes:
-        return None
-    node = random.choice(nodes)
-    new = wrong(node, random)
-    old = ast.get_source_segment(source, node)
-    if new is None or old is None or "\n" in old:
-        return None
-    text = ast.unparse(ast.fix_missing_locations(new))
-    row = node.lineno  # type: ignore[attr-defined]
-    line = source.splitlines(keepends=True)[row - 1].encode()
-    begin, end = node.col_offset, node.end_col_offset  # type: ignore[attr-defined]
-    changed = (line[:begin] + f"({text})".encode() + line[end:]).decode()
-    what = f"{old} -> {text}"
-    return Fault(chapter, path, row, changed, what, *statement(tree, row))
-
-
-def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
-    """Rows of the innermost statement on a row, and what it names while importing."""
-    within: list[ast.stmt] = []
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        waiting += ast.iter_child_nodes(node)
-        if isinstance(node, ast.stmt) and node.lineno <= row <= (node.end_lineno or 0):
-            within.append(node)
-    within.sort(key=lambda node: node.lineno)
-    last = within[-1]
-    body = getattr(last, "body", None)
-    end = body[0].lineno - 1 if body else last.end_lineno or row
-    rows = range(last.lineno, max(end, row) + 1)
-    functions = [n for n in within if isinstance(n, ast.FunctionDef)]
-    if functions and functions[-1] is last:  # a default value
-        return range(0), last.name
-    if functions:
-        return rows, None
-    targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
-    names = [n.id for n in targets if isinstance(n, ast.Name)]
-    return range(0), names[0] if names else path_name(last)
-
-
-def path_name(node: ast.AST) -> str | None:
-    """The first name in an expression that runs while the module is imported."""
-    names = [n.id for n in ast.walk(node) if isinstance(n, ast.Name)]
-    return names[0] if names else None
-
-
-def has_loops(path: Path) -> bool:
-    """Whether a file has compiled loops."""
-    return bool(re.search(r"^@(kernel|part)", path.read_text("utf-8"), re.MULTILINE))
 
 
 class Run:
@@ -406,12 +274,7 @@ def main() -> None:
     parser.add_argument("--traced", type=Path)
     asked = parser.parse_args()
     random = Random(asked.seed)
-    files = [
-        (chapter, path.relative_to(ROOT))
-        for chapter in CHAPTERS
-        if chapter.startswith(asked.only)
-        for path in sorted((ROOT / chapter).rglob("*.py"))
-    ]
+    files = files_of(asked.only)
     weights = [len((ROOT / path).read_text().splitlines()) for _, path in files]
     for library in LIBRARIES:
         importlib.import_module(library)

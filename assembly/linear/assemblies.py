@@ -13,7 +13,7 @@ from assembly.linear.certificate import unproved
 from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.fallback import CannotAssemble
 from assembly.linear.reduction import FreeMotion
-from assembly.model.points import Points
+from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
@@ -33,7 +33,7 @@ _STATUS: dict[type[Exception], str] = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assemblies(Points[Assembly]):
+class Assemblies(PointResults[Assembly]):
     """Least energies of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:

@@ -165,7 +165,7 @@ def loaded_cones(loads: ClearanceLoads, P: Matrices, point: int) -> tuple[bool, 
             squares += (component * h.cone_size[i]) ** 2
             size += loads.clearances[point, i] ** 2
         load = np.sqrt(squares) / scale
-        slack = max(0.0, 1.0 - np.sqrt(size))
+        slack = max(1.0 - np.sqrt(size), 0.0)  # in this order NaN stays NaN
         loaded[c] = load > slack and load > 1e-9
         apart = load > _APART * slack or slack > _APART * load
         # written so that NaN is ambiguous

@@ -37,7 +37,7 @@ from assembly.linear.fallback import CannotAssemble
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.reach import reachable_screws
 from assembly.linear.robot_structure import structure_of
-from assembly.model.points import Points
+from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import (
@@ -91,7 +91,7 @@ class PoseError:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseErrors(Points[PoseError]):
+class PoseErrors(PointResults[PoseError]):
     """Certified bounds of the largest pose errors of k points; ``[i]`` is one of them.
 
     Attributes:

@@ -21,7 +21,7 @@ from assembly.linear.fallback import reference_margin
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
-from assembly.model.points import Points
+from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
 
@@ -65,7 +65,7 @@ class Zone:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Margins(Points[Zone]):
+class Margins(PointResults[Zone]):
     """Zone margins of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:

@@ -327,10 +327,10 @@ def _record_frequencies(
             robot, conditions.coordinates[i], T[i], float(conditions.mismatch[i])
         )
         try:
-            found = natural_modes(there, count).frequencies
+            frequencies = natural_modes(there, count).frequencies
         except BadInput:
             continue  # what has a mass does not move there
-        solved.records["frequency"][rows[run], : len(found)] = found
+        solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _wrenches(robot: Robot, T: NDArray, energies: Assemblies) -> NDArray:

@@ -148,8 +148,8 @@ def results_in(text: str, where: str) -> dict[str, Any]:
     """
     mark = '<script type="application/json" class=results>'
     if text.lstrip()[:15].lower() == "<!doctype html>":
-        _, found, rest = text.partition(mark)
-        if not found:
+        _, own, rest = text.partition(mark)
+        if not own:
             raise BadInput(f"{where}: found a page without results of forcefit")
         text = rest.partition("</script>")[0]
     try:

@@ -26,7 +26,7 @@ _TURNS = {90: "a quarter", 180: "half a turn", 270: "three quarters"}
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LinkComparison:
     """One link by a beam formula and by finite elements.
 
     Attributes:
@@ -104,7 +104,7 @@ class Comparison:
         )
 
 
-def _turned_difference(comparison: Comparison, rotation: NDArray) -> float:
+def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
     """[1] largest difference from the beam turned about the tip by a vector."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
@@ -117,7 +117,7 @@ def compare_link(
     fea: LinkStiffness,
     size: float,
     length: float | None = None,
-) -> Comparison:
+) -> LinkComparison:
     """Compare two stiffnesses of one link.
 
     Args:
@@ -141,7 +141,7 @@ def compare_link(
             f"({ends[1]}) m; both must be one point"
         )
     difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
-    return Comparison(beam, fea, difference, length, size)
+    return LinkComparison(beam, fea, difference, length, size)
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.stress import PeakStress, StressInfluence, von_mises
 from stiffness.link import LinkStiffness
-from stiffness.report.compare import Comparison, entries_that_matter
+from stiffness.report.compare import LinkComparison, entries_that_matter
 from stiffness.report.slenderness import SlendernessSweep
 from stiffness.screws import SCREW
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_comparison(comparison: Comparison) -> "Figure":
+def plot_comparison(comparison: LinkComparison) -> "Figure":
     """K_E by finite elements and by a beam, and their difference, entry by entry.
 
     Args:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.link import LinkStiffness
-from stiffness.report.compare import Comparison, entries_that_matter
+from stiffness.report.compare import LinkComparison, entries_that_matter
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def link_results(link: LinkStiffness) -> dict[str, Any]:
     return results
 
 
-def comparison_results(comparison: Comparison) -> dict[str, Any]:
+def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
     """The object that ``--json`` writes for a beam beside finite elements.
 
     Args:
@@ -152,7 +152,7 @@ def link_text(link: LinkStiffness) -> str:
     return "\n".join(lines)
 
 
-def comparison_text(comparison: Comparison) -> str:
+def comparison_text(comparison: LinkComparison) -> str:
     """A beam beside finite elements, for a reader.
 
     Args:

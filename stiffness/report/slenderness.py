@@ -21,7 +21,7 @@ from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import declared_section
 from stiffness.link import LinkStiffness
-from stiffness.report.compare import Comparison, compare_link
+from stiffness.report.compare import LinkComparison, compare_link
 from stiffness.surface.beam_surfaces import shape_surface
 
 _SHAPES = {
@@ -44,7 +44,7 @@ class SlendernessSweep:
         residual: (n, 6, 6) [1] differences that c and d leave.
     """
 
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[LinkComparison, ...]
     end_effect: NDArray
     end_effect_error: NDArray
     second: NDArray
@@ -134,7 +134,7 @@ def sweep_slenderness(
     return fit_end_effect(comparisons)
 
 
-def fit_end_effect(comparisons: Sequence[Comparison]) -> SlendernessSweep:
+def fit_end_effect(comparisons: Sequence[LinkComparison]) -> SlendernessSweep:
     """Fit c and d of K / K_beam = 1 + c r / L + d (r / L)^2.
 
     Args:

@@ -55,3 +55,12 @@ def test_compiling_leaves_numba_and_the_collector_as_they_were(tmp_path, monkeyp
     assert during == [False, False]
     assert gc.isenabled()
     assert CPUCodeLibrary._optimize_functions is optimize
+
+
+def test_where_numba_is_told_not_to_compile_a_loop_is_its_python(monkeypatch):
+    def double(x: float) -> float:
+        return 2.0 * x
+
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
+    assert kernel(double) is double
+    assert kernel(fastmath=True)(double) is double

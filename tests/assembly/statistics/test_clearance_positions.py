@@ -159,6 +159,26 @@ def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
     assert stats.kstest((z + 0.5) / 2, "uniform").pvalue > 1e-3
 
 
+def test_pushed_from_anywhere_a_pin_rests_anywhere_on_the_narrower_rim():
+    """Two pins on one axis, of 2 and 1 mm: the contacts are a circle of 1 mm."""
+    steel = MatrixLink(np.eye(6) * 1e6)
+    frames = (
+        Frame("one", link=steel, clearance=Clearance(radial=2e-3)),
+        Frame("two", link=steel, clearance=Clearance(radial=1e-3)),
+    )
+    robot = Robot("two pins", "one", frames, (("one", "two"),))
+    prepared = prepare_energies(home_posture(robot))
+    draws = prepared.solve(np.zeros((300, 2, 6)))
+    screws, mixed = position_clearances(prepared, draws, "contact", generators(300))
+    assert mixed.all()
+    np.testing.assert_allclose(np.hypot(screws[:, 3], screws[:, 4]), 1e-3, rtol=1e-6)
+    angle = np.arctan2(screws[:, 4], screws[:, 3]) / (2 * np.pi) + 0.5
+    assert stats.kstest(angle, "uniform").pvalue > 1e-3
+    # twice an angle: nor does it prefer an axis
+    assert stats.kstest(angle * 2 % 1, "uniform").pvalue > 1e-3
+    assert stats.kstest(angle * 4 % 1, "uniform").pvalue > 1e-3
+
+
 def near_the_edge(margin):
     """The paper's robot with errors of which play takes up all but a little."""
     robot = load_robot("irsbot2")

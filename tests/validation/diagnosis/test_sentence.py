@@ -1,8 +1,11 @@
 """A learned function as a formula a person can read."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from assembly.model.function import Function
+from validation.diagnosis.report import _tiles
 from validation.diagnosis.sentence import formula
 
 
@@ -18,3 +21,18 @@ from validation.diagnosis.sentence import formula
 def test_numbers_stand_before_what_they_multiply(form, parameters, expected):
     function = Function("drive", ("rz",), ("q.drive",), form, parameters)
     assert formula(function) == expected
+
+
+def test_the_tiles_say_the_error_before_and_after_and_nothing_not_measured():
+    diagnosis = SimpleNamespace(
+        verdict="none_needed", best_by_score=["self_weight", "drift"],
+        probability={"drift": 0.25, "self_weight": 0.75}, next=None,
+        before=SimpleNamespace(position=2e-3, rotation=float("nan")),
+        after=SimpleNamespace(position=5e-4, rotation=float("nan")),
+    )  # fmt: skip
+    verdict, position, cause = _tiles(diagnosis)
+    assert verdict.answer == ["none needed"]
+    before, _, after = position.answer
+    assert (before.value, after.value) == (2e-3, 5e-4)
+    assert cause.answer == ["self weight + drift"]
+    assert "0.750" in str(cause)

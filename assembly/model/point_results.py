@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 One = TypeVar("One")
 
 
-class Points(Generic[One]):
+class PointResults(Generic[One]):
     """Arrays with a row for each of k points; ``[i]`` is one of them.
 
     Attributes:
