@@ -5,7 +5,8 @@ loads, and reactions of joints and closures, kept while everything else moves.  
 differentiated along the motions that joints and closures leave, so that nothing stiff
 that cannot move enters with its noise.  These are taken along the modes of Exudyn's own
 Jacobian, which keeps soft ones apart from stiff ones, and differences of two steps are
-extrapolated; what changes then is the uncertainty.
+extrapolated; what changes with the next two is the uncertainty, and the least of all is
+taken (Ridders).
 
 Weak springs hold what nothing resists.  They take k theta theta' of the compliance,
 theta how a joint turns or slides under unit loads, which is added again.
@@ -33,7 +34,7 @@ from validation.multibody.open_robot import Tree
 
 # of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
 # within some nm, and pressed by less
-_STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 5e-9, 2.5e-9)
+_STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size of a gap's derivative that counts as none
 _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
@@ -124,12 +125,20 @@ def _compliance(
     for _ in range(polish):
         q = q - Z @ _solve(K, Z.T @ forces(q))
     known = [(stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in steps]
-    rough, better = (
-        _by_modes(model, (4 * K - K1) / 3, (4 * V - V1) / 3)
-        for (K1, V1), (K, V) in pairwise(known)
-    )
-    size = np.sqrt(np.abs(np.diag(better)))
-    return better, float(np.abs((better - rough) / np.outer(size, size)).max())
+    extrapolated = []
+    for (step, (K1, V1)), (half, (K2, V2)) in pairwise(zip(steps, known, strict=True)):
+        square = (step / half) ** 2
+        K, V = (
+            (square * two - one) / (square - 1) for one, two in ((K1, K2), (V1, V2))
+        )
+        extrapolated.append(_by_modes(model, K, V))
+    size = np.sqrt(np.abs(np.diag(extrapolated[-1])))
+    changes = [
+        float(np.abs((two - one) / np.outer(size, size)).max())
+        for one, two in pairwise(extrapolated)
+    ]
+    best = int(np.argmin(changes))
+    return extrapolated[best + 1], changes[best]
 
 
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
