@@ -43,6 +43,7 @@ def test_in_a_disc_the_squared_radius_is_uniform():
     assert stats.kstest(np.arctan2(*u.T) / (2 * np.pi) + 0.5, "uniform").pvalue > 1e-3
 
 
+@pytest.mark.slow
 def test_in_a_box_every_side_is_uniform():
     u = walked([], [0, 1, 2, 3], start=[-0.99, 0.99, 0.0])
     for side in u.T:
@@ -63,6 +64,7 @@ def test_a_cut_disc_agrees_with_rejection():
         assert stats.ks_2samp(own, other).pvalue > 1e-3
 
 
+@pytest.mark.slow
 def test_a_simplex_like_section_of_a_cube_has_its_known_mean():
     """|u_i| <= 1 with u0 + u1 + u2 = 2.4: a triangle with centroid (0.8, 0.8, 0.8)."""
     u = walked([[1, 1, 1]], [0, 1, 2, 3], start=[0.9, 0.9, 0.6])

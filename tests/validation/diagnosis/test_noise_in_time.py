@@ -72,6 +72,7 @@ def test_the_mean_of_a_process_has_the_variance_of_the_books():
     assert wide[0, 0] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_intervals_hold_nine_campaigns_in_ten(rng):
     """Estimated share and constant; by white noise hardly more than half hold.
 
