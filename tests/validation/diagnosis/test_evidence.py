@@ -121,7 +121,7 @@ def test_a_term_comes_and_goes_with_what_is_left(there, rng):
 
 
 def test_a_term_that_shows_by_rounding_alone_stays_away(rng):
-    """What is left of its columns has products with a function's beyond its own size."""
+    """What is left of it has products with a function beyond its own size."""
     ghost, function = term(rng, GEOMETRY, 2), replace(term(rng, "f", 1), sure=True)
     gram = np.full((3, 3), 1.92e-20)
     gram[2] = gram[:, 2] = 3.45e-5  # more than (1.92e-20 5.04e10)^1/2
