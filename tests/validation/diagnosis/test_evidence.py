@@ -121,16 +121,14 @@ def test_a_term_comes_and_goes_with_what_is_left(there, rng):
 
 
 def test_a_term_that_shows_by_rounding_alone_stays_away(rng):
-    """Its columns are another's, but for the last digit: no size of it can be told."""
-    function = replace(term(rng, "function 1", 4), sure=True)
-    residue = function.columns[:, :2] * 1e-15 + 1e-17 * rng.normal(size=(CELLS, 2))
-    ghost = SmallTerm(GEOMETRY, np.zeros(2, int), np.zeros(2, int), residue,
-                      np.full(2, np.nan), -np.inf)  # fmt: skip
-    z = function.columns @ np.full(4, 1.0) + rng.normal(size=CELLS)
-    evidence = Evidence([ghost, function], CELLS)
-    start = Prior((np.zeros(2, bool), np.ones(4, bool)), {}, 0.0, 0.0)
-    along = np.concatenate([t.columns.T @ z for t in evidence.terms])
-    after = evidence.best_of(along, float(z @ z), start)
+    """What is left of it has products with a function beyond its own size."""
+    ghost, function = term(rng, GEOMETRY, 2), replace(term(rng, "f", 1), sure=True)
+    gram = np.full((3, 3), 1.92e-20)
+    gram[2] = gram[:, 2] = 3.45e-5  # more than (1.92e-20 5.04e10)^1/2
+    gram[2, 2] = 5.04e10
+    evidence = Evidence([ghost, function], CELLS, gram)
+    start = Prior((np.zeros(2, bool), np.ones(1, bool)), {}, 0.0, 0.0)
+    after = evidence.best_of(np.array([-5.8e-11, -5.8e-11, 2.4e6]), 400.0, start)
     assert not after.used[0].any()
     assert after.used[1].all()
 
