@@ -6,6 +6,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames
+from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
@@ -134,3 +135,15 @@ def test_a_load_however_large_moves_what_is_pressed_by_the_compliance(size):
     )
     compliance = platform_stiffness(posture).compliance[5, 5]
     assert twice - once == pytest.approx(compliance * size, rel=1e-6)
+
+
+def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
+    """About z at the origin a platform at (0.5, 0.25) moves by (-0.25, 0.5) per rad."""
+    link = MatrixLink(1e6 * np.eye(6))
+    frames = (
+        Frame("hinge", joint="revolute"),
+        Frame("tip", "hinge", [0.5, 0.25, 0.0], link=link),
+    )
+    expected = r"it moves hinge rz; the platform along \[0 0 1 -0.25 0.5 0\] \[rad, m\]"
+    with pytest.raises(FreeMotion, match=expected):
+        solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])

@@ -38,6 +38,16 @@ def test_a_sample_too_small_for_a_quantile_says_so():
     assert np.isfinite(found["lower"])
 
 
+def test_the_mean_of_three_numbers_by_hand():
+    """1, 2, 4: 7/3, deviation sqrt(7/3), Student's t of two degrees 4.302653."""
+    answer = mean([1.0, 2.0, 4.0])
+    assert answer["value"] == pytest.approx(7 / 3, rel=1e-14)
+    assert answer["deviation"] == pytest.approx((7 / 3) ** 0.5, rel=1e-14)
+    half = 4.302653 * (7 / 9) ** 0.5
+    assert answer["upper"] == pytest.approx(7 / 3 + half, rel=1e-6)
+    assert answer["lower"] == pytest.approx(7 / 3 - half, rel=1e-6)
+
+
 def test_intervals_of_means_hold_as_often_as_they_say(rng):
     found = [mean(x) for x in rng.normal(3.0, 2.0, size=(1000, 50))]
     held = np.mean([f["lower"] <= 3.0 <= f["upper"] for f in found])

@@ -136,3 +136,21 @@ def test_present_errors_times_their_factor_just_fit():
     assert sum(shares) == pytest.approx(1.0, rel=1e-6)
     assert shares == sorted(shares, reverse=True)
     assert "everywhere with all errors times" in present_text(found)
+
+
+@pytest.mark.parametrize(("kind", "scale"), [("truncated", 0.25), ("uniform", 1.0)])
+def test_errors_of_a_plan_are_within_their_tolerances_and_as_wide_as_it_says(
+    tmp_path, kind, scale
+):
+    """A normal law of a quarter of the tolerance, cut at four deviations; or even."""
+    path = tmp_path / "plan.toml"
+    path.write_text(
+        f"distribution = '{kind}'\ndeviations = 4.0\nyield = 0.9\n"
+        "[[tolerance]]\nframes = ['leg1.link_a']\ncomponents = ['TX']\n"
+    )
+    plan = read_plan(path, load_robot("irsbot2"))
+    assert plan.sources.scale == pytest.approx(np.full(len(plan.sources.scale), scale))
+    drawn = plan.sources.draw(0, 4000, seed=1)
+    assert 0.9 < np.abs(drawn).max() <= 1.0
+    deviation = 0.25 if kind == "truncated" else 1 / np.sqrt(3)
+    assert np.std(drawn) == pytest.approx(deviation, rel=0.05)
