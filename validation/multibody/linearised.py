@@ -8,8 +8,9 @@ Jacobian, which keeps soft ones apart from stiff ones, and differences of two st
 extrapolated; what changes with the next two is the uncertainty, and the least of all is
 taken (Ridders).
 
-Weak springs hold what nothing resists.  They take k theta theta' of the compliance,
-theta how a joint turns or slides under unit loads, which is added again.
+Weak springs hold what nothing resists, to be solved at all.  Without them the
+compliance is more by k X (1 - k B)^-1 X', X how the platform and B how their joints
+answer to loads on these joints (Woodbury), which is added again.
 """
 
 from collections.abc import Callable
@@ -37,6 +38,7 @@ from validation.multibody.open_robot import Tree
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative size of a gap's derivative that counts as none
+_ROLLS = 1e-4  # of a joint's motion that its idle spring alone does not resist
 _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
 
 
@@ -59,7 +61,7 @@ def linearised_compliance(
     """
     system = model.mbs.systemData
     start = system.GetSystemState()
-    model.hold_idle(model.regularisation.idle)
+    model.hold_idle(0.0)
     for closure in tree.closures:
         _freeze(model, closure)
     try:
@@ -121,7 +123,7 @@ def _compliance(
         )
     K = N.T @ jacobian[:count, :count] @ N
     Z = N @ np.linalg.eigh((K + K.T) / 2)[1]
-    K = stiffness(q, Z, steps[-1])
+    K = _held(model, stiffness(q, Z, steps[-1]), motion(q, Z, steps[-1])[gaps.stop :])
     for _ in range(polish):
         q = q - Z @ _solve(K, Z.T @ forces(q))
     known = [(stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in steps]
@@ -141,11 +143,20 @@ def _compliance(
     return extrapolated[best + 1], changes[best]
 
 
+def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
+    """The modes' stiffness with the idle springs."""
+    return K + model.regularisation.idle * V[6:].T @ V[6:]
+
+
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Compliance from the modes' stiffness and motions, idle springs taken off."""
-    moves = V @ _solve(K, V[:6].T)
-    idle = moves[6:]
-    return moves[:6] + model.regularisation.idle * idle.T @ idle
+    """Compliance from the modes' stiffness and motions, without the idle springs."""
+    whole = V @ _solve(_held(model, K, V), V.T)
+    k, coupled = model.regularisation.idle, whole[:6, 6:]
+    held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
+    # what moves the idle springs alone, such as a rod that rolls, is nobody else's
+    ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
+    ways = coupled @ ways / np.sqrt(held)
+    return whole[:6, :6] + k * ways @ ways.T
 
 
 def _solve(K: NDArray, right: NDArray) -> NDArray:

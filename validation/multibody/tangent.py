@@ -25,8 +25,9 @@ from validation.multibody.simulation import (
 )
 
 # closures' forces are rounded to 1e-16 of their stiffness, and move soft robots by it
-_CLOSING = (1e8, 1e10)  # [N m/rad, N/m], tried in turn
-_IDLE = 1e-6  # [N m/rad, N/m]
+_REGULARISATIONS = (
+    Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +85,8 @@ def simulated_tangent(
     case = _case(posture, model, load, gravity)
     # where no spring is bent its law does not matter, and Exudyn's own is faster
     bent = is_bent(posture.robot.errors, load, gravity)
-    regularisations = [Regularisation(k, _IDLE) for k in _CLOSING]
-    if model.clearances:
-        regularisations = list(WITH_CLEARANCES[:2])
-    *first, last = (replace(one, conservative=bent) for one in regularisations)
+    tried = WITH_CLEARANCES[:2] if model.clearances else _REGULARISATIONS
+    *first, last = (replace(one, conservative=bent) for one in tried)
     for regularisation in first:
         try:
             return _tangent(case, regularisation, steps, started, time_limit)

@@ -24,7 +24,9 @@ def relative(C, other):
 
 
 @pytest.mark.parametrize("links", ["spring", "beam"])
-@pytest.mark.parametrize("name", ["four_bar", "orthoglide"])
+@pytest.mark.parametrize(
+    "name", ["four_bar", pytest.param("orthoglide", marks=pytest.mark.slow)]
+)
 def test_without_load_it_is_the_classical_compliance(name, links):
     posture = home_posture(load_robot(name))
     expected = without_clearance(posture).compliance
