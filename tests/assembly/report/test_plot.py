@@ -63,6 +63,7 @@ def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monkeypatch):
     """The reading budget, the default without a load, is of unloaded robots."""
     import assembly.report.plot

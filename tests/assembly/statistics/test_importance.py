@@ -162,6 +162,7 @@ def test_random_play_is_not_taken_for_importance():
         assert said["importance"]["play"] == expected
 
 
+@pytest.mark.slow
 def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):
     """Rigid parts that meet within clearances of 0.1 mm: errors of 0.3 may not."""
     frames = (

@@ -61,6 +61,7 @@ def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
     assert found.verification["verdict"] == "no draw failed"
 
 
+@pytest.mark.slow
 def test_an_allocation_that_was_killed_asks_again_and_ends_the_same(tmp_path):
     """Killed at its 5th and 9th result; each is computed once, all in all."""
     robot = two_bars()

@@ -278,6 +278,7 @@ def test_the_papers_bar_with_a_distributing_tip():
     assert 0 < solution.stiffness[0, 0] / 1020060 - 1 < 1e-3
 
 
+@pytest.mark.slow
 def test_slender_bars_become_timoshenkos():
     """End effect c r / L: halved when the length doubles (slope -1 within 0.05)."""
     excess = []

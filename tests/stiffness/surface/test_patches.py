@@ -148,6 +148,7 @@ def barrel(facets=32, layers=12):
     return check_surface(points, np.concatenate(triangles), "barrel"), exact
 
 
+@pytest.mark.slow
 def test_facets_of_no_known_shape_are_lifted_toward_it():
     """Middles of 32-sided rings lack 0.48 % of the radius, lifted ones 0.02 %."""
     surface, _ = barrel()
