@@ -21,7 +21,7 @@ def import_(
     ] = "1",
     tip: Annotated[str, typer.Option(help="Where the screw is read, likewise.")] = "2",
     nodes: Annotated[
-        Path | None, typer.Option(help="Places of nodes: number, x, y, z.")
+        Path | None, typer.Option(help="Places of nodes: number, x, y, z; or a deck.")
     ] = None,
     mass: Annotated[
         Path | None, typer.Option(help="Mass matrix of the same freedoms.")
