@@ -58,7 +58,11 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
 def _finish_with_newton() -> None:
     """Newton's method by itself, as it refines a solution of the interior point."""
     from assembly.solvers.cone_solvers import newton
+    from assembly.solvers.dual_newton import Dual
 
-    one, none = np.ones((1, 1)), np.zeros(1)
-    starts, u, y = np.array([0, 1]), np.zeros(1), np.ones(1)
-    newton(one, none, none, 1, starts, 1e-9, 1e-9, 1, 0.0, u, y)
+    none = np.zeros(1)
+    dual = Dual(
+        Gt=np.ones((1, 1)), h=none, d=none, springs=1, starts=np.array([0, 1]),
+        relative=1e-9, absolute=1e-9,
+    )  # fmt: skip
+    newton(dual, 1, 0.0, np.zeros(1), np.ones(1))

@@ -225,7 +225,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
         if not line.strip() or line.lstrip().startswith(("*", "#")):
             continue
         words = re.split(r"[,\s]+", line.strip(" ,\t\r"))
-        if len(words) != (3 if unnamed else 5) and (named or len(words) != 3):
+        if len(words) not in ({3} if unnamed else {5} if named else {3, 5}):
             raise BadInput(
                 f"{path}: line {number}: found {len(words)} words, expected "
                 f"{'' if unnamed else 'node, direction, node, direction, value'}"
@@ -246,11 +246,11 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
             unnamed[where[0], where[1]] = real(path, value)
     if not unnamed:
         return _from_entries(path, named)
-    places_of = path.with_suffix(".dof")
-    order = list(range(1, max(map(max, unnamed)) + 1))
-    matrix = _of_rows(unnamed, {row: row - 1 for row in order})
-    if path.suffix.lower() in {".sti", ".mas"} and places_of.exists():
-        return matrix, _named_by(places_of, matrix.shape[0])
+    last = max(map(max, unnamed))
+    matrix = _of_rows(unnamed, {row: row - 1 for row in range(1, last + 1)})
+    names = path.with_suffix(".dof")
+    if path.suffix.lower() in {".sti", ".mas"} and names.exists():
+        return matrix, _named_by(names, last)
     return matrix, None
 
 

@@ -341,6 +341,12 @@ def test_processes_that_compile_one_kernel_at_once_leave_it_compiled(tmp_path):
     ]  # fmt: skip
 
 
+def test_warming_up_runs_to_its_end(run):
+    """Each computation with the arguments that its kernels take today."""
+    status, _, err = run("warm-up")
+    assert status == 0, err
+
+
 @pytest.mark.slow
 def test_every_compiled_function_is_warmed_up_and_has_one_signature(tmp_path):
     """Others would be compiled later, or by each process under the same name."""
