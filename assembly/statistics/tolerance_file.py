@@ -94,8 +94,9 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
         for place in places:
             if place in rows:
                 label = f"{robot.frames[place[0]].name}.{SCREW[place[1]]}"
-                first = quoted(names[rows[place]])
-                raise table.bad("", f"found {quoted(label)} again, first in {first}")
+                first = rows[place]
+                where = "this table" if first == number else quoted(names[first])
+                raise table.bad("", f"found {quoted(label)} again, first in {where}")
             rows[place] = number
         default = f"{robot.frames[places[0][0]].name}.{SCREW[places[0][1]]}"
         names.append(table.text("name", default))

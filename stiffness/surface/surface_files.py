@@ -66,7 +66,29 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
     from vtkmodules.vtkCommonCore import vtkObject
 
     vtkObject.GlobalWarningDisplayOff()
-    return _boundary(pyvista.read(path))
+    mesh = pyvista.read(path)
+    _check_points(path, mesh)
+    return _boundary(mesh)
+
+
+def _check_points(path: Path, mesh: Any) -> None:
+    """Refuse cells of points that are not there: VTK's filters die of them."""
+    import pyvista
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    cells = []
+    if isinstance(mesh, pyvista.PolyData):
+        cells = [mesh.GetVerts(), mesh.GetLines(), mesh.GetPolys(), mesh.GetStrips()]
+    elif isinstance(mesh, pyvista.UnstructuredGrid):
+        cells = [mesh.GetCells()]
+    for some in cells:
+        used = vtk_to_numpy(some.GetConnectivityArray())
+        wrong = used[(used < 0) | (used >= mesh.n_points)]
+        if len(wrong):
+            raise BadInput(
+                f"{path}: found a cell of point {wrong[0] + 1}, expected 1 to "
+                f"{mesh.n_points}"
+            )
 
 
 def _boundary(mesh: Any) -> tuple[NDArray, NDArray]:

@@ -105,6 +105,7 @@ def test_the_plans_of_the_example_are_read(name):
         (("yield = 0.95", "yield = 1.2"), "yield: found 1.2"),
         (("energy = 2.0", "enrgy = 2.0"), "limits: unknown key"),
         (('"TX"', '"TX", "RX"'), "angles only or lengths only"),
+        (('"TX"', '"TX", "TX"'), 'TX" again, first in this table'),
         (('"leg1.tip"', '"leg1.tap"'), 'no frame "leg1.tap"'),
         (('["RX", "RY"]', '["RX", "RQ"]'), 'components: found "RQ"'),
         (("cost = 2.0", "cost = -2.0"), "cost: found -2.0"),

@@ -186,3 +186,12 @@ def test_a_broken_step_file_is_refused(tmp_path, gmsh):
     path.write_text("rubbish")
     with pytest.raises(BadInput, match="not a readable STEP file|holds no triangles"):
         read_surface(path)
+
+
+@pytest.mark.parametrize("face", ["f 1 2 4", "f 1 2 3\nf 2 3 400000000"])
+def test_a_face_of_points_that_are_not_there_is_refused(face, tmp_path):
+    """VTK's filters read beyond the points, and died of it."""
+    path = tmp_path / "part.obj"
+    path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{face}\n")
+    with pytest.raises(BadInput, match=r"found a cell of point \d+, expected 1 to 3"):
+        read_surface(path)
