@@ -10,7 +10,7 @@ literal reading); ``"free"`` lets them turn about their own axis, as a hinge doe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, overload
+from typing import ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +24,6 @@ from assembly.model.clearance import Compliant
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
-
-if TYPE_CHECKING:
-    pass
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins

@@ -1,5 +1,6 @@
 """Results of many points: a sequence of single ones, and a table of them all."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 One = TypeVar("One")
 
 
-class PointResults(Generic[One]):
+class PointResults(ABC, Generic[One]):
     """Arrays with a row for each of k points; ``[i]`` is one of them.
 
     Attributes:
@@ -27,8 +28,9 @@ class PointResults(Generic[One]):
     def __len__(self) -> int:
         return len(getattr(self, next(iter(self.VARIABLES.values()))))
 
+    @abstractmethod
     def __getitem__(self, i: int) -> One:
-        raise NotImplementedError
+        """Point i."""
 
     def __iter__(self) -> Iterator[One]:
         return (self[i] for i in range(len(self)))

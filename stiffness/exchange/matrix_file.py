@@ -36,6 +36,7 @@ _ENDINGS = (
     ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz"
 )  # fmt: skip
 _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
+_INITIALS = {"stiffness": "K", "mass": "M"}  # of a DMIG's name
 _LARGEST = 2_000_000  # rows
 
 
@@ -296,7 +297,7 @@ def _dmig(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
             if node:
                 row = _whole(path, node), max(1, _whole(path, direction or "0"))
                 entries[row, column] = real(path, value)
-    initial = which[0].upper().replace("S", "K")
+    initial = _INITIALS[which]
     names = [name for name in matrices if forms.get(name, "") in {"1", "6", ""}]
     names = names or list(matrices)
     if len(names) > 1:

@@ -66,9 +66,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
     from vtkmodules.vtkCommonCore import vtkObject
 
     vtkObject.GlobalWarningDisplayOff()
-    mesh = pyvista.read(path)
-    _check_points(path, mesh)
-    return _boundary(mesh)
+    return _boundary(path, pyvista.read(path))
 
 
 def _check_points(path: Path, mesh: Any) -> None:
@@ -91,10 +89,11 @@ def _check_points(path: Path, mesh: Any) -> None:
             )
 
 
-def _boundary(mesh: Any) -> tuple[NDArray, NDArray]:
+def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
     """Points and triangles of a VTK mesh, the boundary of its volume if it has one."""
     import pyvista
 
+    _check_points(path, mesh)
     if not isinstance(mesh, pyvista.PolyData):
         mesh = mesh.extract_surface(algorithm="dataset_surface")
     mesh = mesh.triangulate()
@@ -116,7 +115,7 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
     if not blocks:
         raise BadInput(f"{path}: holds neither triangles nor tetrahedra")
     cells = [(b.type, b.data) for b in blocks]
-    return _boundary(pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
+    return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 
 
 def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
