@@ -1,11 +1,12 @@
 """Gives every reader and every command's options what nobody should, and counts.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
-[--foreign]``. Each input is a sound command of ``fuzz_seeds.py``, or of
-``fuzz_foreign.py``, with its files or its words changed by
-``fuzz_mutations.py``, run in a process
-forked from one that has imported and compiled everything, and judged by
-``fuzz_faults.py``. Input i of a seed is always the same; ``--only I`` shows one.
+[--foreign | --every-option]``. Each input is a sound command of ``fuzz_seeds.py``, or
+of ``fuzz_foreign.py``, with its files or its words changed by ``fuzz_mutations.py``,
+run in a process forked from one that has imported and compiled everything, and judged
+by ``fuzz_faults.py``. Input i of a seed is always the same; ``--only I`` shows one.
+``--every-option`` draws nothing: each option that takes a value, of each command, gets
+each of EXTREMES once.
 
 What is asked of each: an exit status of 0, 1, 2 or 130; with 2 one line that begins
 ``forcefit: `` and no new file; nothing on stderr but that and progress; only whole
@@ -47,6 +48,9 @@ LIMIT = 2.0  # [s] of processor time, then Ctrl-C
 PATIENCE = 60.0  # [s] for one input, then SIGKILL: it hangs
 BATCH = 50  # inputs to a process
 MEMORY = 8 << 30  # [byte] of addresses
+EXTREMES = [
+    "nan", "inf", "-inf", "0", "-1", "1e300", "-1e300", "1e-300", "1e15", "9" * 400, "",
+]  # fmt: skip
 _HEAD = struct.Struct("<Q")
 
 
@@ -56,6 +60,7 @@ class Asked(NamedTuple):
     seed: int
     options: dict[str, list[tuple[str, bool]]]
     commands: list[tuple[int, str]]
+    fixed: list[list[str]]  # words of each input if none is drawn
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
@@ -74,6 +79,28 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
 
     walk(typer.main.get_command(forcefit_command.app), ())
     return faults
+
+
+def every_option(asked: Asked) -> list[list[str]]:
+    """Words of a sound command with one more option, for each option and value."""
+    sound: dict[str, list[str]] = {}
+    for _, command in asked.commands:
+        words = shlex.split(command)
+        sound.setdefault(command_name(words), words)
+    return [
+        [*sound[name], option, value]
+        for name in sorted(asked.options.keys() & sound.keys())
+        for option, takes_value in asked.options[name]
+        if takes_value
+        for value in EXTREMES
+    ]
+
+
+def command_name(words: list[str]) -> str:
+    """The words before a command's arguments."""
+    if words[0] in {"study", "convert"}:
+        return words[0]
+    return " ".join(words[:3] if words[1] == "library" else words[:2])
 
 
 def prepare(folder: Path, commands: list[str]) -> None:
@@ -128,6 +155,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
         os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1
     )
     sys.argv = ["forcefit", *words]
+    sys.warnoptions[:] = ["default"]  # a warning on stderr is a fault here
     try:
         forcefit_command.main()
         status: object = 0
@@ -154,6 +182,8 @@ def run(words: list[str]) -> tuple[object, str, str]:
 
 def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
     """The words of an input, in the current folder, whose files it changes."""
+    if asked.fixed:
+        return asked.fixed[number], ["an option"]
     random = Random(f"{asked.seed}:{number}")
     weights, commands = zip(*asked.commands, strict=True)
     words = shlex.split(random.choices(commands, weights)[0])
@@ -174,9 +204,8 @@ def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
         path = random.choice(files)
         done.append(f"{path}: {change_file(path, random)}")
     if not done or random.random() < 0.1:
-        name = " ".join(words[:3]) if words[1] == "library" else " ".join(words[:2])
-        name = words[0] if words[0] in {"study", "convert"} else name
-        words = change_words(words, asked.options.get(name, []), random)
+        options = asked.options.get(command_name(words), [])
+        words = change_words(words, options, random)
         done.append("words")
     return words, done
 
@@ -285,6 +314,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+")
     parser.add_argument("--foreign", action="store_true", help="other programs' files")
+    parser.add_argument("--every-option", action="store_true", help="nothing is drawn")
     given = parser.parse_args()
 
     def too_late(*_):
@@ -299,7 +329,10 @@ def main() -> int:
         os.environ.pop("DISPLAY", None)
         commands = FOREIGN if given.foreign else COMMANDS
         prepare(seeds, [] if given.only else [command for _, command in commands])
-        asked = Asked(given.seed, options_of(), commands)
+        asked = Asked(given.seed, options_of(), commands, [])
+        if given.every_option:
+            asked = asked._replace(fixed=every_option(asked))
+            given.count = len(asked.fixed)
         if given.only is not None:
             for number, faults in batch(given.only, asked, seeds):
                 print(number, shlex.join(faults["words"]), faults["done"], sep="\n")

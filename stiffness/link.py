@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput
 
+# eigenvalues of a scaled 6 by 6 matrix are known to its size times this
+_ROUNDING = 6 * np.finfo(float).eps
+
 
 @dataclass(frozen=True, eq=False)
 class LinkStiffness:
@@ -121,7 +124,8 @@ def check_definite(who: str, matrix: NDArray) -> None:
         matrix: (6, 6).
 
     Raises:
-        BadInput: it is not symmetric to 1e-6 of its scale, or not positive definite.
+        BadInput: it is not symmetric to 1e-6 of its scale, or not positive definite by
+            more than rounding.
     """
     if not np.all(np.diag(matrix) > 0):
         raise BadInput(f"{who} is not positive definite: its diagonal has a value <= 0")
@@ -133,7 +137,7 @@ def check_definite(who: str, matrix: NDArray) -> None:
             f"but [{column}, {row}] = {matrix[column, row]:.6e}"
         )
     smallest = np.linalg.eigvalsh((unit + unit.T) / 2)[0]
-    if smallest <= 0:
+    if smallest <= _ROUNDING:
         raise BadInput(
             f"{who} is not positive definite: smallest eigenvalue of the scaled "
             f"matrix is {smallest:.1e}"

@@ -53,6 +53,8 @@ def run(capsys, monkeypatch):
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
+        # pytest's own choice of warnings stays
+        monkeypatch.setattr(sys, "warnoptions", ["default"])
         with pytest.raises(SystemExit) as done:
             command.main()
         out, err = capsys.readouterr()

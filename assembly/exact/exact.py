@@ -56,6 +56,7 @@ from assembly.kinematics.se3 import inverse, logarithm
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.linear.energy import solve_assembly
+from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (
     clearance_bounds,
     clearance_excess,
@@ -173,10 +174,12 @@ class ExactAssembly:
         """Where the robot stands nominally."""
         return self.whole
 
-    @property
+    @cached_property
     def energy(self) -> float:
-        """[J] elastic energy stored."""
-        return energy_of(self.placement)
+        """[J] elastic energy stored; 0 where what closures leave open may hide it."""
+        energy, residual = energy_of(self.placement), self.closure_residual()
+        differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
+        return energy if differs else 0.0
 
     @property
     def potential(self) -> float:

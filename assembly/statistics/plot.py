@@ -115,7 +115,8 @@ def _histogram(panel: Any, name: str, values: Any) -> None:
             panel.axvspan(
                 estimate["lower"], estimate["upper"], color=colour, alpha=0.25
             )
-    panel.legend(fontsize=8)
+    # the place with the least behind it takes seconds to find among many bars
+    panel.legend(fontsize=8, loc="upper right")
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":

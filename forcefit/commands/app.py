@@ -1,6 +1,7 @@
 """The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -98,6 +99,9 @@ def warm_up() -> None:
 
 def main() -> None:
     """Run the command; bad input is one line on stderr and exit status 2."""
+    if not sys.warnoptions:
+        # libraries' warnings are for programmers; ``python -W default -m forcefit``
+        warnings.simplefilter("ignore")
     try:
         status = app(prog_name="forcefit", standalone_mode=False)
     except BadInput as error:

@@ -27,7 +27,7 @@ from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.progress import one_thread
 from forcefit.commands.statistics import statistics, tolerances
 from forcefit.commands.sweep import plot, sweep
-from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.writing import (
     PIXELS,
     check_writable,
@@ -184,7 +184,7 @@ def show(
     joint: JointOption = None,
     load: LoadOption = None,
     exaggeration: Annotated[
-        float | None, typer.Option(help="Factor on displacements.", min=1e-6)
+        float | None, typer.Option(help="Factor on displacements.")
     ] = None,
     error_body: Annotated[
         str | None,
@@ -217,8 +217,8 @@ def show(
     ):  # fmt: skip
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
-    if exaggeration is not None and not exaggeration < float("inf"):
-        raise BadInput(f"--exaggeration: found {exaggeration}, expected a finite one")
+    if exaggeration is not None:
+        checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
     loaded = wrench is not None and any(wrench)
     if loaded and error_body is not None and reading == "budget":

@@ -17,7 +17,7 @@ from forcefit.commands.campaign_options import (
 )
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import check_json, check_new_folder, write_json
 
 DEFAULT_STRENGTH = 5.0  # [-] sigmas
@@ -86,7 +86,7 @@ def generate(
     ] = 0.0,
     point: Point = "0,0,0",
     program: Annotated[str, typer.Option(help="multibody | springs")] = "multibody",
-    seed: Annotated[int, typer.Option(help="Of all draws.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of all draws.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
     """Measure a simulated machine with effects its file lacks.
@@ -126,6 +126,7 @@ def generate(
         humidity=humidity,
         reference_point=(x, y, z),
     )
+    checked("--error-size", error_size, "rad", least=0)
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
     check_new_folder(folder)
     check_json(str(truth))

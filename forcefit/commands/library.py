@@ -18,17 +18,15 @@ Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
 @library.command()
 def build(
     spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
-    workers: Annotated[int, typer.Option(help="Processes.")] = 1,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1, max=1024)] = 1,
     json: JsonOption = None,
 ) -> None:
     """Compute the entries of a build file that are not there yet."""
-    from forcefit.inputs.errors import checked
     from stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)
-    count = int(checked("--workers", workers, "1", least=1))
     with progress_bars() as update:
-        files = build_library(wanted, count, partial(update, "entries"))
+        files = build_library(wanted, workers, partial(update, "entries"))
     write_json({"library": str(wanted.folder), "keys": [f.stem for f in files]}, json)
     if json != "-":
         print(f"{len(files)} entries in {wanted.folder}")

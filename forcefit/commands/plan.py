@@ -17,7 +17,7 @@ from forcefit.commands.campaign_options import (
 )
 from forcefit.commands.options import JsonOption, RobotArgument, parse_point
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import checked
 from forcefit.inputs.writing import check_new_folder, write_json
 
 
@@ -38,7 +38,7 @@ def plan(
     rotation: RotationNoise = 1e-5,
     position: PositionNoise = 5e-6,
     point: Point = "0,0,0",
-    seed: Annotated[int, typer.Option(help="Of the rows to choose from.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of the rows to choose from.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
     """Plan rows that tell effects apart.
@@ -52,10 +52,8 @@ def plan(
     from validation.synthetic.generator import write_campaign
 
     x, y, z = parse_point(point, "--point")
-    if not (rotation > 0 and position > 0):
-        wrong = "rotation" if not rotation > 0 else "position"
-        size = rotation if not rotation > 0 else position
-        raise BadInput(f"--{wrong}: found {size:g}, expected > 0")
+    checked("--rotation", rotation, "rad", above=0)
+    checked("--position", position, "m", above=0)
     machine = load_robot(robot)
     check_new_folder(output)
     design = CampaignDesign(

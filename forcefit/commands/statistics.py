@@ -61,7 +61,9 @@ def statistics(
     ] = None,
     importance: Annotated[
         int | None,
-        typer.Option(help="Base draws for the importance of errors.", min=16),
+        typer.Option(
+            help="Base draws for the importance of errors.", min=16, max=1_000_000
+        ),
     ] = None,
     by: Annotated[
         str, typer.Option(help="Importance by: source | frame | kind.")
@@ -77,7 +79,7 @@ def statistics(
         ),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
-    workers: Annotated[int, typer.Option(help="Threads.", min=1)] = 1,
+    workers: Annotated[int, typer.Option(help="Threads.", min=1, max=1024)] = 1,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
     ] = None,

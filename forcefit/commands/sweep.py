@@ -89,7 +89,7 @@ def sweep(
     gravity: GravityOption = None,
     under: UnderOption = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes on this machine.", min=1)
+        int | None, typer.Option(help="Processes on this machine.", min=1, max=1024)
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import POSE, home_posture, pose_components
 from assembly.model.robot import Robot
-from forcefit.inputs.table import BadInput
+from forcefit.inputs.errors import BadInput, checked
 from validation.synthetic.effects import Row
 
 TEMPERATURES = ("swing", "around", "constant")
@@ -53,6 +53,11 @@ class CampaignDesign:
     corners: bool = False
 
     def __post_init__(self) -> None:
+        checked("design: reach", self.reach, "rad", above=0)
+        checked("design: size", self.size, "m/rad", above=0)
+        checked("design: load", self.load, "N", least=0)
+        for value in self.reference_point:
+            checked("design: reference_point", value, "m")
         choices = (
             ("levels", ("many", "one")),
             ("temperature", TEMPERATURES),

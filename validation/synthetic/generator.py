@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import whole_folder, write_text
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
@@ -93,6 +94,13 @@ class Noise:
     missing: float = 0.0
     hidden_frame: float = 0.0
 
+    def __post_init__(self) -> None:
+        checked("noise: rotation", self.rotation, "rad", above=0)
+        checked("noise: position", self.position, "m", above=0)
+        checked("noise: outliers", self.outliers, "rows", least=0)
+        checked("noise: missing", self.missing, "1", least=0, below=1)
+        checked("noise: hidden_frame", self.hidden_frame, "rad, m", least=0)
+
     @property
     def sigma(self) -> NDArray:
         """(6,) [rad, m]."""
@@ -124,12 +132,18 @@ def generate_campaign(
         The campaign.
 
     Raises:
-        BadInput: an unknown effect, or a design that the robot cannot do.
+        BadInput: an unknown effect, more blunders than rows, or a design that the robot
+            cannot do.
         NotApplicable: the robot has nothing that an effect could act on, or the
             readings hardly show it wherever it is drawn.
         SimulationFailed: a row has no equilibrium.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
+    if noise.outliers > design.rows:
+        raise BadInput(
+            f"noise: outliers: found {noise.outliers}, expected at most the "
+            f"{design.rows} rows of the design"
+        )
     rng = np.random.default_rng(seed)
     point = np.array(design.reference_point, dtype=float)
     plan = plan_campaign(robot, design, rng)

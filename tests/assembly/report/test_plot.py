@@ -47,6 +47,7 @@ def test_the_picture_shows_links_bodies_and_the_exaggeration():
         (["-o", "x.png", "--load", "fx=1", "--error-body", "translation", "--reading",
           "budget"], "--reading: found budget with --load"),
         (["-o", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
+        (["-o", "x.png", "--exaggeration", "1e300"], "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
 def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(

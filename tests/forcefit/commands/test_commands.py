@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -367,3 +368,36 @@ for path in sorted(pathlib.Path("assembly").rglob("*.py")):
         cwd=Path(__file__).parents[3], check=True,
     )  # fmt: skip
     assert run.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["assembly", "sweep", "bar.toml", "--grid", "rz=0:1:1", "-o", "x.nc",
+         "--workers", "1025"],
+        ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--workers", "9" * 40],
+        ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--importance", "1" * 9],
+        ["stiffness", "library", "build", "spec.toml", "--workers", "1025"],
+    ],
+)  # fmt: skip
+def test_numbers_that_no_machine_has_are_refused(run, tmp_path, monkeypatch, words):
+    """A million processes would be begun one by one, for minutes."""
+    monkeypatch.chdir(tmp_path)
+    status, _, err = run(*words)
+    assert status == 2
+    assert f"{words[-2]}': {words[-1]} is not in the range" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_warnings_of_libraries_are_for_programmers(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["forcefit", "--version"])
+    with warnings.catch_warnings():
+        monkeypatch.setattr(sys, "warnoptions", ["default"])
+        with pytest.raises(SystemExit):
+            command.main()
+        with pytest.raises(UserWarning):  # as pytest is told
+            warnings.warn("a library's", stacklevel=1)
+        monkeypatch.setattr(sys, "warnoptions", [])
+        with pytest.raises(SystemExit):
+            command.main()
+        warnings.warn("a library's", stacklevel=1)

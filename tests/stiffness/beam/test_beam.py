@@ -191,6 +191,10 @@ def test_turning_a_link_keeps_its_energy(rng):
         turn_link(link, np.diag([1, 1, -1]))
 
 
+PARALLEL = np.eye(6)
+PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("C", "message"),
     [
@@ -198,6 +202,8 @@ def test_turning_a_link_keeps_its_energy(rng):
         (np.eye(6) + np.eye(6, k=1), "not symmetric: [0, 1] = 1.000000e+00 but"),
         (-np.eye(6), "not positive definite"),
         (np.ones((6, 6)), "not positive definite"),
+        # least eigenvalue 1.1e-16: rounding alone keeps it above zero
+        (1e-9 * PARALLEL, "not positive definite"),
         (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
     ],
 )

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.inputs.errors import BadInput
 from validation.synthetic.design import CampaignDesign
 from validation.synthetic.effects import Row
-from validation.synthetic.generator import generate_campaign
+from validation.synthetic.generator import Noise, generate_campaign
 from validation.synthetic.machine import Hidden, simulate_readings
 
 pytestmark = pytest.mark.exudyn
@@ -294,3 +295,47 @@ def test_errors_of_the_declared_robot_and_an_effect_add_up(added):
     ):  # fmt: skip
         perfect, real = (added(name, given, row(0.4), r) for r in (None, wrong))
         close(real, perfect, 0, 3e-8)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Noise(rotation=-math.inf), "noise: rotation: found -inf"),
+        (lambda: Noise(position=0.0), "noise: position: found 0"),
+        (lambda: Noise(missing=math.nan), "noise: missing: found nan"),
+        (lambda: Noise(missing=1.0), "noise: missing: found 1"),
+        (lambda: Noise(outliers=-1), "noise: outliers: found -1"),
+        (lambda: Noise(hidden_frame=math.inf), "noise: hidden_frame: found inf"),
+        (lambda: CampaignDesign(reach=-math.inf), "design: reach: found -inf"),
+        (lambda: CampaignDesign(size=math.nan), "design: size: found nan"),
+        (lambda: CampaignDesign(load=-1.0), "design: load: found -1"),
+        (lambda: CampaignDesign(reference_point=(0.0, math.inf, 0.0)),
+         "design: reference_point: found inf"),
+        (lambda: generate_campaign(
+            one_link(), {}, CampaignDesign(configurations=2, rows=4),
+            Noise(outliers=5)),
+         "outliers: found 5, expected at most the 4 rows"),
+    ],
+)  # fmt: skip
+def test_a_campaign_that_nobody_could_measure_is_refused(make, message):
+    with pytest.raises(BadInput) as caught:
+        make()
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--rotation", "-inf"], "rotation: found -inf"),
+        (["--error-size", "nan"], "--error-size: found nan"),
+        (["--outliers", "200"], "found 200, expected at most the 116 rows"),
+        (["--seed", "-1"], "--seed"),
+    ],
+)
+def test_the_command_refuses_them_and_writes_nothing(run, tmp_path, words, message):
+    folder, truth = tmp_path / "c", tmp_path / "t.json"
+    generate = ["validation", "generate", "arm6", folder, "--truth", truth]
+    status, _, err = run(*generate, "--program", "springs", *words)
+    assert status == 2
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
