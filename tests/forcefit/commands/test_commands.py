@@ -385,7 +385,7 @@ def test_numbers_that_no_machine_has_are_refused(run, tmp_path, monkeypatch, wor
     monkeypatch.chdir(tmp_path)
     status, _, err = run(*words)
     assert status == 2
-    assert f"{words[-2]}': {words[-1]} is not in the range" in err
+    assert f"'{words[-2]}'" in err
     assert list(tmp_path.iterdir()) == []
 
 
