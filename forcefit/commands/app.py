@@ -11,7 +11,7 @@ from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
-from forcefit.inputs.errors import BadInput, one_line
+from forcefit.inputs.errors import BadInput, one_line, quoted
 from forcefit.inputs.writing import write_json
 
 app = typer.Typer(
@@ -122,8 +122,15 @@ def main() -> None:
         # an option misspelt or missing: the parser's own kind of error
         if not hasattr(error, "format_message"):
             raise
-        sys.exit(_complain(error.format_message(), 2))
+        sys.exit(_complain(_with_found(error.format_message(), error), 2))
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _with_found(message: str, error: Exception) -> str:
+    """A parser's message and the value refused, which newer ones leave out."""
+    refused: list[dict] = getattr(error.__cause__, "errors", list)()
+    values = [str(one.get("input")) for one in refused[:1] if one.get("input")]
+    return "; ".join([message, *(f"found {quoted(v)}" for v in values)])
 
 
 def _complain(message: str, status: int) -> int:

@@ -17,7 +17,12 @@ def diagnose(
     json: JsonOption = None,
     report: ReportOption = None,
     calibrate: Annotated[
-        int, typer.Option(help="Simulate this many campaigns on the same design.")
+        int,
+        typer.Option(
+            help="Simulate this many campaigns on the same design.",
+            min=0,
+            max=1_000_000,
+        ),
     ] = 0,
     finite_motions: Annotated[
         bool,

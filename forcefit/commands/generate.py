@@ -62,8 +62,12 @@ def generate(
             "--effect", help="Hidden: NAME, or NAME=MULTIPLE of the noise (5)."
         ),
     ] = None,
-    configurations: Annotated[int, typer.Option(help="Different ones.")] = 24,
-    rows: Annotated[int, typer.Option(help="Measurements, interleaved.")] = 116,
+    configurations: Annotated[
+        int, typer.Option(help="Different ones.", min=1, max=1_000_000)
+    ] = 24,
+    rows: Annotated[
+        int, typer.Option(help="Measurements, interleaved.", min=1, max=1_000_000)
+    ] = 116,
     reach: Reach = 0.6,
     stroke: Stroke = 0.1,
     force: Force = 40.0,
@@ -79,7 +83,7 @@ def generate(
         float,
         typer.Option(help="[rad] Declared errors drawn up to it, 0.5 mm per mrad."),
     ] = 0.0,
-    outliers: Annotated[int, typer.Option(help="Rows spoilt.")] = 0,
+    outliers: Annotated[int, typer.Option(help="Rows spoilt.", min=0)] = 0,
     missing: Annotated[float, typer.Option(help="Share of empty cells.")] = 0.0,
     hidden_frame: Annotated[
         float, typer.Option(help="[rad, m] Size of an unknown measuring frame.")

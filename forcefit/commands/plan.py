@@ -26,9 +26,10 @@ def plan(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Campaign folder to be written.")
     ],
-    rows: Annotated[int, typer.Option(help="Measurements.")] = 60,
+    rows: Annotated[int, typer.Option(help="Measurements.", min=1, max=1_000_000)] = 60,
     configurations: Annotated[
-        int, typer.Option(help="Different ones to choose from.")
+        int,
+        typer.Option(help="Different ones to choose from.", min=1, max=1_000_000),
     ] = 120,
     reach: Reach = 0.6,
     stroke: Stroke = 0.1,

@@ -49,7 +49,9 @@ def statistics(
     joint: JointOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
-    draws: Annotated[int, typer.Option(help="Draws of all errors.", min=2)] = 10_000,
+    draws: Annotated[
+        int, typer.Option(help="Draws of all errors.", min=2, max=10**9)
+    ] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     play: PlayOption = "worst",
     limit: Annotated[
@@ -189,7 +191,8 @@ def tolerances(
     ] = "free",
     play: PlayOption = "worst",
     fresh: Annotated[
-        int, typer.Option(help="Fresh draws that verify the tolerances.", min=0)
+        int,
+        typer.Option(help="Fresh draws that verify the tolerances.", min=0, max=10**9),
     ] = 2000,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")

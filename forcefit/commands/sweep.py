@@ -50,7 +50,8 @@ def sweep(
         Path | None, typer.Option(help="How errors are distributed (TOML).")
     ] = None,
     draws: Annotated[
-        int | None, typer.Option(help="Draws of errors at each point.", min=1)
+        int | None,
+        typer.Option(help="Draws of errors at each point.", min=1, max=10**9),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     reading: Annotated[
@@ -77,7 +78,7 @@ def sweep(
         ),
     ] = None,
     frequencies: Annotated[
-        int | None, typer.Option(help="Natural frequencies, so many.")
+        int | None, typer.Option(help="Natural frequencies, so many.", min=1, max=1000)
     ] = None,
     near: Annotated[
         float, typer.Option(help="Distance below which a singularity is named.")

@@ -375,6 +375,8 @@ for path in sorted(pathlib.Path("assembly").rglob("*.py")):
     [
         ["assembly", "sweep", "bar.toml", "--grid", "rz=0:1:1", "-o", "x.nc",
          "--workers", "1025"],
+        ["validation", "diagnose", "campaign", "--calibrate", "1" * 9],
+        ["validation", "plan", "arm6", "-o", "x", "--rows", "0"],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--workers", "9" * 40],
         ["assembly", "statistics", "bar.toml", "-o", "x.nc", "--importance", "1" * 9],
         ["stiffness", "library", "build", "spec.toml", "--workers", "1025"],
@@ -386,6 +388,7 @@ def test_numbers_that_no_machine_has_are_refused(run, tmp_path, monkeypatch, wor
     status, _, err = run(*words)
     assert status == 2
     assert f"'{words[-2]}'" in err
+    assert words[-1] in err
     assert list(tmp_path.iterdir()) == []
 
 
