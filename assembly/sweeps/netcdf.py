@@ -6,6 +6,7 @@ from io import SEEK_SET, BytesIO, FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
@@ -79,12 +80,20 @@ def stored_dataset(path: Path | str) -> StoredDataset:
         beside = {*file.dimensions, *attrs.get("coordinates", "").split()}
         return StoredDataset(
             {
-                name: Stored(one.dimensions, one[...], dict(one.attrs))
+                name: Stored(one.dimensions, _decoded(one[...]), dict(one.attrs))
                 for name, one in file.variables.items()
                 if name not in beside
             },
             attrs,
         )
+
+
+def _decoded(values: NDArray) -> NDArray:
+    """Texts of a variable, which HDF5 hands over as bytes; numbers as they are."""
+    if values.dtype != object:
+        return values
+    texts = [text.decode() for text in values.ravel()]
+    return np.array(texts, dtype=object).reshape(values.shape)
 
 
 def forgive_damaged_files() -> None:

@@ -181,6 +181,14 @@ def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_first_reason_why_not_is_told(run, tmp_path):
+    robot, file = tmp_path / "r.toml", tmp_path / "x.nc"
+    robot.write_text(STIFF)
+    status, out, _ = run("assembly", "sweep", robot, "--grid", "q.drive=0", "-o", file)
+    assert status == 0
+    assert "\ncannot assemble, for one: a rigid part stays open by 0.0001" in out
+
+
 def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     words = ["--grid", "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture]
