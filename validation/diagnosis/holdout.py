@@ -9,6 +9,7 @@ from validation.campaign.campaign import Campaign
 
 _FEWEST = 8  # configurations from which blocks can be kept aside
 _SHARE = 4  # one block in this many
+_TAIL = 4.0  # degrees of freedom of Student's t
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,16 +66,28 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     return order * count // len(campaign), "spans of time"
 
 
-def gain_over_blocks(less: NDArray, blocks: NDArray) -> tuple[float, float]:
-    """How much smaller errors are in all, by the scatter between blocks.
+def gain_over_blocks(
+    before: NDArray, after: NDArray, blocks: NDArray
+) -> tuple[float, float]:
+    """How much likelier readings are foretold, by the scatter between blocks.
+
+    Errors are those of Student's t, so that a reading which neither model foretells,
+    a blunder or one next to a singularity, does not decide alone.
 
     Args:
-        less: (N,) by which each cell's squared error is smaller.
+        before: (N,) squared errors of the cells, over that of the noise.
+        after: (N,) the same by another model.
         blocks: (N,) whose each cell is, see :func:`blocks_of`.
 
     Returns:
-        The sum, and its standard error; zero of a single block.
+        Twice the logarithm of the likelihoods' ratio, and its standard error; zero of
+        a single block.  Of errors of about one sigma, the sum by which squares fall.
+
+    Sources:
+        Lange, Little, Taylor (1989), Robust statistical modeling using the t
+        distribution, J. Am. Stat. Assoc. 84, 881.
     """
+    less = (_TAIL + 1) * (np.log1p(before / _TAIL) - np.log1p(after / _TAIL))
     gains = np.array([float(less[blocks == name].sum()) for name in np.unique(blocks)])
     error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
     return float(gains.sum()), float(error)

@@ -168,7 +168,7 @@ class Remainder:
             one: any.
 
         Returns:
-            Whether squared errors in folds over blocks of rows fall, beside all that is
+            Whether errors in folds over blocks of rows fall, beside all that is
             known fitted anew in each.
         """
         where = blocks_of(self.campaign)[0][np.nonzero(self.campaign.cells)[0]]
@@ -184,12 +184,12 @@ class Remainder:
         known = X.shape[1] - len(size)
         z = self._all.residual[self._cells]
         gram = X.T @ X
-        less = np.zeros(len(where))
+        squares = np.zeros((2, len(where)))
         for fold in np.array_split(names, min(_FOLDS, len(names))):
             kept = np.isin(where, fold)
-            without, beside = _foretold(X, z, gram, kept, known)
-            less[kept] = (without - beside) / self._noise**2
-        gain, error = gain_over_blocks(less, where)
+            squares[:, kept] = _foretold(X, z, gram, kept, known)
+        without, beside = squares / self._noise**2
+        gain, error = gain_over_blocks(without, beside, where)
         return gain > _PROVEN * error
 
     def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:

@@ -113,7 +113,7 @@ def _foretells(
     ]
     rows = np.nonzero(judged.cells)[0]
     where = blocks_of(campaign)[0][held][rows]
-    gain, error = gain_over_blocks(squares[0] - squares[1], where)
+    gain, error = gain_over_blocks(squares[0], squares[1], where)
     return gain > _ERROR * error
 
 
