@@ -50,7 +50,7 @@ from validation.multibody.tangent import simulated_tangent
 
 SIZES = (0.1, 0.3, 1.0)
 LEGS = {1: 3, 2: 6, 3: 7}  # joints of each leg, so that loops can move
-TIME_LIMIT = 10.0  # [s] of one simulation
+TIME_LIMIT = 20.0  # [s] of one simulation
 ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
 _FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
