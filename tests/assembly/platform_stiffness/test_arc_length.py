@@ -48,7 +48,7 @@ def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
 
 
 def test_two_bars_on_torsion_springs_branch_at_both_their_loads():
-    """k / L times (3 - sqrt 5) / 2 and (3 + sqrt 5) / 2: det [[2k - PL, -k], ..] = 0."""
+    """(3 - sqrt 5) k / 2L and (3 + sqrt 5) k / 2L: det [[2k - PL, -k], ..] = 0."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     foot = Frame("foot", joint_stiffness=K)
     knee = Frame("knee", "foot", [0.4, 0, 0], joint_stiffness=K)
