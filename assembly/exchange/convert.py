@@ -10,6 +10,7 @@ kind          read                                                        writte
 ============  ==========================================================  ==========
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,6 +35,7 @@ from assembly.exchange.loops_file import (
     find_loops_file,
     loops_text,
     read_loops,
+    with_points,
 )
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
@@ -74,6 +76,7 @@ class Conversion:
         drives_held: whether the drives stand where the file has them.
         difference: largest of any body's pose in 100 random postures, read back.
         left_out: what the new file cannot hold, in words.
+        taken: what the files leave open, and what was taken, in words.
     """
 
     robot: Robot
@@ -83,6 +86,7 @@ class Conversion:
     drives_held: bool
     difference: float
     left_out: tuple[str, ...]
+    taken: tuple[str, ...] = ()
 
     def table(self) -> dict[str, Any]:
         """Plain values for ``--json``."""
@@ -99,6 +103,7 @@ class Conversion:
             },
             "largest_difference": self.difference,
             "left_out": list(self.left_out),
+            "taken": list(self.taken),
         }
 
     def text(self) -> str:
@@ -116,6 +121,7 @@ class Conversion:
                 f"home: loops open by {self.open_before:.2g} rad or m in the file's "
                 f"own, {self.open_after:.1e} in the one found{moved}"
             )
+        lines += [f"taken: {line}" for line in self.taken]
         lines += [f"left out: {line}" for line in self.left_out]
         return "\n".join([*lines, f"written: {', '.join(map(str, self.files))}"])
 
@@ -125,6 +131,7 @@ def convert(
     target: Path | str,
     loops: Path | str | None = None,
     overlay: Path | str | None = None,
+    points: Sequence[str] | None = None,
 ) -> Conversion:
     """Convert a robot between a robot file and the files of other programs.
 
@@ -134,6 +141,10 @@ def convert(
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
         loops: YAML with ``closed_loop``, for files that have it not beside them.
         overlay: TOML with elasticity, clearances, errors of frames by name.
+        points: names of loops that meet only in a point, beside those of type 3d; an
+            empty one takes the types as they stand.  Without it they are taken so too,
+            unless every loop is said to be 6d and they cannot close: then all are
+            points, and the answer says so.
 
     Returns:
         What was written and how well it is what was read.
@@ -152,7 +163,9 @@ def convert(
     if beside is not None:
         check_writable(beside, _LOOPS)
     if source.suffix.lower() in _READERS:
-        conversion, placed = _from_others(source, loops, overlay)
+        conversion, placed = _from_others(source, loops, overlay, points)
+    elif points:
+        raise BadInput(f"--points: found some beside {source}, which says its own")
     elif loops is not None:
         raise BadInput(f"--loops: found one beside {source}, which says its own loops")
     else:
@@ -161,18 +174,41 @@ def convert(
 
 
 def _from_others(
-    source: Path, loops: Path | str | None, overlay: Path | str | None
+    source: Path,
+    loops: Path | str | None,
+    overlay: Path | str | None,
+    points: Sequence[str] | None,
 ) -> tuple[Conversion, RobotAndMechanism]:
     """The robot of a file of another program."""
     ending = source.suffix.lower()
     if loops is None and ending == ".urdf":
         loops = find_loops_file(source)
     beside = None if loops is None else read_loops(loops)
-    mechanism = _READERS[ending](source, beside)
+    if points:
+        if beside is None:
+            raise BadInput(f"--points: found some, but {source} has no loops file")
+        beside = with_points(beside, points)
+    read = _READERS[ending]
+    mechanism, taken = read(source, beside), tuple[str, ...]()
     before = loop_residual(mechanism, mechanism.home)
     home, held = mechanism.home, True
     if mechanism.loops:
-        home, held = close_loops(mechanism, str(source))
+        try:
+            home, held = close_loops(mechanism, str(source))
+        except BadInput as error:
+            if points is not None or beside is None or not beside.as_generated:
+                raise
+            mechanism = read(source, with_points(beside, ["all"]))
+            try:
+                home, held = close_loops(mechanism, str(source))
+            except BadInput:
+                raise error from None
+            before = loop_residual(mechanism, mechanism.home)
+            taken = (
+                "every loop for a point (3d): all of them are said to be 6d, which is "
+                "what generators write, and so they cannot close "
+                f"({str(error).removeprefix(f'{source}: ')}); --points says which are",
+            )
     mechanism = points_as_joints(mechanism, home)
     placed = robot_of_mechanism(mechanism)
     content = robot_table(placed.robot)
@@ -200,6 +236,7 @@ def _from_others(
         drives_held=held,
         difference=0.0,
         left_out=tuple(left_out),
+        taken=taken,
     )
     return conversion, placed
 

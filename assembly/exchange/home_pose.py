@@ -67,7 +67,8 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
             f"{file}: {loop.name} {ends} cannot close, not even alone: at best it is "
-            f"open by {residual:.3g} rad or m; expected more joints, or type 3d"
+            f"open by {residual:.3g} rad or m; expected more joints, or type 3d "
+            "(--points)"
         )
 
 

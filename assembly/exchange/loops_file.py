@@ -5,10 +5,17 @@ links that coincide, ``type`` says ``6d`` or ``3d`` (only the points), ``name_mo
 names the drives; ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a
 UJOINT_XY, _YZ, _ZX, which CAD exports write as one turn.  ``home`` (coordinates by
 joint) and ``platform`` are ours; other readers pass over them.
+
+The authors' generator writes ``6d`` for every loop, "that is not very general", and
+leaves the rest to be corrected by hand.  So a file that says nothing else may not mean
+it: its loops count as points where they cannot close otherwise.
+
+Sources:
+    Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +52,11 @@ class LoopsFile:
     home: Mapping[str, float] = field(default_factory=dict)
     platform: str | None = None
     passed_over: tuple[str, ...] = ()
+
+    @property
+    def as_generated(self) -> bool:
+        """Whether no loop is said to be a point, which may be nobody's decision."""
+        return bool(self.pairs) and not any(self.points)
 
 
 def find_loops_file(robot: Path) -> Path | None:
@@ -91,6 +103,34 @@ def read_loops(path: Path | str) -> LoopsFile:
         platform=table.text("platform") if table.has("platform") else None,
         passed_over=tuple(str(k) for k in table.content if k not in _KNOWN),
     )
+
+
+def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
+    """The same loops, some of which meet only in a point, whatever their type says.
+
+    Args:
+        loops: of a file.
+        names: ``loop1`` for the first, or the name of either end; ``all``.
+
+    Returns:
+        The loops.
+
+    Raises:
+        BadInput: a name is of no loop.
+    """
+    of_loop: dict[str, set[int]] = {"all": set(range(len(loops.pairs)))}
+    for i, pair in enumerate(loops.pairs):
+        for name in (f"loop{i + 1}", *pair):
+            of_loop.setdefault(name, set()).add(i)
+    for name in names:
+        if name not in of_loop:
+            raise BadInput(
+                f"--points: found {quoted(name)}, expected loops of {loops.file}"
+                f"{nearest(name, of_loop)}"
+            )
+    chosen = set().union(*(of_loop[name] for name in names))
+    points = tuple(point or i in chosen for i, point in enumerate(loops.points))
+    return replace(loops, points=points)
 
 
 def loops_text(loops: LoopsFile) -> str:

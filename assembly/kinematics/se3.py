@@ -26,6 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 from stiffness.screws import rotation_vector, skew, transform
 
 _SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
+_STUMPFF = np.array([
+    [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
+])  # fmt: skip
 _ROUNDING = 1e-16  # [-] below which the series of the second derivative ends
 
 
@@ -118,16 +121,18 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     w = np.asarray(wrench, dtype=float)[..., None]
     orders = _orders(np.asarray(screw, dtype=float))
     powers = [np.broadcast_to(np.eye(6), ad.shape)]
-    for _ in range(orders):
+    for _ in range(orders - 1):
         powers.append(powers[-1] @ ad)
-    Z = np.zeros(ad.shape)
-    for k in range(orders - 1):
-        # w.ad^k [h, ad^(n-1-k) h] / (n+1)! summed over n >= k + 2
-        rest = sum(
-            powers[n - 1 - k] / math.factorial(n + 1) for n in range(k + 2, orders + 1)
-        )  # fmt: skip
-        on_power = (np.swapaxes(powers[k], -1, -2) @ w)[..., 0]
-        Z = Z + bracket_form(on_power) @ rest
+    # w.ad^k [h, ad^j h] / (k + j + 2)! summed over k + j < orders, j not 0
+    factors = [
+        [1 / math.factorial(k + j + 2) if 0 < j < orders - k else 0.0
+         for j in range(orders)]
+        for k in range(orders - 1)
+    ]  # fmt: skip
+    stacked = np.stack(powers[:orders])
+    rests = np.tensordot(factors, stacked, axes=1)
+    on_powers = (np.swapaxes(stacked[:-1], -1, -2) @ w)[..., 0]
+    Z = (bracket_form(on_powers) @ rests).sum(axis=0)
     return (Z + np.swapaxes(Z, -1, -2)) / 2
 
 
@@ -171,15 +176,14 @@ def stumpff(turn: NDArray) -> list[NDArray]:
     squared = np.sum(turn * turn, axis=-1)[..., None, None]
     large = squared > 1.0
     small = np.where(large, 0.0, squared)
-    functions = []
     most, terms = float(small.max(initial=0.0)), 2
     while terms < _SERIES and most**terms / math.factorial(2 * terms) > 1e-18:
         terms += 1
-    for k in range(6):
-        value = np.zeros_like(small)
-        for j in reversed(range(terms)):
-            value = 1 / math.factorial(2 * j + k) - value * small
-        functions.append(value)
+    series = _STUMPFF[:terms].reshape(terms, 6, *(1,) * small.ndim)
+    values = np.zeros((6, *small.shape))
+    for factors in series[::-1]:
+        values = factors - values * small
+    functions = list(values)
     if large.any():
         a2 = np.where(large, squared, 1.0)
         a = np.sqrt(a2)

@@ -30,6 +30,14 @@ def convert(
         Path | None,
         typer.Option(help="Elasticity, clearances and errors by frame (TOML)."),
     ] = None,
+    points: Annotated[
+        str | None,
+        typer.Option(
+            help="Loops that meet only in a point, whatever their type: loop1 for the "
+            "first, or a name of an end, between commas; all; none: types as they "
+            "stand."
+        ),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Convert a robot from or to URDF, MJCF and SDF.
@@ -39,7 +47,11 @@ def convert(
     """
     from assembly.exchange.convert import convert as convert_robot
 
-    conversion = convert_robot(source, output, loops, overlay)
+    named = None
+    if points is not None:
+        names = [name.strip() for name in points.split(",")]
+        named = [] if names == ["none"] else names
+    conversion = convert_robot(source, output, loops, overlay, named)
     write_json(conversion.table(), json)
     if json != "-":
         print(conversion.text())

@@ -33,8 +33,8 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 
     Returns:
         (6,) [N m, N] in the ends' mean axes, half the screw's shift along them from
-        either end, where Exudyn applies it: the gradient of screw.K screw / 2 at the
-        near end, but for a couple of shift x force times turn^2 / 24 at the far one.
+        the near end, where Exudyn applies it: the gradient of screw.K screw / 2.  At
+        the far end :func:`far_couple` has to be added.
     """
     a, b, c, d, e, g = screw
     w, v = (a, b, c), (d, e, g)
@@ -52,6 +52,34 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
         term = _bracket(w, v, *_bracket(w, v, *term))
     moment, force = _turned_back(w, turn, moment), _turned_back(w, turn, force)
     return [*_sum(moment, -0.5, _cross(v, force)), *force]
+
+
+def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
+    """What Exudyn leaves out at a spring's far end.
+
+    It applies the wrench half the screw's shift from either end.  These two points are
+    one only without a turn: a chord is shorter than its arc, across the turn's axis by
+    sin(t/2) / (t/2), so that the wrenches on the two ends are not opposite ones.
+
+    Args:
+        screw: (6,) [rad, m] logarithm of the far end seen from the near one.
+        force: (3,) [N] of :func:`middle_wrench`, in the ends' mean axes.
+
+    Returns:
+        (3,) [N m] a moment on the far end, in its own axes.
+    """
+    a, b, c, *_ = screw
+    w, v = (a, b, c), (screw[3], screw[4], screw[5])
+    turn = math.hypot(*w)
+    if not turn:
+        return [0.0] * 3
+    # cancellation: sin x / x - 1 by its series, x below half a radian or so
+    x = turn * turn / 4
+    short = -x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
+    along = sum(p * q for p, q in zip(w, v, strict=True)) / (turn * turn)
+    across = _sum(v, -along, w)
+    couple = _cross(across, (force[0], force[1], force[2]))
+    return [short * m for m in _turned_back(w, turn, couple)]
 
 
 def _bracket(w: _Vector, v: _Vector, m: _Vector, f: _Vector) -> tuple[_Vector, _Vector]:

@@ -11,14 +11,13 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from validation.multibody.conservative_springs import middle_wrench
+from validation.multibody.conservative_springs import far_couple, middle_wrench
 from validation.multibody.contact import NARROW, WIDE, JointClearance, cone_forces
 from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
@@ -118,7 +117,7 @@ class Model:
         spring = self._connect(markers, K)
         # about or along one axis Exudyn's own law is the gradient
         if self.regularisation.conservative and soft.sum() > 1:
-            self.set_law(spring, partial(middle_wrench, K.tolist()))
+            self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
@@ -246,6 +245,25 @@ class Model:
     def transform(self, T: NDArray) -> Any:
         """Exudyn's own kind of transform."""
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
+
+    def _follow_energy(self, spring: int, far: int, K: NDArray) -> None:
+        """Let a spring's wrenches be the gradient of its energy, on both its ends."""
+        rows, lacking = K.tolist(), [0.0] * 3
+
+        def law(screw: list[float]) -> list[float]:
+            wrench = middle_wrench(rows, screw)
+            lacking[:] = far_couple(screw, wrench[3:])
+            return wrench
+
+        # Exudyn evaluates connectors before loads.  Where it differentiates loads it
+        # moves the far end alone, for which the couple is not to change: it hardly
+        # does if the near end moves along
+        load = self.item.LoadTorqueVector(
+            markerNumber=far, bodyFixed=True,
+            loadVectorUserFunction=lambda mbs, t, load: lacking,
+        )  # fmt: skip
+        self.mbs.AddLoad(load)
+        self.set_law(spring, law)
 
     def _connect(self, markers: list[int], K: NDArray) -> int:
         """A 6 by 6 spring between two markers."""

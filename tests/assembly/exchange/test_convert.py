@@ -33,20 +33,80 @@ def test_a_loop_that_cannot_close_is_named_and_nothing_is_written(tmp_path):
     """Kangaroo's file says 6d where a rod needs a ball: three turns cannot close it."""
     target = tmp_path / "robot.toml"
     with pytest.raises(BadInput, match=r"loop2 .* cannot close, not even alone"):
-        convert(example("kangaroo_like"), target)
+        convert(example("kangaroo_like"), target, points=())
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
-def test_kangaroo_closes_with_the_loops_that_its_rods_need(tmp_path):
-    """A later file of the same authors has balls (3d) at the ends of these rods."""
-    path = example("kangaroo_like")
-    text = path.with_suffix(".yaml").read_text()
-    loops = tmp_path / "loops.yaml"
-    loops.write_text(text.replace("'6d'", "'3d'"))
-    answer = convert(path, tmp_path / "robot.toml", loops=loops)
+def test_types_as_a_generator_writes_them_may_be_points(tmp_path):
+    """Kangaroo closes without a word more, and the answer says what was taken."""
+    answer = convert(example("kangaroo_like"), tmp_path / "robot.toml")
     assert answer.open_after < 1e-9
     assert answer.difference < 1e-12
+    (taken,) = answer.taken
+    assert taken.startswith("every loop for a point (3d)")
+    assert "loop2" in taken
+
+
+@pytest.mark.slow
+def test_kangaroo_closes_with_the_points_of_its_authors_later_file(tmp_path):
+    """There loops 3, 4 and 5 are 6d and all others 3d (kangaroo_like_2legs)."""
+    points = [f"closedloop{i}_A" for i in (0, 2, 6, 7, 8, 9, 10, 11)]
+    answer = convert(example("kangaroo_like"), tmp_path / "robot.toml", points=points)
+    assert answer.taken == ()
+    assert answer.open_after < 1e-9
+    assert answer.difference < 1e-12
+
+
+SPATIAL_LOOP = """<robot name="bent"><link name="base"/><link name="a"/><link name="b"/>
+<link name="c"/><link name="end"/>
+<joint name="one" type="revolute"><parent link="base"/><child link="a"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="two" type="revolute"><parent link="a"/><child link="b"/>
+<origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+<joint name="three" type="revolute"><parent link="b"/><child link="c"/>
+<origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+<joint name="tip" type="fixed"><parent link="c"/><child link="end"/>
+<origin xyz="1 0 0"/></joint>
+<link name="goal"/><joint name="ground" type="fixed"><parent link="base"/>
+<child link="goal"/><origin xyz="1.5 0 0" rpy="0.1 0 0"/></joint></robot>"""
+
+
+def bent_loop(folder, types):
+    """Three bars in a plane that end on a tilted frame: only the points can meet."""
+    path = folder / "robot.urdf"
+    path.write_text(SPATIAL_LOOP)
+    loops = f"closed_loop: [[end, goal]]\n{types}name_mot: [one]\n"
+    path.with_suffix(".yaml").write_text(loops)
+    return path
+
+
+@pytest.mark.parametrize("types", ["", "type: ['6d']\n"])
+def test_a_loop_of_a_default_type_may_be_a_point(types, tmp_path):
+    path = bent_loop(tmp_path, types)
+    answer = convert(path, tmp_path / "robot.toml")
+    assert answer.open_after < 1e-9
+    assert "loop1" in answer.text()
+    assert answer.table()["taken"] == list(answer.taken)
+    assert convert(path, tmp_path / "robot.toml", points=["goal"]).taken == ()
+    with pytest.raises(BadInput, match="loop1 .* cannot close"):
+        convert(path, tmp_path / "robot.toml", points=())
+
+
+def test_points_are_loops_of_the_file(run, tmp_path):
+    path = bent_loop(tmp_path, "type: ['3d']\n")
+    target = tmp_path / "robot.toml"
+    status, _, error = run("convert", path, "-o", target, "--points", "gaol")
+    assert status == 2
+    assert "--points: found 'gaol'" in error.replace('"', "'")
+    assert "goal" in error
+    assert not target.exists()
+    status, _, error = run("convert", "arm6", "-o", target, "--points", "all")
+    assert status == 2
+    assert error.count("\n") == 1
+    status, out, _ = run("convert", path, "-o", target, "--points", "none")
+    assert status == 0
+    assert "taken:" not in out
 
 
 # of the robots that take long, the ending with which a quick run tries them

@@ -47,6 +47,20 @@ def test_a_column_on_a_torsion_spring_branches_at_k_over_l():
     assert np.abs(curve.screws).max() < 1e-12
 
 
+def test_two_bars_on_torsion_springs_branch_at_both_their_loads():
+    """(3 - sqrt 5) k / 2L and (3 + sqrt 5) k / 2L: det [[2k - PL, -k], ..] = 0."""
+    K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
+    foot = Frame("foot", joint_stiffness=K)
+    knee = Frame("knee", "foot", [0.4, 0, 0], joint_stiffness=K)
+    tip = Frame("tip", "knee", [0.4, 0, 0])
+    posture = home_posture(Robot("bars", "tip", (foot, knee, tip), ()))
+    curve = follow_load(posture, 3, 0.0, -400.0)
+    loads = 50.0 / 0.4 * (3 + np.array([-1, 1]) * np.sqrt(5)) / 2
+    np.testing.assert_allclose([-e.load for e in curve.events], loads, rtol=1e-5)
+    for event in curve.events:
+        assert event.what.startswith("branch point, buckles")
+
+
 def test_rods_that_spin_in_their_ball_joints_are_no_part_of_the_path():
     """The delta's six rods; the tangent at no load is the classical stiffness."""
     posture = home_posture(load_robot("delta"))

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.robots import load_robot
 from validation.crosscheck.link_models import link_models
-from validation.multibody.conservative_springs import middle_wrench
+from validation.multibody.conservative_springs import far_couple, middle_wrench
 from validation.multibody.motion import exponential, logarithm, turn_of, turned
 from validation.multibody.simulation import SimulationModel
 from validation.multibody.tangent import simulated_tangent
@@ -68,22 +70,43 @@ def test_a_bar_on_a_torsion_spring_is_k_minus_its_load(share):
 
 @pytest.mark.parametrize("size", [1e-3, 0.05, 0.3])
 def test_a_bent_spring_pulls_by_the_gradient_of_its_energy(size):
-    """Along six twists of its far end, but for the couple of the third order."""
+    """On both of its ends, along six twists of the far one."""
     rng = np.random.default_rng(3)
     B = rng.normal(size=(6, 6))
     K = B @ B.T + np.eye(6)
     screw = size * rng.normal(size=6)
-    screw[3:] *= 1e-3
     T, half = exponential(screw), turned(screw[:3] / 2)
     wrench = np.array(middle_wrench(K.tolist(), screw.tolist()))
-    point = half @ screw[3:] / 2  # of the near end
+    moment, force = np.split(wrench.reshape(2, 3) @ half.T, 2)
+    # as Exudyn applies it: half the shift from either end
+    arm = half @ screw[3:] / 2
+    near = np.concatenate([moment[0] + np.cross(arm, force[0]), force[0]])
+    couple = T[:3, :3] @ far_couple(screw.tolist(), wrench[3:].tolist())
+    at_far = moment[0] - np.cross(arm, force[0]) - couple
+    far = np.concatenate([at_far + np.cross(T[:3, 3], force[0]), force[0]])
     slopes = []
     for twist in np.eye(6):
-        about = np.concatenate([half @ twist[:3], half @ twist[3:]])
-        about[3:] += np.cross(point, about[:3])
-        ends = [logarithm(exponential(h * about) @ T) for h in (1e-5, -1e-5)]
+        ends = [logarithm(exponential(h * twist) @ T) for h in (1e-5, -1e-5)]
         slopes.append((ends[0] @ K @ ends[0] - ends[1] @ K @ ends[1]) / 4e-5)
-    np.testing.assert_allclose(wrench, slopes, atol=1e-8 * np.abs(slopes).max())
+    np.testing.assert_allclose(near, slopes, atol=1e-8 * np.abs(slopes).max())
+    np.testing.assert_allclose(far, near, atol=1e-14 * np.abs(near).max())
+
+
+def test_a_spring_bent_by_half_a_radian_is_as_stiff_as_its_energy_says():
+    """Its shift across the turn times the force is a couple that Exudyn leaves out."""
+    K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])
+    frames = (
+        Frame("foot", translation=[0.5, 0, 0], link=MatrixLink(K)),
+        Frame("tip", "foot", [0.7, 0.1, 0]),
+    )
+    posture = home_posture(Robot("bent", "tip", frames, ()))
+    load = np.array([0, 0, 0, 20.0, -25.0, 30.0])
+    equilibrium = solve_exact(posture, load)
+    assert np.linalg.norm(equilibrium.platform_screw[:3]) > 0.4
+    simulated = simulated_tangent(posture, SimulationModel("spring"), load)
+    expected = exact_tangent(equilibrium).compliance
+    assert relative(expected, simulated.linearised) < 1e-8
+    assert relative(expected, simulated.stepped) < 1e-6
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
