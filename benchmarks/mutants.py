@@ -241,9 +241,9 @@ def places_of_tests() -> list[str]:
 
 
 def tests_in(place: str) -> list[Path]:
-    """Python files of a folder of tests; or the one file."""
+    """Python files of a folder of tests; of one file, those beside it."""
     path = ROOT / place
-    return [path] if path.is_file() else sorted(path.rglob("*.py"))
+    return sorted(path.parent.glob("*.py") if path.is_file() else path.rglob("*.py"))
 
 
 def importing(fault: Fault) -> list[str]:

@@ -9,9 +9,9 @@ numbers that move by more than the inputs, when these are moved by 1e-12.
 
 import dataclasses
 import json
+import re
 import sys
 import tempfile
-import zlib
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -44,12 +44,16 @@ from stiffness.link import LinkStiffness
 from tests.built_in_robots_for_tests import LOAD, WORKSPACE
 from tests.part_questions_for_tests import PARTS
 from tests.planar_arm_for_tests import measured
+from tests.robot_questions_for_tests import ROBOTS
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.tolerances_for_tests import plan_for
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import results
+from validation.diagnosis import figures, results
 from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.scene import worst_robot
 from validation.diagnosis.text import text
+from validation.diagnosis.verdict import calibrate
 
 STORED = Path(__file__).with_name("answers.json")
 NUDGE = 1e-12  # relative, of inputs
@@ -60,9 +64,10 @@ LEFT_OUT = (
 )  # fmt: skip
 STEADY = 3e-8  # relative change of an answer so moved that is none
 FEW = 6  # numbers that are stored one by one; of more, two sums
-LONG = 200  # letters of which a sum is stored
+LONG = 200  # letters, of which the numbers are stored
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 
-Leaf = str | int | list[float]
+Leaf = str | list[float]
 
 
 def leaves(answer: Any) -> dict[str, Leaf]:
@@ -72,8 +77,11 @@ def leaves(answer: Any) -> dict[str, Leaf]:
     found: dict[str, Leaf] = {}
     for place, values in gathered.items():
         if any(isinstance(value, str) for value in values):
-            text = " ".join(map(str, values))
-            found[place] = text if len(text) < LONG else zlib.crc32(text.encode())
+            whole = " ".join(map(str, values))
+            if len(whole) < LONG:
+                found[place] = whole
+            else:
+                found |= numbers(np.array(NUMBER.findall(whole), dtype=float), place)
         else:
             found |= numbers(np.concatenate(values), place)
     return found
@@ -212,8 +220,7 @@ def diagnosed(name: str, nudge: float) -> Any:
     """What explains a campaign."""
     campaign = read_campaign(Path(__file__).parent / "campaigns" / name)
     campaign = dataclasses.replace(campaign, measured=campaign.measured * (1 + nudge))
-    found = diagnose(campaign)
-    return {"table": results.table(found, None), "found": found}
+    return told_of(diagnose(campaign))
 
 
 def planar(kind: str, nudge: float) -> Any:
@@ -229,8 +236,25 @@ def planar(kind: str, nudge: float) -> Any:
     readings = measured_rows.measured * (1 + nudge)
     if kind == "sag":
         readings[:, 5] -= 1e-6 * np.linalg.norm(measured_rows.loads[:, 3:], axis=1)
-    found = diagnose(dataclasses.replace(measured_rows, measured=readings))
-    return {"table": results.table(found, None), "found": found, "text": text(found)}
+    return told_of(diagnose(dataclasses.replace(measured_rows, measured=readings)))
+
+
+def told_of(found: Diagnosis) -> Any:
+    """A diagnosis, and what pages and tables say and draw of it."""
+    told: list[tuple[int, int]] = []
+    tally = calibrate(found.screen, found.best, 2, lambda *words: told.append(words))
+    return {
+        "found": found,
+        "table": results.table(found, tally),
+        "text": text(found, tally),
+        "told": told,
+        "separability": figures.separability_of(found),
+        "charts": {chart.__name__: chart(found) for chart in (
+            figures.error_chart, figures.ladder_chart, figures.vector_charts,
+            figures.covariate_charts, figures.probability_chart,
+            figures.confounding_chart, worst_robot,
+        )},
+    }  # fmt: skip
 
 
 QUESTIONS: dict[str, Callable[[float], Any]] = {
@@ -244,6 +268,7 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
        for c in ("encoder_offset", "base_compliance_drift")},
     **{f"planar, {k}": partial(planar, k) for k in ("sag",)},
     **PARTS,
+    **ROBOTS,
 }  # fmt: skip
 
 
