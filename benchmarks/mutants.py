@@ -13,6 +13,7 @@ their module.  Printed: the share caught, and every survivor.
 """
 
 import argparse
+import ast
 import importlib
 import json
 import os
@@ -24,7 +25,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -36,7 +37,7 @@ import numba
 import pytest
 from coverage import Coverage, CoverageData
 
-from benchmarks.faults import ROOT, Fault, drawn, files_of, has_loops
+from benchmarks.faults import CHAPTERS, ROOT, Fault, drawn, files_of, has_loops
 
 PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
 # imported once, before the forks
@@ -46,9 +47,9 @@ LIBRARIES = (
     "h5netcdf", "matplotlib.figure", "pyvista", "meshio", "typer.testing", "hypothesis",
     "hypothesis.extra.numpy", "numba.extending",
 )  # fmt: skip
-SHARES = (60.0, 600.0)  # [s] of tests that run for one fault
-AT_MOST = 400  # tests that run in the first share
-UNCOMPILED_SECONDS = 3.0  # of processor time, of a test that is to be of use uncompiled
+BESIDE = ("tests/test_answers.py",)  # asked besides the chapters' own tests
+LEAST_SECONDS = 15  # of processor time, for collecting tests
+UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
 
@@ -75,7 +76,8 @@ class Run:
             code = os.WEXITSTATUS(status)
             if code in {PASSED, NONE_COLLECTED}:
                 return None
-            if code not in {FAILED, INTERRUPTED}:
+            broken = "ImportError while loading conftest" in printed.read_text()
+            if code not in {FAILED, INTERRUPTED} and not broken:
                 raise RuntimeError(printed.read_text()[-2000:])
         first = re.search(r"^(?:FAILED|ERROR) (\S+)", printed.read_text(), re.MULTILINE)
         return first[1] if first else ""
@@ -162,11 +164,13 @@ class Trace:
 
     def of(self, path: Path, rows: range | set[int]) -> set[str]:
         """Tests that pass one of these rows of a file."""
-        files = self.lines.measured_files()
-        file = next((f for f in files if f.endswith(f"/{path}")), None)
-        passing = self.lines.contexts_by_lineno(file) if file else {}
+        # traced in one copy of the tree or another
+        files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
         tests = {
-            test.partition("|")[0] for row in rows for test in passing.get(row, [])
+            test.partition("|")[0]
+            for passing in map(self.lines.contexts_by_lineno, files)
+            for row in rows
+            for test in passing.get(row, [])
         }
         return tests & self.seconds.keys()
 
@@ -181,17 +185,20 @@ class Trace:
                 tests |= self.of(path, rows) if rows else set()
                 if tests:  # its own file has them
                     break
+        return sorted(tests, key=self.cost(fault))
+
+    def cost(self, fault: Fault) -> Callable[[str], float]:
+        """A test's seconds, less where it is nearer to a fault."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
+        beside = (f"tests/{fault.chapter}/", "tests/test_answers.py")
 
         def cost(test: str) -> float:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            return (
-                seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
-            )
+            return seconds if test.startswith(beside) else 3 * seconds
 
-        return sorted(tests, key=cost)
+        return cost
 
 
 def sources() -> Iterator[Path]:
@@ -201,18 +208,42 @@ def sources() -> Iterator[Path]:
             yield path.relative_to(ROOT)
 
 
-def traced(tree: Path, folder: Path, uncompiled: bool) -> Trace:
-    """All default tests, traced, or what an earlier call left in the folder."""
-    name = "uncompiled" if uncompiled else "compiled"
-    data = folder / f"{name}.coverage"
-    if not data.with_suffix(".json").exists():
-        loops = [path for path in sources() if has_loops(ROOT / path)]
-        folders = sorted({f"tests/{path.parent}" for path in loops})
-        tracer = Tracer(data, UNCOMPILED_SECONDS if uncompiled else None)
-        Run(tree, uncompiled, 7200)(folders if uncompiled else ["tests"], (tracer,))
-    lines = CoverageData(str(data))
-    lines.read()
-    return Trace(lines, json.loads(data.with_suffix(".json").read_text()))
+def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
+    """The default tests of each folder, traced, or what an earlier call left of them.
+
+    A folder of which a test has changed since is traced anew.
+    """
+    loops = {f"tests/{path.parent}" for path in sources() if has_loops(ROOT / path)}
+    loops = {folder for folder in loops if any((ROOT / folder).rglob("test_*.py"))}
+    lines = CoverageData(no_disk=True)
+    seconds: dict[str, float] = {}
+    for folder in sorted(loops) if uncompiled else places_of_tests():
+        name = "uncompiled" if uncompiled else "compiled"
+        data = kept / f"{name}.{folder.replace('/', '.')}.coverage"
+        times = data.with_suffix(".json")
+        changed = max((path.stat().st_mtime for path in tests_in(folder)), default=0.0)
+        if not times.exists() or times.stat().st_mtime < changed:
+            data.unlink(missing_ok=True)
+            tracer = Tracer(data, UNCOMPILED_SECONDS if uncompiled else None)
+            Run(tree, uncompiled, 7200)([folder], (tracer,))
+            print(f"traced {folder}, {name}", flush=True)
+        part = CoverageData(str(data))
+        part.read()
+        lines.update(part)
+        seconds |= json.loads(times.read_text())
+    return Trace(lines, seconds)
+
+
+def places_of_tests() -> list[str]:
+    """Folders of the tests that mirror a chapter, and what else is asked."""
+    mirrors = [f"tests/{chapter}" for chapter in CHAPTERS]
+    return [m for m in mirrors if any((ROOT / m).glob("test_*.py"))] + list(BESIDE)
+
+
+def tests_in(place: str) -> list[Path]:
+    """Python files of a folder of tests; of one file, those beside it."""
+    path = ROOT / place
+    return sorted(path.parent.glob("*.py") if path.is_file() else path.rglob("*.py"))
 
 
 def importing(fault: Fault) -> list[str]:
@@ -224,45 +255,116 @@ def importing(fault: Fault) -> list[str]:
     )
     files = sorted((ROOT / "tests").rglob("test_*.py"))
     folder_of_tests = ROOT / "tests" / fault.chapter
-    return [
+    return ["tests/test_answers.py"] + [
         str(path.relative_to(ROOT))
         for path in files
         if path.is_relative_to(folder_of_tests) or imports.search(path.read_text())
     ]
 
 
-def caught(fault: Fault, tree: Path, traces: dict[bool, Trace]) -> str | None:
+class Caches:
+    """Compiled functions on disk, of the tree without a fault."""
+
+    def __init__(self, tree: Path) -> None:
+        self.tree = tree
+        self.files = {path: path.read_bytes() for path in self._found()}
+
+    def _found(self) -> list[Path]:
+        return [path for p in PACKAGES for path in (self.tree / p).rglob("*.nb[ic]")]
+
+    def restore(self) -> None:
+        """As they were before the fault."""
+        for path in set(self._found()) - self.files.keys():
+            path.unlink()
+        for path, content in self.files.items():
+            path.write_bytes(content)
+
+    def drop(self, fault: Fault) -> None:
+        """Leave out those that a fault is built into, though their files are the same.
+
+        A part is called by its address, a kernel and a constant are built in.
+        """
+        names, stale = built_in(fault), set[Path]()
+        while names:
+            named = re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
+            more = {
+                path
+                for path in sources()
+                if has_loops(ROOT / path) and named.search((ROOT / path).read_text())
+            } - stale
+            stale |= more
+            names = {name for path in more for name in kernels_of(path)}
+        for path in stale:
+            for cached in (self.tree / path.parent).rglob(f"{path.stem}.*.nbi"):
+                cached.unlink()
+
+
+def built_in(fault: Fault) -> set[str]:
+    """The kernel or the constant that a fault is in; nothing for a part."""
+    for node in ast.walk(ast.parse((ROOT / fault.path).read_text("utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            if node.lineno <= fault.row <= (node.end_lineno or 0):
+                return {node.name} & kernels_of(fault.path)
+    return {fault.name} if fault.name else set()
+
+
+def kernels_of(path: Path) -> set[str]:
+    """Names of a file's kernels."""
+    text = (ROOT / path).read_text("utf-8")
+    return set(re.findall(r"^@kernel.*\ndef (\w+)", text, re.MULTILINE))
+
+
+def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
+    """As many of the first tests as take so long."""
+    total = 0.0
+    some: list[str] = []
+    for test in tests:
+        total += trace.seconds[test]
+        if some and total > seconds:
+            break
+        some.append(test)
+    return some
+
+
+def caught(
+    fault: Fault, tree: Path, traces: dict[bool, Trace], caches: Caches, seconds: float
+) -> str | None:
     """The test that sees a fault, "" where it is none's name; None if none does."""
     path = tree / fault.path
     whole, times = path.read_bytes(), path.stat()
     lines = whole.decode().splitlines(True)
     lines[fault.row - 1] = fault.line
     path.write_text("".join(lines), encoding="utf-8")
-    trace = traces[fault.compiled]
-    tests = trace.nearest(fault)
     try:
-        for share in SHARES:
-            total, chosen = 0.0, []
-            for test in tests[:AT_MOST] if share == SHARES[0] else tests:
-                total += trace.seconds[test]
-                if chosen and total > share:
-                    break
-                chosen.append(test)
-            run = Run(tree, fault.compiled, 15 + 3 * min(total, share))
-            if chosen and (test := run(chosen)) is not None:
-                return test
-            tests = tests[len(chosen) :]
-            if not tests:
-                break
-        files = importing(fault) if fault.compiled else []
-        return Run(tree, False, 600)(files) if files else None
+        if fault.compiled:
+            caches.drop(fault)
+        return seen(fault, tree, traces, seconds)
     finally:
         path.write_bytes(whole)
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-        if fault.compiled:  # built into what calls them, whose files have not changed
-            for folder in ("assembly", "validation"):
-                for cached in (tree / folder).rglob("*.nbi"):
-                    cached.unlink()
+        if fault.compiled:
+            caches.restore()
+
+
+def seen(
+    fault: Fault, tree: Path, traces: dict[bool, Trace], seconds: float
+) -> str | None:
+    """The first test that sees the fault in the tree; None if none does."""
+    trace = traces[fault.compiled]
+    tests = trace.nearest(fault)
+    for share in (seconds / 8, seconds):
+        some = chosen(tests, trace, share)
+        run = Run(tree, fault.compiled, LEAST_SECONDS + 3 * share)
+        if some and (test := run(some)) is not None:
+            return test
+        tests = tests[len(some) :]
+    if not fault.compiled:
+        return None
+    files, trace = importing(fault), traces[False]
+    tests = [test for test in trace.seconds if test.partition("::")[0] in files]
+    # its own compilation takes half a minute at most
+    run = Run(tree, False, LEAST_SECONDS + 120 + 3 * seconds)
+    return run(chosen(sorted(tests, key=trace.cost(fault)), trace, seconds))
 
 
 def main() -> None:
@@ -271,6 +373,7 @@ def main() -> None:
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")
+    parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--traced", type=Path)
     asked = parser.parse_args()
     random = Random(asked.seed)
@@ -287,12 +390,13 @@ def main() -> None:
         kept = asked.traced or Path(scratch)
         kept.mkdir(parents=True, exist_ok=True)
         traces = {loops: traced(tree, kept, loops) for loops in (False, True)}
+        caches = Caches(tree)
         while done < asked.count:
             ((chapter, path),) = random.choices(files, weights)
             fault = drawn(chapter, path, random)
             if fault is None:
                 continue
-            test = caught(fault, tree, traces)
+            test = caught(fault, tree, traces, caches, asked.seconds)
             done += 1
             survived += test is None
             seen = "survived" if test is None else f"caught by {test or 'a limit'}"

@@ -1,0 +1,191 @@
+"""Questions about robots of every kind, for ``answers_for_tests.py``: random ones with
+links, springs and clearances, many draws at once, kinematics, tolerances by play."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.nominal import motion_screws, size_of
+from assembly.kinematics.pieces import cut_beams
+from assembly.kinematics.posture import place_many, place_many_joints, place_robot
+from assembly.kinematics.se3 import (
+    bracket,
+    bracket_form,
+    exponential,
+    left_jacobian,
+    logarithm,
+    second_form,
+    turn_jacobian,
+)
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import READINGS
+from assembly.linear.screw_bound import bound_screw
+from assembly.linear.singularity import find_singularities
+from assembly.linear.zone import zone_margin
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
+from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
+from assembly.statistics.allocation import allocate
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
+from assembly.statistics.summary import summarise, summary_text
+from assembly.statistics.tolerances import present_errors, present_text
+from tests.built_in_robots_for_tests import LOAD, WORKSPACE
+from tests.robots_for_tests import random_robot, small_clearance
+from tests.tolerances_for_tests import plan_for
+
+
+def of_any_kind(seed: int, nudge: float) -> Any:
+    """Energy, certificates, margins and pose errors of a random robot."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, legs=2 + seed % 2, branched=seed % 3 == 0)
+    posture = place_robot(robot.with_errors(0.1 * robot.errors * (1 + nudge)))
+    found: dict[str, Any] = {}
+    for name, load in (("alone", None), ("loaded", np.array(LOAD) / 10)):
+        solved = solve_assembly(posture, load)
+        found[name] = {
+            "solved": solved,
+            "bound": bound_screw(solved),
+            "energy_lower_bound": solved.energy - solved.duality_gap(),
+        }
+    for reading in READINGS:
+        some = bound_pose_error(found["alone"]["solved"], reading, energy_budget=0.1)
+        found[reading] = {
+            "sizes": [some.rotation_error, some.translation_error],
+        }
+    return found | {r: zone_margin(posture, r) for r in ("rigid", "free")}
+
+
+def at_once(name: str, nudge: float) -> Any:
+    """Energies and margins of many draws at a posture, with a load and without."""
+    robot = pressed(load_robot(name))
+    where = {key: (2 * low + high) / 3 for key, (low, high) in WORKSPACE[name].items()}
+    posture = place_robot(robot, where)
+    size = [2e-4] * 3 + [5e-5] * 3
+    errors = np.random.default_rng(5).uniform(-1, 1, (4, len(robot.frames), 6)) * size
+    errors = errors * (1 + nudge)
+    load, gravity = np.array(LOAD) / 5, (0.5, 0.0, -9.81)
+    return {
+        "alone": prepare_energies(posture).solve(errors),
+        "loaded": prepare_energies(posture, load, gravity).solve(errors),
+        "free": prepare_margins(posture, "free").solve(errors),
+        "rigid": prepare_margins(posture, "rigid").solve(errors),
+    }
+
+
+def pressed(robot: Robot) -> Robot:
+    """The robot with a clearance at every third joint that has none."""
+    frames = [
+        replace(f, clearance=small_clearance(2e-5 * (1 + i)))
+        if i % 3 == 1 and f.clearance is None and f.joint != "fixed"
+        else f
+        for i, f in enumerate(robot.frames)
+    ]
+    return replace(robot, frames=tuple(frames))
+
+
+def placed(name: str, nudge: float) -> Any:
+    """Postures of many poses and of many drives; motions, singularities, pieces."""
+    robot = load_robot(name)
+    keys = ("tx", "ty", "tz", "rx", "ry", "rz")
+    shares = np.random.default_rng(2).uniform(0.2, 0.8, (3, 6)) * (1 + nudge)
+    box = [WORKSPACE[name].get(key, (np.nan, np.nan)) for key in keys]
+    poses = np.array([[a + s * (b - a) for s, (a, b) in zip(share, box, strict=True)]
+                      for share in shares])  # fmt: skip
+    postures, track = place_many(robot, poses)
+    drives = np.array([f.actuated for f in robot.frames])
+    at = np.array([posture.transforms for posture in postures])
+    coordinates = np.array([posture.coordinates for posture in postures])
+    again = place_many_joints(robot, np.where(drives, coordinates * 1.001, np.nan))
+    return {
+        "poses": postures, "track": track, "joints": again, "size": size_of(robot),
+        "motions": [motion_screws(robot, T) for T in at],
+        "singular": find_singularities(robot, at),
+        "pieces": cut_beams(robot).robot,
+    }  # fmt: skip
+
+
+def screws(nudge: float) -> Any:
+    """Exponentials, logarithms and their derivatives, of small and of large turns."""
+    sizes = (1e-9, 1e-4, 0.03, 0.7, 2.9, 3.14)
+    one = np.array([0.3, -0.5, 0.81, 0.2, -0.4, 0.1]) * (1 + nudge)
+    wrench = np.array([1.0, -2.0, 0.5, 3.0, 0.2, -1.0])
+    some = [size * one for size in sizes]
+    return {
+        "exponential": [exponential(s) for s in some],
+        "logarithm": [logarithm(exponential(s)) for s in some],
+        "turn": [turn_jacobian(s[:3]) for s in some],
+        "left": [left_jacobian(s) for s in some],
+        "second": [second_form(s, wrench) for s in some],
+        "bracket": bracket(one),
+        "form": bracket_form(wrench),
+    }
+
+
+def in_a_row(play: float) -> Robot:
+    """Two springy bars from two walls that meet in a joint with clearance."""
+    link = MatrixLink(np.diag([2e3, 2e3, 2e3, 1e6, 2e6, 1e6]))
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=link),
+        Frame("mount", translation=[1.0, 0, 0]),
+        Frame("two", "mount", [-0.5, 0, 0], link=link),
+        Frame("joint", "one", clearance=Clearance(radial=play, tilt=1e-4)),
+        Frame("end_one", "joint"),
+        Frame("end_two", "two"),
+    )
+    return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
+
+
+def by_play(model: str, nudge: float) -> Any:
+    """Tolerances for limits of pose errors, clearances anywhere a model puts them."""
+    robot = in_a_row(1e-4 * (1 + nudge))
+    plan = plan_for(
+        robot, [("one", 3), ("two", 4), ("two", 1)], [1, 2, 0.5],
+        {"translation": 2.5e-4, "force": 400.0}, asked_yield=0.9, draws=30,
+        clearance_model=model,
+    )  # fmt: skip
+    told: list[tuple[str, int, int]] = []
+    found = allocate([place_robot(robot)], plan, 20, lambda *words: told.append(words))
+    results = allocation_of(found)
+    return {"found": found, "told": told, "text": allocation_text(results)}
+
+
+def shown(nudge: float) -> Any:
+    """What pages show of present errors and of draws, and what progress is told."""
+    robot = in_a_row(1e-4)
+    errors = np.zeros((6, 6))
+    errors[[0, 2], :] = [[1e-4, 0, 5e-5, 4e-5, 3e-5, 0], [0, 2e-4, 0, 1e-5, 0, 2e-5]]
+    postures = [place_robot(robot.with_errors(errors * (1 + nudge)))]
+    told: list[tuple[int, int]] = []
+    present = present_errors(postures, "rigid", lambda *words: told.append(words))
+    sources = tolerance_sources(robot, [1e-4 * (1 + nudge)] * 6, ("one", "two"))
+    experiment = Experiment(postures[0], sources, 4, "contact")
+    data = run_draws(experiment, 9, progress=lambda *words: told.append(words))
+    summary = summarise(data, {"energy": 1e-3, "margin": 1.0}, None, 0.8)
+    return {
+        "present": present, "told": told, "summary": summary,
+        "texts": present_text(present) + summary_text(
+            {"robot": "bars", "pose": postures[0].pose(), "seed": 4} | summary
+        ),
+        "scenes": drawn_robot(experiment, data) + tightest_robot(postures, present)
+        + margin_map(postures, present),
+    }  # fmt: skip
+
+
+ROBOTS: dict[str, Callable[[float], Any]] = {
+    **{f"of any kind, {seed}": partial(of_any_kind, seed) for seed in range(4)},
+    **{f"at once, {n}": partial(at_once, n) for n in ("hexapod", "3rrr", "five_bar")},
+    **{f"placed, {n}": partial(placed, n) for n in WORKSPACE},
+    "screws": screws,
+    **{f"tolerances, {m}": partial(by_play, m) for m in CLEARANCE_MODELS},
+    "shown": shown,
+}

@@ -1,0 +1,21 @@
+"""Answers are those that are stored, see ``answers_for_tests.py``."""
+
+import json
+
+import pytest
+
+from tests.answers_for_tests import QUESTIONS, STORED, close, leaves
+
+ANSWERS = json.loads(STORED.read_text())
+RELATIVE = 1e-6
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_answers_are_those_stored(name):
+    stored, now = ANSWERS[name], leaves(QUESTIONS[name](0.0))
+    other = {
+        place: (was, now.get(place))
+        for place, was in stored.items()
+        if not close(was, now.get(place), RELATIVE)
+    }
+    assert not other
