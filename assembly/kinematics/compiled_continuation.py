@@ -155,9 +155,12 @@ def _follow(
             tree, tried, part, part_held, goal < 1.0, jump, careful
         )
         if not careful and (not determined or step < _SHORT):
-            # where it ends depends on the way, or the way is hard: by short steps
-            copy(start, q)
-            done, step, careful, jump = 0.0, _FIRST_STEP, True, _JUMP * longest
+            # the way is hard: by short steps from here on
+            careful, jump = True, _JUMP * longest
+            if not determined:
+                # and where it ends depends on all of the way
+                copy(start, q)
+                done, step = 0.0, _FIRST_STEP
             continue
         for j in range(n):
             # a jump, or a coordinate that is NaN: another assembly mode

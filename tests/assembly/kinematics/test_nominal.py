@@ -334,6 +334,20 @@ def test_a_long_way_ends_where_many_short_ones_do(name):
         np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
 
 
+def test_a_ball_near_gimbal_lock_turns_on_as_it_did():
+    """Beside the lock a long step ends half a turn about two of its axes away."""
+    robot = load_robot("hexapod")
+    home = home_posture(robot)
+    goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
+    begin, at = pose_components(home.platform), home.coordinates
+    for share in np.linspace(0, 1, 81)[1:]:
+        pose = begin + share * (goal - begin)
+        at = follow(robot, at, Target(pose=pose)).coordinates[0]
+    track = follow(robot, home.coordinates, Target(pose=goal))
+    assert track.reached[0]
+    np.testing.assert_allclose(track.coordinates[0], at, rtol=0, atol=EXACT)
+
+
 def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
     """Law of cosines one way, the closure the other; flat outward the elbows are
     0.9 m apart and two bars of 0.4 m cannot meet."""
