@@ -5,8 +5,8 @@ left out: what they show is tested where it is a number.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
-cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401 steps at most
-instead of 400 would be no fault.  No fault is left out for where it stands.
+cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401
+steps at most instead of 400 would be no fault.  No fault is left out for where it stands.
 """
 
 import ast

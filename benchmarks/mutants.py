@@ -190,13 +190,16 @@ class Trace:
     def cost(self, fault: Fault) -> Callable[[str], float]:
         """A test's seconds, less where it is nearer to a fault."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
-        beside = (f"tests/{fault.chapter}/", "tests/test_answers.py")
 
         def cost(test: str) -> float:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            return seconds if test.startswith(beside) else 3 * seconds
+            if test.startswith(BESIDE):  # compare the most numbers
+                return seconds / 3
+            return (
+                seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
+            )
 
         return cost
 
