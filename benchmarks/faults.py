@@ -6,7 +6,7 @@ left out: what they show is tested where it is a number.
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
 cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401
-steps at most instead of 400 would be no fault.  No fault is left out for where it stands.
+steps at most instead of 400 would be no fault.  No fault is left out for its place.
 """
 
 import ast
@@ -135,6 +135,9 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
         return range(last.body[0].lineno, (last.end_lineno or row) + 1), None
     if functions:
         return rows, None
+    classes = [n.name for n in within if isinstance(n, ast.ClassDef)]
+    if classes:  # a field's default counts where one is made
+        return rows, classes[-1]
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
     # a lambda's rows are passed later

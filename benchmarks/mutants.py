@@ -49,6 +49,8 @@ LIBRARIES = (
 )  # fmt: skip
 BESIDE = ("tests/test_answers.py",)  # asked besides the chapters' own tests
 LEAST_SECONDS = 15  # of processor time, for collecting tests
+# of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
+UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
 UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
@@ -179,12 +181,10 @@ class Trace:
         tests = self.of(fault.path, fault.rows)
         if fault.name:
             named = re.compile(rf"\b{fault.name}\b")
-            for path in (fault.path, *sources()):
+            for path in (fault.path, *importers(fault.path)):
                 lines = (ROOT / path).read_text("utf-8").splitlines()
                 rows = {i for i, line in enumerate(lines, 1) if named.search(line)}
-                tests |= self.of(path, rows) if rows else set()
-                if tests:  # its own file has them
-                    break
+                tests |= self.of(path, rows)
         return sorted(tests, key=self.cost(fault))
 
     def cost(self, fault: Fault) -> Callable[[str], float]:
@@ -211,16 +211,21 @@ def sources() -> Iterator[Path]:
             yield path.relative_to(ROOT)
 
 
+def importers(path: Path) -> list[Path]:
+    """Files of the packages that import a file's names."""
+    module = ".".join(path.with_suffix("").parts)
+    text = re.compile(rf"^from {re.escape(module)} import", re.MULTILINE)
+    return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
+
+
 def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
     """The default tests of each folder, traced, or what an earlier call left of them.
 
     A folder of which a test has changed since is traced anew.
     """
-    loops = {f"tests/{path.parent}" for path in sources() if has_loops(ROOT / path)}
-    loops = {folder for folder in loops if any((ROOT / folder).rglob("test_*.py"))}
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}
-    for folder in sorted(loops) if uncompiled else places_of_tests():
+    for folder in UNCOMPILED if uncompiled else places_of_tests():
         name = "uncompiled" if uncompiled else "compiled"
         data = kept / f"{name}.{folder.replace('/', '.')}.coverage"
         times = data.with_suffix(".json")
