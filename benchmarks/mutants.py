@@ -1,15 +1,18 @@
 """Random one-line faults in the numerical modules, and whether the tests see them.
 
-    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--traced FOLDER]
+    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--seconds S]
+        [--traced FOLDER]
 
-All default tests run once, traced: which test passes which line, and how long it takes
-(kept in the folder after --traced).  Compiled loops have no lines to trace: their
-files' tests run a second time uncompiled, each for a few seconds at most.  Then every
-fault is put into a copy of the tree and the tests that pass its line run, in a fork of
-this process, which has imported all libraries: first what takes a minute, the nearest
-and shortest first, then ten times that; the first failure is enough.  Faults in
-compiled loops are judged uncompiled, then once more compiled, by the tests that import
-their module.  Printed: the share caught, and every survivor.
+The default tests of the numerical modules and ``tests/test_answers.py`` run once,
+traced: which test passes which line, and how long it takes (kept in the folder after
+--traced, and traced anew where a test has changed).  Compiled loops have no lines to
+trace: tests of loops by themselves run a second time uncompiled, each for a few seconds
+at most.  Then every fault is put into a copy of the tree and the tests that pass its
+line run, in a fork of this process, which has imported all libraries: those of an
+eighth of S seconds, the nearest and shortest first, then of S seconds; the first
+failure is enough.  A fault that longer or other tests would see counts as survived.
+Faults in compiled loops are judged uncompiled, then once more compiled, by the tests
+that import their module.  Printed: the share caught, and every survivor.
 """
 
 import argparse
