@@ -5,8 +5,9 @@ left out: what they show is tested where it is a number.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
-cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401 steps at most
-instead of 400 would be no fault.  No fault is left out for where it stands.
+cosmic-ray do it: a tolerance of 1e-9 becomes 1.  A number above ten becomes one: 401
+steps at most instead of 400 would be no fault.  Left out are the places
+of a size that ``reshape`` is to find, where any negative number is the same.
 """
 
 import ast
@@ -68,11 +69,20 @@ def places(tree: ast.Module) -> Iterator[ast.AST]:
             yield node
         if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
             yield node
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("reshape"):
+            sizes = [arg for arg in node.args if not is_left_open(arg)]
+            waiting += [node.func, *sizes]
+            continue
         for field, value in ast.iter_fields(node):
             if field in {"annotation", "returns", "decorator_list"}:
                 continue
             children = value if isinstance(value, list) else [value]
             waiting += [child for child in children if isinstance(child, ast.AST)]
+
+
+def is_left_open(node: ast.AST) -> bool:
+    """Whether it is a size that numpy works out: any negative number will do."""
+    return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
 def wrong(node: ast.AST, random: Random) -> ast.AST | None:
@@ -135,6 +145,9 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
         return range(last.body[0].lineno, (last.end_lineno or row) + 1), None
     if functions:
         return rows, None
+    classes = [n.name for n in within if isinstance(n, ast.ClassDef)]
+    if classes:  # a field's default counts where one is made
+        return rows, classes[-1]
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
     # a lambda's rows are passed later

@@ -1,15 +1,18 @@
 """Random one-line faults in the numerical modules, and whether the tests see them.
 
-    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--traced FOLDER]
+    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--seconds S]
+        [--traced FOLDER]
 
-All default tests run once, traced: which test passes which line, and how long it takes
-(kept in the folder after --traced).  Compiled loops have no lines to trace: their
-files' tests run a second time uncompiled, each for a few seconds at most.  Then every
-fault is put into a copy of the tree and the tests that pass its line run, in a fork of
-this process, which has imported all libraries: first what takes a minute, the nearest
-and shortest first, then ten times that; the first failure is enough.  Faults in
-compiled loops are judged uncompiled, then once more compiled, by the tests that import
-their module.  Printed: the share caught, and every survivor.
+The default tests of the numerical modules and ``tests/test_answers.py`` run once,
+traced: which test passes which line, and how long it takes (kept in the folder after
+--traced, and traced anew where a test has changed).  Compiled loops have no lines to
+trace: tests of loops by themselves run a second time uncompiled, each for a few seconds
+at most.  Then every fault is put into a copy of the tree and the tests that pass its
+line run, in a fork of this process, which has imported all libraries: those of an
+eighth of S seconds, the nearest and shortest first, then of S seconds; the first
+failure is enough.  A fault that longer or other tests would see counts as survived.
+Faults in compiled loops are judged uncompiled, then once more compiled, by the tests
+that import their module.  Printed: the share caught, and every survivor.
 """
 
 import argparse
@@ -49,6 +52,8 @@ LIBRARIES = (
 )  # fmt: skip
 BESIDE = ("tests/test_answers.py",)  # asked besides the chapters' own tests
 LEAST_SECONDS = 15  # of processor time, for collecting tests
+# of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
+UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
 UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
@@ -179,24 +184,25 @@ class Trace:
         tests = self.of(fault.path, fault.rows)
         if fault.name:
             named = re.compile(rf"\b{fault.name}\b")
-            for path in (fault.path, *sources()):
+            for path in (fault.path, *importers(fault.path)):
                 lines = (ROOT / path).read_text("utf-8").splitlines()
                 rows = {i for i, line in enumerate(lines, 1) if named.search(line)}
-                tests |= self.of(path, rows) if rows else set()
-                if tests:  # its own file has them
-                    break
+                tests |= self.of(path, rows)
         return sorted(tests, key=self.cost(fault))
 
     def cost(self, fault: Fault) -> Callable[[str], float]:
         """A test's seconds, less where it is nearer to a fault."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
-        beside = (f"tests/{fault.chapter}/", "tests/test_answers.py")
 
         def cost(test: str) -> float:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            return seconds if test.startswith(beside) else 3 * seconds
+            if test.startswith(BESIDE):  # compare the most numbers
+                return seconds / 3
+            return (
+                seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
+            )
 
         return cost
 
@@ -208,16 +214,21 @@ def sources() -> Iterator[Path]:
             yield path.relative_to(ROOT)
 
 
+def importers(path: Path) -> list[Path]:
+    """Files of the packages that import a file's names."""
+    module = ".".join(path.with_suffix("").parts)
+    text = re.compile(rf"^from {re.escape(module)} import", re.MULTILINE)
+    return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
+
+
 def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
     """The default tests of each folder, traced, or what an earlier call left of them.
 
     A folder of which a test has changed since is traced anew.
     """
-    loops = {f"tests/{path.parent}" for path in sources() if has_loops(ROOT / path)}
-    loops = {folder for folder in loops if any((ROOT / folder).rglob("test_*.py"))}
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}
-    for folder in sorted(loops) if uncompiled else places_of_tests():
+    for folder in UNCOMPILED if uncompiled else places_of_tests():
         name = "uncompiled" if uncompiled else "compiled"
         data = kept / f"{name}.{folder.replace('/', '.')}.coverage"
         times = data.with_suffix(".json")

@@ -1,6 +1,7 @@
 """Questions to single parts, for ``answers_for_tests.py``: beams, surfaces, meshes;
 effects and functions; hypotheses and what the readings tell of them."""
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -18,6 +19,7 @@ from assembly.model.function import Function
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.beam_stress import peak_beam_stress, section_stress
 from stiffness.beam.curve import arc_piece, curve_compliance, straight_piece
+from stiffness.beam.curve_file import read_curve
 from stiffness.beam.sections import (
     box_section,
     i_section,
@@ -37,8 +39,9 @@ from stiffness.surface.decimate import coarser_surface
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.intersections import crossing_triangles
 from stiffness.surface.patches import find_patches
-from stiffness.surface.surface import read_surface
-from tests.solids_for_tests import bar_solid, box_solid, masked_solid
+from stiffness.surface.primitives import project
+from stiffness.surface.surface import check_surface, read_surface
+from tests.solids_for_tests import bar_solid, box_solid, cylinder, masked_solid
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.hypotheses import hypotheses
 from validation.diagnosis.responses import responses
@@ -105,8 +108,49 @@ def sections(nudge: float) -> Any:
     }
 
 
+CURVE = """
+[[piece]]
+start = [0.0, 0.01, {start}]
+section = {{ width = 0.02, height = 0.03, wall = 0.002 }}
+end = [0.1, 0.01, 0.02]
+[[piece]]
+center = [0.1, 0.11, 0.02]
+turn = [0, 0, 0.6]
+[[piece]]
+section = {{ radius = 0.01, inner_radius = 0.004 }}
+tip_section = {{ radius = 0.008, inner_radius = 0.003 }}
+end = [0.3, 0.1, 0.02]
+[[piece]]
+end = [0.35, 0.1, 0.1]
+up = [0, 1, 0]
+"""
+
+
+def written(nudge: float) -> Any:
+    """A curved beam from its file; a surface of no known shape, and what is nearest."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "curve.toml"
+        path.write_text(CURVE.format(start=repr(0.02 * (1 + nudge))))
+        curve = curve_compliance(read_curve(path, NU), E, NU)
+    points, triangles = cylinder(0.02, 0.1 * (1 + nudge), 24)
+    x, y, z = points.T
+    bent = np.column_stack([x + 8 * z * x + 0.2 * y * y / 0.02, 1.3 * y, z])
+    surface = check_surface(bent, triangles, "bent")
+    ends = (
+        parse_interface("z=0"),
+        replace(parse_interface("z=0.1"), point=np.array([0, 0, 0.1 * (1 + nudge)])),
+    )
+    patches = find_patches(surface, *ends)
+    near = np.random.default_rng(3).uniform(-0.03, 0.03, (5, 3)) + [0, 0, 0.05]
+    return {
+        "curve": curve,
+        "patches": patches,
+        "nearest": [project(near, (shape,)) for shape in patches.shapes],
+    }
+
+
 def shapes(nudge: float) -> Any:
-    """Surfaces of simple shapes, their beams, and interfaces as they are written."""
+    """Surfaces of simple shapes, and their beams."""
     found = {}
     for name, lengths in SHAPES.items():
         sizes = {key: size * (1 + nudge) for key, size in lengths.items()}
@@ -273,6 +317,7 @@ def signatures(name: str, nudge: float) -> Any:
 PARTS: dict[str, Callable[[float], Any]] = {
     "sections": sections,
     "shapes": shapes,
+    "written": written,
     **{f"surface {name}": partial(surface, name) for name in ENDS},
     "meshes": meshes,
     **{f"level, {i}": partial(levels, i) for i in ("rigid", "distributing-both")},

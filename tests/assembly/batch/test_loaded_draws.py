@@ -143,3 +143,16 @@ def test_the_command_takes_load_and_gravity(tmp_path):
     assert [one["exceeds"]["force"]["probability"] for one in said] == [0.0, 1.0]
     assert said[1]["load"] == [0, 0, 0, 0, 0, -100]
     assert said[1]["gravity"] == [0, 0, -9.81]
+
+
+@pytest.mark.parametrize("load", [None, LOAD])
+def test_errors_drawn_replace_the_robots_own(load):
+    """A robot with errors and one without: the same draws, the same answers."""
+    robot = load_robot("irsbot2")
+    posture, errors = place_robot(robot), some_errors(robot, 2)
+    own = replace(posture, robot=robot.with_errors(0.5 * errors[::-1][0]))
+    plain, other = (prepare_energies(p, load).solve(errors) for p in (posture, own))
+    np.testing.assert_allclose(other.energy, plain.energy, rtol=1e-6)
+    np.testing.assert_allclose(
+        other.platform_screw, plain.platform_screw, rtol=1e-4, atol=1e-8
+    )

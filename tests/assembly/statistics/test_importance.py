@@ -13,8 +13,10 @@ from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import (
+    SaltelliDesign,
     linear_importance,
     sobol_importance,
+    sobol_indices,
     source_groups,
 )
 from assembly.statistics.importance_table import ImportanceOptions
@@ -201,3 +203,25 @@ def test_groups_by_kind_join_the_legs():
     assert [len(c) for _, c in source_groups(sources, "frame")] == [2] * 4
     with pytest.raises(ValueError, match="by is 'leg'"):
         source_groups(sources, "leg")
+
+
+def test_indices_are_those_of_all_draws_within_their_intervals():
+    """V(E(f | a)) / V(f) and its total by the estimators of Saltelli and Jansen."""
+    A, B = three(0, 400), three(1, 400)
+    design = SaltelliDesign(A, B, THREE)
+    f = np.exp(design.rows(0, len(design)) @ [1.0, 0.5, 0.2])
+    found = sobol_indices(design, f[:, None], level=0.9)
+    a, b, mixed = f[:400], f[400:800], f[800:].reshape(3, 400)
+    # the mean is that of A and B, and so is the variance
+    mean, size = np.r_[a, b].mean(), np.r_[a, b].var()
+    first = ((b - mean) * (mixed - a)).mean(axis=1) / size
+    total = ((mixed - a) ** 2).mean(axis=1) / (2 * size)
+    np.testing.assert_allclose(found.first[0, :, 0], first, rtol=1e-9)
+    np.testing.assert_allclose(found.total[0, :, 0], total, rtol=1e-9)
+    assert found.variance[0] == pytest.approx(size)
+    for _, low, high in (*found.first[0], *found.total[0]):
+        assert low < high
+    wider = sobol_indices(design, f[:, None]).total[0]
+    assert (wider[:, 2] > found.total[0, :, 2]).all()
+    assert (found.total[0, :, 1] < total).all()
+    assert (found.total[0, :, 2] > total).all()

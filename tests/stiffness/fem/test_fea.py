@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem.fea import Budget, FemOptions, interface_center, solve_link
+from stiffness.fem.fea import (
+    Budget,
+    FemOptions,
+    interface_center,
+    solve_bar,
+    solve_link,
+)
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.surface.interface import parse_interface
@@ -105,3 +111,18 @@ def test_the_center_of_a_plane_is_its_areas_and_of_a_bore_its_point():
     )
     bore = parse_interface("bore=0,0,0.1/0,0,1/0.04")
     np.testing.assert_array_equal(interface_center(surface, bore, "tip"), [0, 0, 0.1])
+
+
+def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
+    """Less than wanted, where more would not fit; the estimate says what is missed."""
+    section, material = {"width": 0.3, "height": 0.3}, Material(E, NU)
+    first = solve_bar(section, material, FemOptions(1e-3, budget=Budget(levels=1))).link
+    budget = Budget(unknowns=2 * first.mesh["unknowns"])
+    finer = solve_bar(section, material, FemOptions(1e-3, budget=budget)).link
+    assert first.mesh["unknowns"] < finer.mesh["unknowns"] <= budget.unknowns
+    assert finer.mesh["meshes"] > 1
+    assert not finer.mesh["reached"]
+    # stiffer on the coarser mesh, by no more than it said
+    too_stiff = np.diag(first.stiffness) / np.diag(finer.stiffness) - 1
+    assert (too_stiff > 0).all()
+    assert too_stiff.max() <= first.relative_error_estimate

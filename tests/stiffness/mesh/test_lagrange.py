@@ -145,3 +145,17 @@ def test_the_numbers_of_the_corners_do_not_matter(rng):
     assert len(one.nodes) == len(two.nodes)
     gap = np.linalg.norm(one.nodes[:, None] - two.nodes[None], axis=2).min(axis=1)
     assert gap.max() < 1e-12
+
+
+@pytest.mark.parametrize("degree", [*ORDERS, 4, 5])
+def test_every_place_has_one_number_and_every_number_one_place(degree):
+    """Three tetrahedra around an edge: what they share is counted once."""
+    cells = np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 3, 4]])
+    points = np.random.default_rng(1).normal(size=(5, 3))
+    numbers, count = numbered(cells, degree)
+    places = np.einsum("mk,tkx->tmx", lattice(degree) / degree, points[cells])
+    every = np.unique(places.reshape(-1, 3).round(9), axis=0)
+    assert count == len(every) == len(np.unique(numbers)) == numbers.max() + 1
+    first = np.full((count, 3), np.nan)
+    first[numbers] = places
+    np.testing.assert_allclose(places, first[numbers], atol=1e-12)

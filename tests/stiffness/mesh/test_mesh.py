@@ -12,13 +12,15 @@ from stiffness.mesh.mesh import (
     MeshFailed,
     boundary_faces,
     cache_folder,
+    fit_to_patches,
     mesh_solid,
 )
 from stiffness.mesh.refine import refine
 from stiffness.surface.decimate import coarser_surface, euler_characteristic
 from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import find_patches
 from stiffness.surface.surface import check_surface, read_surface
-from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, box_solid
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, bar_solid, box_solid
 
 
 @pytest.fixture
@@ -194,3 +196,24 @@ def test_the_cache_is_where_the_user_says(monkeypatch, tmp_path):
     assert cache_folder() == tmp_path
     monkeypatch.delenv("FORCEFIT_CACHE")
     assert cache_folder().name == "forcefit"
+
+
+def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
+    """The ends' faces look along the bar, the side's across; its corners are on it."""
+    surface, ends = bar(), (parse_interface("z=0"), parse_interface("z=0.1"))
+    made = bar_solid(5, 4, 0.02, 0.1)
+    solid = fit_to_patches(
+        made.points * [0.98, 0.98, 1.0], made.cells[:, [0, 2, 1, 3]],
+        surface, find_patches(surface, *ends),
+    )  # fmt: skip
+    corners = solid.points[solid.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    along = normals[:, 2] / np.linalg.norm(normals, axis=1)
+    for patch, height, expected in ((0, 0.0, -1.0), (1, 0.1, 1.0)):
+        there = solid.patch == patch
+        assert np.abs(corners[there][..., 2] - height).max() < 1e-12
+        assert along[there] == pytest.approx(expected)
+    side = corners[solid.patch > 1]
+    assert np.hypot(side[..., 0], side[..., 1]) == pytest.approx(0.02)
+    assert np.abs(along[solid.patch > 1]).max() < 1e-9
+    assert (solid.volumes() > 0).all()

@@ -74,8 +74,11 @@ def test_what_is_no_surface_file_is_refused(tmp_path, name, content, message):
 
 
 def test_an_open_surface_is_refused_and_the_gap_named():
-    with pytest.raises(BadInput, match="open: 3 edges have a triangle on one side"):
+    with pytest.raises(
+        BadInput, match="open: 3 edges have a triangle on one side"
+    ) as no:
         check_surface(CUBE, CUBE_TRIANGLES[:-1], "cube")
+    assert "near (0, 0.05, 0.1)" in str(no.value)
 
 
 def test_a_surface_that_cuts_itself_is_refused():
@@ -132,5 +135,6 @@ def test_nearly_equal_vertices_are_merged_and_named(rng):
 def test_an_edge_of_four_triangles_is_refused():
     points = np.concatenate([CUBE, CUBE + [0.1, 0.1, 0]])
     triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
-    with pytest.raises(BadInput, match="1 edges are shared by more than two"):
+    with pytest.raises(BadInput, match="1 edges are shared by more than two") as no:
         check_surface(points, triangles, "cubes")
+    assert "near (0.1, 0.1, 0.05)" in str(no.value)
