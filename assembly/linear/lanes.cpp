@@ -1,5 +1,6 @@
-// Problem (22) without loads, several postures side by side, from the frames' poses to
-// the certified answer: compiled_energy.py and compiled_reduction.py in lanes.
+// Problems (22), without loads, and (21), several postures side by side, from the
+// frames' poses to the certified answer: compiled_reduction.py, compiled_energy.py and
+// compiled_zone.py in lanes.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning
@@ -16,18 +17,23 @@
 // known     (m,)           closure error that the geometric errors cause
 // G, h      (r, nu), (r,)  strains by clearances and by errors
 // u, v, y                  clearances, strains G u + h, multipliers of the springs
+// B, w      (p, nu), (p,)  of (21): B u = w must hold, B's rows orthonormal, |u_k| <= t
 // ========  =============  ============================================================
 #include "../solvers/cpp/cones.h"
 #include "../solvers/cpp/householder.h"
 
 // assembly/linear/thresholds.py and assembly/solvers/conic.py
 constexpr double RANK = 1e-10, MISMATCH_FACTOR = 30.0, NOISE = 1e-12, OPEN = 1e-11;
+constexpr double ROWS_RANK = 1e-9, INFEASIBLE = 1e-13, MARGIN_GAP = 1e-8;
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
 // assembly/linear/compiled_energy.py
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED };
 constexpr double STOP = 3e-3, NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9;
 constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
 constexpr double FIRST_SIGMA = 1e6;
+// assembly/linear/compiled_zone.py
+enum { SOLVED, FALLBACK };
+constexpr double MARGIN_STOP = 1e-9;
 
 // A robot: assembly/linear/compiled_structure.py's Structure, and how many there are.
 struct Robot {
@@ -59,6 +65,12 @@ struct Solutions {
         *multipliers, *residual, *elastic;
 };
 
+// Margins (21) and their bounds, one a point.
+struct Margins {
+    double *margin, *bound;
+    int64_t *outcome;
+};
+
 namespace {
 
 // The points of one block of lanes.
@@ -76,6 +88,13 @@ struct Block {
     }
 };
 
+// The rank in the first of these lanes.
+inline int rank_of_first(Whole ranks, Whole lanes) {
+    int l = 0;
+    while (!lanes[l]) ++l;
+    return int(ranks[l]);
+}
+
 // A closure that a frame enters, and the sign.
 struct Entry {
     int closure;
@@ -89,6 +108,7 @@ public:
 
     bool covers() const { return cones.known; }
     Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
+    Whole margins(const Points &points, const Block &block, Whole asked, Margins &out);
 
 private:
     const Robot &s;
@@ -99,6 +119,7 @@ private:
     Table P;                       // (n, 18) the three turns of each frame: `column`
     Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
     Triangle free, springs;        // F; Y with Z beside it
+    Triangle rows;                 // of (21), with their right sides
     Table L, parts;                // parts: Z's rows, for a screw of each pattern
     Row known;
     Real screw[6];  // of the platform
@@ -117,10 +138,13 @@ private:
     void part(const Real *row, int64_t pattern, Real *out) const;
     int spring_group(int g, Triangle &rows);
     void grouped_springs();
-    void spring_rows(int rank, int count);
+    void orthogonal_rows(int rank, int count);
+    void spring_rows(int count);
     void eliminate_springs(int rank, int count);
+    void clearance_parts(int count);
     Whole rigid_rows(int rank, int count, Real tolerance);
     Real enters(int c, const Real *part) const;
+    Real largest_clearance() const;
     void small_problem(int r);
     Whole minimise(int r, Whole asked);
     Row least_multipliers(int r, int count);
@@ -131,13 +155,15 @@ private:
     Row spring_strains(int r);
     struct Proof { Real gain, cost; };
     Proof complementary(const Row &motions, const Row &multipliers);
+    void first_along(int count, Real *w, Real size);
+    void farthest(int count, Whole asked, Real &reach, Real &most);
 };
 
 Assembler::Assembler(const Robot &s, const Points &points)
     : s(s), n(int(s.n)), m(int(6 * s.closures)), np(int(s.np)), ng(int(s.ng)),
       nu(int(s.nu)), nq(int(s.nq)), cones(s.starts, int(s.cones)), patterns(np), felt(n),
       erring(n), loose(np), P(n, 18), motion(nq, 6), play(nu, 6), elastic(int(s.ny), 6),
-      free(nq, m), springs(m, 6 * ng + m), L(6 * ng, 6), parts(m, 6 * np), known(m),
+      free(nq, m), springs(m, 6 * ng + m), rows(ng ? 0 : m, nu + 1), L(6 * ng, 6), parts(m, 6 * np), known(m),
       programme(cones, m), solver(cones, m), v(m), Z(m), widest(6) {
     for (int g = 0; g < np; ++g)
         for (int k = 0; k < s.closures; ++k)
@@ -287,14 +313,18 @@ void Assembler::grouped_springs() {
     }
 }
 
-// Z orthogonal to the free motions, and Y = Z times the grouped springs' columns.
-void Assembler::spring_rows(int rank, int count) {
+// Z, orthogonal to the free motions.
+void Assembler::orthogonal_rows(int rank, int count) {
     for (int i = 0; i < count; ++i) {
         Z[i] = springs.F[i] + 6 * ng;
         std::fill(Z[i], Z[i] + m, Real{});
         Z[i][rank + i] = real(1.0);
     }
     turn_all(free, rank, m, Z.data(), count);
+}
+
+// Y = Z times the grouped springs' columns.
+void Assembler::spring_rows(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < ng; ++g) {
             Real of_group[6], own[6] = {};
@@ -305,8 +335,7 @@ void Assembler::spring_rows(int rank, int count) {
         }
 }
 
-// Divides Z, ordered like Y's triangle, by it: rows that springs enter first.  Then
-// what a screw of each pattern is in its rows.
+// Divides Z, ordered like Y's triangle, by it: rows that springs enter first.
 void Assembler::eliminate_springs(int rank, int count) {
     Row weights(rank);
     for (int i = 0; i < count; ++i) {
@@ -319,9 +348,14 @@ void Assembler::eliminate_springs(int rank, int count) {
             const Real over = 1.0 / springs.diagonal[i];
             for (int a = 0; a < m; ++a) Z[i][a] *= over;
         }
+    }
+}
+
+// What a screw of each pattern is in Z's rows.
+void Assembler::clearance_parts(int count) {
+    for (int i = 0; i < count; ++i)
         for (int g = 0; g < np; ++g)
             if (loose[g]) part(Z[i], g, parts[i] + 6 * g);
-    }
 }
 
 // What clearance c is in a row, of which screws of its pattern are `part`.
@@ -331,6 +365,16 @@ Real Assembler::enters(int c, const Real *part) const {
     return total;
 }
 
+// Largest entry of the clearances' closure columns, for the noise floor.
+Real Assembler::largest_clearance() const {
+    Real largest = {};
+    for (int c = 0; c < nu; ++c)
+        for (const Entry &e : patterns[s.pattern_of[s.cone_frame[c]]])
+            for (int a = 0; a < 6; ++a)
+                largest = larger(magnitude(e.sign * play[c][a]), largest);
+    return largest;
+}
+
 // Lanes where clearances or errors enter rows that no spring enters.
 Whole Assembler::rigid_rows(int rank, int count, Real tolerance) {
     std::vector<Real> most(np), sizes(nu);
@@ -338,15 +382,10 @@ Whole Assembler::rigid_rows(int rank, int count, Real tolerance) {
         for (int i = rank; loose[g] && i < count; ++i)
             for (int a = 0; a < 6; ++a)
                 most[g] = larger(magnitude(parts[i][6 * g + a]), most[g]);
-    Real largest = {}, worst = {};
-    for (int c = 0; c < nu; ++c) {
+    Real worst = {};
+    for (int c = 0; c < nu; ++c)
         for (int a = 0; a < 6; ++a) sizes[c] = larger(magnitude(play[c][a]), sizes[c]);
-        double enters = 0.0;
-        for (const Entry &e : patterns[s.pattern_of[s.cone_frame[c]]])
-            enters = std::max(enters, std::fabs(e.sign));
-        largest = larger(sizes[c] * enters, largest);
-    }
-    const Real limit = largest * (NOISE / CLEAR);
+    const Real limit = largest_clearance() * (NOISE / CLEAR);
     for (int c = 0; c < nu; ++c) {
         const int64_t g = s.pattern_of[s.cone_frame[c]];
         const Whole near = 6.0 * sizes[c] * most[g] > limit;
@@ -551,11 +590,6 @@ Assembler::Proof Assembler::complementary(const Row &motions, const Row &multipl
 // rows; returns the others.
 Whole Assembler::solve(
     const Points &points, const Block &block, Whole asked, Solutions &out) {
-    const auto rank_of_first = [&](Whole rank) {
-        int l = 0;
-        while (!asked[l]) ++l;
-        return int(rank[l]);
-    };
     const auto settle = [&](Whole where, int64_t outcome) {
         for (int l = 0; l < LANES; ++l)
             if (where[l]) out.outcome[block.point[l]] = outcome;
@@ -566,19 +600,21 @@ Whole Assembler::solve(
     const Whole free_rank = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
     settle(asked & (free_rank < 0), AMBIGUOUS);
     if (!any(asked &= free_rank >= 0)) return Whole{};
-    const int rank = rank_of_first(free_rank), count = m - rank;
+    const int rank = rank_of_first(free_rank, asked), count = m - rank;
     asked &= free_rank == rank;
     grouped_springs();
-    spring_rows(rank, count);
+    orthogonal_rows(rank, count);
+    spring_rows(count);
     const Whole spring_rank = triangulate(
         springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
     settle(asked & (spring_rank < 0), AMBIGUOUS);
     Whole settled = (free_rank < 0) | (asked & (spring_rank < 0));
     if (!any(asked &= spring_rank >= 0)) return all & ~settled;
-    const int r = rank_of_first(spring_rank);
+    const int r = rank_of_first(spring_rank, asked);
     asked &= spring_rank == r;
     settled |= asked;
     eliminate_springs(r, count);
+    clearance_parts(count);
     const Whole rigid = rigid_rows(r, count, tolerance);
     settle(asked & rigid, RIGID);
     if (!any(asked &= ~rigid)) return all & ~settled;
@@ -631,6 +667,137 @@ Whole Assembler::solve(
     return all & ~settled;
 }
 
+// Margins of the lanes asked for that have the ranks of the first of them; returns the
+// others.  With every link and joint rigid, B u = w must hold: the least factor t on the
+// clearances is |w| over the most that g.u can be with |u_k| <= 1 and the rest of B u
+// zero, g = B^T w / |w|.  The multipliers n of these rows bound it from below,
+//
+//     t >= |w| / sum_k |(g - B_rest^T n)_k|.
+Whole Assembler::margins(
+    const Points &points, const Block &block, Whole asked, Margins &out) {
+    const auto settle = [&](Whole where, Real margin, Real bound, Whole proved) {
+        block.write(out.margin, 1, 0, margin, where);
+        block.write(out.bound, 1, 0, bound, where);
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) out.outcome[block.point[l]] = proved[l] ? SOLVED : FALLBACK;
+        return ~where;
+    };
+    const Real unknown = real(NAN);
+    Whole others = asked;
+    read(points, block);
+    const Whole closed = asked & (inner(known.data(), known.data(), m) == 0.0);
+    others &= settle(closed, Real{}, Real{}, closed);  // no clearance is needed
+    if (!any(asked = others)) return others;
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Whole ranks = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
+    others &= settle(asked & (ranks < 0), unknown, unknown, Whole{});
+    if (!any(asked &= ranks >= 0)) return others;
+    const int rank = rank_of_first(ranks, asked), count = m - rank;
+    asked &= ranks == rank;
+    orthogonal_rows(rank, count);
+    clearance_parts(count);
+    small_problem(count);
+    // rows u = right, beside each other
+    for (int i = 0; i < count; ++i) {
+        std::copy(programme.M[i], programme.M[i] + nu, rows.F[i]);
+        rows.F[i][nu] = -programme.h[i];
+    }
+    const Whole clear = triangulate(
+        rows, count, nu, real(ROWS_RANK), NOISE * largest_clearance(), -1.0, nu + 1);
+    others &= settle(asked & (clear < 0), unknown, unknown, Whole{});
+    if (!any(asked &= clear >= 0)) return others;
+    const int left = rank_of_first(clear, asked);
+    asked &= clear == left;
+    Row w(count);
+    Whole possible = whole(-1);
+    for (int i = 0; i < count; ++i) {
+        Real total = rows.F[i][nu];
+        for (int l = 0; l < std::min(i, left); ++l) total -= rows.F[i][l] * w[l];
+        if (i < left)
+            w[i] = total / rows.diagonal[i];
+        else  // what no clearance enters; written so that NaN is not possible
+            possible &= magnitude(total) <= INFEASIBLE;
+    }
+    const Real size = root(inner(w.data(), w.data(), left));
+    possible &= size > 0.0;
+    Real reach = {}, most = real(1.0);
+    if (any(asked & possible)) {
+        first_along(left, w.data(), size);
+        farthest(left, asked & possible, reach, most);
+    }
+    possible &= reach > 0.0;
+    const Real margin = size / reach, bound = size / most;
+    // motions of passive joints must stay within their ranges
+    for (Real &own : programme.u) own *= margin;
+    const Row motions = least_motions(rank, moved_by(0));
+    for (int c = 0; c < nq; ++c) possible &= magnitude(motions[c]) <= s.free_bound[c];
+    const Whole proved = possible & (margin - bound <= MARGIN_GAP * margin);
+    return others & settle(
+        asked, possible ? margin : unknown, possible ? bound : unknown, proved);
+}
+
+// B's rows, the triangle's own, turned so that the first is along w, the others across.
+void Assembler::first_along(int count, Real *w, Real size) {
+    Real *const *B = programme.M.rows();
+    for (int i = 0; i < count; ++i) {
+        std::fill(B[i], B[i] + nu, Real{});
+        B[i][i] = real(1.0);
+    }
+    turn_all(rows, count, nu, B, count);
+    for (int i = 0; i < count; ++i) w[i] /= size;
+    const Real sign = w[0] <= 0.0 ? real(1.0) : real(-1.0);
+    w[0] -= sign;
+    const Real factor = -2.0 / inner(w, w, count);
+    Row dots(nu), weights(count);
+    combine(B, count, w, nu, dots.data());
+    for (int i = 0; i < count; ++i)
+        for (int c = 0; c < nu; ++c) B[i][c] += factor * w[i] * dots[c];
+    for (int c = 0; c < nu; ++c) B[0][c] *= sign;
+}
+
+// u within the cones with the most B[0].u, its reach, and no B[1:] u; the most that it
+// can be, by the multipliers.
+void Assembler::farthest(int count, Whole asked, Real &reach, Real &most) {
+    Programme &q = programme;
+    Real **B = q.M.rows();
+    std::rotate(B, B + 1, B + count);  // the rows H u = 0 first
+    q.r = 0, q.p = count - 1;
+    const Real *along = B[q.p];
+    std::copy(along, along + nu, q.d.begin());
+    solver.interior_point(q, real(MARGIN_STOP), 0.0, asked);
+    Row gradient = q.d, against(q.p);
+    for (int i = 0; i < q.p; ++i) against[i] = -q.y[i];
+    combine(B, q.p, against.data(), nu, gradient.data());
+    // the residual of the rest by rounding is removed, then u scaled into the cones
+    for (int i = 0; i < q.p; ++i) {
+        const Real residual = inner(B[i], q.u.data(), nu);
+        for (int c = 0; c < nu; ++c) q.u[c] -= residual * B[i][c];
+    }
+    Real worst = real(1.0);
+    most = Real{};
+    cones.each([&](auto of, int, int at) {
+        worst = larger(inner(&q.u[at], &q.u[at], of), worst);
+        most += root(inner(&gradient[at], &gradient[at], of));
+    });
+    worst = root(worst);
+    for (int c = 0; c < nu; ++c) q.u[c] /= worst;
+    reach = inner(along, q.u.data(), nu);
+}
+
+// Every point in blocks of lanes; solve returns the lanes that it left.
+template <typename Solve> void in_blocks(int64_t count, Solve solve) {
+    for (int64_t first = 0; first < count; first += LANES) {
+        Block block;
+        Whole pending;
+        for (int l = 0; l < LANES; ++l) {
+            const bool inside = first + l < count;
+            block.point[l] = inside ? first + l : count - 1;
+            pending[l] = inside ? -1 : 0;
+        }
+        while (any(pending)) pending = solve(block, pending);
+    }
+}
+
 }  // namespace
 
 #ifndef SOURCE_DIGEST
@@ -646,15 +813,19 @@ extern "C" __attribute__((visibility("default"))) int assemble_all(
     const Robot *robot, const Points *points, Solutions *out) {
     Assembler assembler(*robot, *points);
     if (!assembler.covers()) return 0;
-    for (int64_t first = 0; first < points->count; first += LANES) {
-        Block block;
-        Whole pending;
-        for (int l = 0; l < LANES; ++l) {
-            const bool inside = first + l < points->count;
-            block.point[l] = inside ? first + l : points->count - 1;
-            pending[l] = inside ? -1 : 0;
-        }
-        while (any(pending)) pending = assembler.solve(*points, block, pending, *out);
-    }
+    in_blocks(points->count, [&](const Block &block, Whole pending) {
+        return assembler.solve(*points, block, pending, *out);
+    });
+    return 1;
+}
+
+// Margins of every point of a robot without springs, as compiled_zone.py's all_margins.
+extern "C" __attribute__((visibility("default"))) int all_margins(
+    const Robot *robot, const Points *points, Margins *out) {
+    Assembler assembler(*robot, *points);
+    if (robot->ng || !assembler.covers()) return 0;
+    in_blocks(points->count, [&](const Block &block, Whole pending) {
+        return assembler.margins(*points, block, pending, *out);
+    });
     return 1;
 }

@@ -1,7 +1,8 @@
-"""Problem (22) of several postures side by side, by ``lanes.cpp`` beside this file.
+"""Problems (22) and (21) of several postures side by side, by ``lanes.cpp``.
 
-The same equations and thresholds as :mod:`assembly.linear.compiled_energy`, one posture
-in each lane of the processor's vector registers.  No lane depends on another: a point
+The same equations and thresholds as :mod:`assembly.linear.compiled_energy` and
+:mod:`assembly.linear.compiled_zone`, one posture in each lane of the processor's vector
+registers.  No lane depends on another: a point
 solved alone, in a batch or in another order has the same answer to the last bit.
 """
 
@@ -63,18 +64,46 @@ def assemble_side_by_side(
     Returns:
         Whether it did; not where there is no compiler, or for cones of three columns.
     """
+    return _side_by_side("assemble_all", structure, (T, errors, mismatch), out)
+
+
+def margins_side_by_side(
+    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: tuple[NDArray, NDArray, NDArray],
+) -> bool:  # fmt: skip
+    """Margins of all points, with their lower bounds.
+
+    Args:
+        structure: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        out: (k,) margins, their bounds and outcomes to fill, as
+            :func:`assembly.linear.compiled_zone.all_margins` does.
+
+    Returns:
+        Whether it did, as above.
+    """
+    return _side_by_side("all_margins", structure, (T, errors, mismatch), out)
+
+
+def _side_by_side(
+    name: str, structure: "Structure", points: tuple[NDArray, NDArray, NDArray],
+    out: tuple[NDArray, ...],
+) -> bool:  # fmt: skip
+    """Call a function of the library on every point; whether it did."""
     library = load_library(SOURCE)
     if library is None:
         return False
-    points = _Points(
+    T, errors, mismatch = points
+    given = _Points(
         len(T), T.ctypes.data, errors.ctypes.data, mismatch.ctypes.data, len(errors) > 1
     )
     rows = [column.ctypes.data if column.size else None for column in out]
-    solutions = (ctypes.c_void_p * len(rows))(*rows)
-    robot = ctypes.byref(_robot(structure))
-    return bool(
-        library.assemble_all(robot, ctypes.byref(points), ctypes.byref(solutions))
-    )
+    filled = (ctypes.c_void_p * len(rows))(*rows)
+    robot = _robot(structure)
+    function = getattr(library, name)
+    return bool(function(*map(ctypes.byref, (robot, given, filled))))
 
 
 def _robot(structure: "Structure") -> _Robot:

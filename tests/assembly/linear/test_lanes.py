@@ -1,4 +1,4 @@
-"""Problems side by side in C++ against numba's kernel, and against each other."""
+"""Problems side by side in C++ against numba's kernels, and against each other."""
 
 import shutil
 import subprocess
@@ -11,11 +11,18 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import energy as module
+from assembly.linear import zone
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
-from assembly.linear.fallback import reference_assembly
-from assembly.linear.lanes import SOURCE
+from assembly.linear.fallback import reference_assembly, reference_margin
+from assembly.linear.lanes import (
+    SOURCE,
+    assemble_side_by_side,
+    margins_side_by_side,
+)
+from assembly.linear.robot_structure import structure_of
+from assembly.linear.zone import zone_margins
 from assembly.robots import BUILT_IN
 from assembly.solvers import compiled, native
 from assembly.solvers.native import load_library
@@ -85,8 +92,6 @@ def test_every_built_in_robot_has_numbas_energies(name, size, by_numba, rng):
 def test_random_robots_have_numbas_energies_or_its_reasons():
     """What numba's kernel leaves to the fallback, these leave, for the same reason."""
     from assembly.linear.compiled_energy import assemble_all
-    from assembly.linear.lanes import assemble_side_by_side
-    from assembly.linear.robot_structure import structure_of
 
     solved = 0
     for seed in range(150):
@@ -181,6 +186,69 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
             assert np.array_equal(
                 getattr(alone, name)[0], getattr(whole, name)[i], equal_nan=True
             )
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_are_numbas_and_proved(grid, compliant, monkeypatch):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for kappa in (0.05, 0.1, 0.2, 0.5, 1.0):
+        given = robot, T, compliant, mismatch, kappa * robot.errors
+        lanes = zone_margins(*given)
+        with monkeypatch.context() as context:
+            context.setattr(zone, "margins_side_by_side", lambda *given: False)
+            numba = zone_margins(*given)
+        assert not lanes.fallback.any()
+        assert lanes.margin == pytest.approx(numba.margin, rel=2e-8)
+        assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
+        assert np.all(lanes.bound <= numba.margin * (1 + 1e-11))
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_any_robot_are_numbas(compliant, rng):
+    """They leave nothing to the fallback that numba's kernel does not."""
+    from assembly.linear.compiled_zone import all_margins
+
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(120):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    solved = 0
+    for home in homes:
+        _, structure = structure_of(home.robot, compliant)
+        errors = 1e-4 * rng.normal(size=(5, len(home.robot.frames), 6))
+        errors[2] = 0.0  # needs no clearance
+        T = np.repeat(home.transforms[None], 5, axis=0)
+        lanes, numba = ((*np.full((2, 5), np.nan), np.ones(5, int)) for _ in range(2))
+        given = structure, T, errors, np.full(5, home.mismatch)
+        assert margins_side_by_side(*given, lanes)
+        all_margins(*given, *numba)
+        assert np.all(lanes[2] <= numba[2])
+        for i in np.flatnonzero(lanes[2] == 0).tolist():
+            expected = numba[0][i]
+            if numba[2][i]:
+                erring = replace(home, robot=home.robot.with_errors(errors[i]))
+                expected = reference_margin(erring, compliant)[0]
+            assert lanes[0][i] == pytest.approx(expected, rel=2e-8)
+            solved += 1
+    assert solved > 200
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
+    robot, postures = grid
+    T, off = stack(postures)
+    errors = robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
+    errors[::5] = 0.0
+    whole = zone_margins(robot, T, compliant, off, errors)
+    orders = [rng.permutation(len(T)) for _ in range(4)] + [[i] for i in range(8)]
+    for order in orders:
+        other = zone_margins(robot, T[order], compliant, off[order], errors[order])
+        for name in ("margin", "bound", "fallback"):
+            assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
 def test_without_a_compiler_numba_answers(grid, by_numba, tmp_path, monkeypatch):
