@@ -29,6 +29,7 @@ from assembly.linear.fallback import (
     reference_assembly,
     without_own_springs,
 )
+from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.rounding import (
@@ -43,6 +44,7 @@ from assembly.model.robot import Robot
 
 if TYPE_CHECKING:
     from assembly.linear.compiled_energy import Solutions
+    from assembly.linear.compiled_structure import Structure
 
 __all__ = [
     "Assemblies", "Assembly", "CannotAssemble", "minimise_energies", "solve_assembly",
@@ -189,8 +191,29 @@ def _solve_compiled(
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
     elif errors.any():  # else nothing has to move, and zeros are the answer
-        assemble_all(structure, T, errors, mismatch, out)
+        if assemble_side_by_side(structure, T, errors, mismatch, out):
+            _solve_left(structure, T, errors, mismatch, out)
+        else:
+            assemble_all(structure, T, errors, mismatch, out)
     return out
+
+
+def _solve_left(
+    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: "Solutions",
+) -> None:  # fmt: skip
+    """By numba what side by side was not certified; rounding there is another."""
+    from assembly.linear.compiled_energy import Solutions, assemble_all
+
+    left = np.flatnonzero(out.outcome >= COMPILED)
+    if not len(left):
+        return
+    again = Solutions._make(rows[left] if len(rows) else rows for rows in out)
+    own = errors[left] if len(errors) > 1 else errors
+    assemble_all(structure, T[left], own, mismatch[left], again)
+    for rows, solved in zip(out, again, strict=True):
+        if len(rows):
+            rows[left] = solved
 
 
 def minimise_energies(

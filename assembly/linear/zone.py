@@ -10,7 +10,7 @@ literal reading); ``"free"`` lets them turn about their own axis, as a hinge doe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, overload
+from typing import TYPE_CHECKING, ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,12 +18,16 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import checked_size
 from assembly.linear.fallback import reference_margin
+from assembly.linear.lanes import margins_side_by_side
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
+
+if TYPE_CHECKING:
+    from assembly.linear.compiled_structure import Structure
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins
@@ -197,7 +201,7 @@ def _compiled(
     errors: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
     """(k,) margins, their bounds, and whether each is left to the fallback."""
-    from assembly.linear.compiled_zone import FALLBACK, all_margins
+    from assembly.linear.compiled_zone import FALLBACK
 
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
@@ -209,9 +213,30 @@ def _compiled(
     outcome = np.full(len(T), FALLBACK)
     if joints.scaled.all():
         # writable and in C order, whatever comes: the kernels are compiled for one kind
-        all_margins(
-            structure, np.require(T, requirements=["C", "W"]),
+        points = (
+            np.require(T, requirements=["C", "W"]),
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),
-            mismatch, margin, bound, outcome,
-        )  # fmt: skip
+            mismatch,
+        )
+        _solve_all(structure, points, (margin, bound, outcome))
     return margin, bound, outcome
+
+
+def _solve_all(
+    structure: "Structure", points: tuple[NDArray, NDArray, NDArray],
+    out: tuple[NDArray, NDArray, NDArray],
+) -> None:  # fmt: skip
+    """Side by side, and by numba what that leaves: rounding there is another."""
+    from assembly.linear.compiled_zone import all_margins
+
+    if not margins_side_by_side(structure, *points, out):
+        all_margins(structure, *points, *out)
+        return
+    left = np.flatnonzero(out[2])
+    if len(left):
+        T, errors, mismatch = points
+        again = tuple(rows[left] for rows in out)
+        own = errors[left] if len(errors) > 1 else errors
+        all_margins(structure, T[left], own, mismatch[left], *again)
+        for rows, solved in zip(out, again, strict=True):
+            rows[left] = solved

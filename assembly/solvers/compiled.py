@@ -20,11 +20,12 @@ import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import cache, partial
+from pathlib import Path
 from pickle import UnpicklingError
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
-from llvmlite.binding import add_symbol
+from llvmlite.binding import add_symbol, get_host_cpu_features, get_host_cpu_name
 from numba import config, njit, types
 from numba.core import event, funcdesc
 from numba.core.codegen import CPUCodeLibrary
@@ -209,22 +210,33 @@ def _numba_type(hint: Any) -> types.Type:
     return types.BaseTuple.from_types(tuple(map(_numba_type, fields.values())), hint)
 
 
+def folder_of_compiled() -> Path:
+    """Where compiled code is kept on disk, by numba and by others."""
+    return Path(njit(cache=True)(_keep_functions)._cache.cache_path)
+
+
+def processor() -> str:
+    """Which processor code is compiled for, with its features."""
+    return f"{get_host_cpu_name()} {get_host_cpu_features().flatten()}"
+
+
+@cache
+def announce() -> None:
+    """Say once that this is the first compilation on this machine."""
+    if multiprocessing.parent_process() is None:
+        print(
+            "forcefit: compiling its solvers, once on this machine "
+            "(`forcefit warm-up` does it beforehand)",
+            file=sys.stderr,
+        )
+
+
 class _Announcement(event.Listener):
     """One line when the first function of this package has to be compiled."""
 
-    announced = False
-
     def on_start(self, event: Any) -> None:
-        function = event.data["dispatcher"].py_func
-        ours = function.__module__.startswith("assembly.")
-        first = multiprocessing.parent_process() is None and not self.announced
-        if ours and first:
-            self.announced = True
-            print(
-                "forcefit: compiling its solvers, once on this machine "
-                "(`forcefit warm-up` does it beforehand)",
-                file=sys.stderr,
-            )
+        if event.data["dispatcher"].py_func.__module__.startswith("assembly."):
+            announce()
 
     def on_end(self, event: Any) -> None:
         """No message."""

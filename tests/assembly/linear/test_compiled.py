@@ -254,6 +254,9 @@ def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
     """The kernel's own certificate: asked for more than is possible, it refuses."""
     robot, postures = grid
     from assembly.linear import compiled_energy as compiled_assembly
+    from assembly.linear import energy
+
+    monkeypatch.setattr(energy, "assemble_side_by_side", lambda *given: False)
 
     assemble_all = compiled_assembly.assemble_all
 

@@ -1,0 +1,123 @@
+"""Problems (22) and (21) of several postures side by side, by ``lanes.cpp``.
+
+The same equations and thresholds as :mod:`assembly.linear.compiled_energy` and
+:mod:`assembly.linear.compiled_zone`, one posture in each lane of the processor's vector
+registers.  No lane depends on another: a point
+solved alone, in a batch or in another order has the same answer to the last bit.
+"""
+
+import ctypes
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from assembly.solvers.native import load_library
+
+if TYPE_CHECKING:
+    from assembly.linear.compiled_energy import Solutions
+    from assembly.linear.compiled_structure import Structure
+
+SOURCE = "linear/lanes.cpp"
+_ARRAYS = (
+    "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
+    "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis", "cone_size",
+    "starts", "free_frame", "free_axis", "free_bound",
+)  # fmt: skip
+_COUNTS = ("n", "closures", "np", "ny", "ng", "nu", "cones", "nq")
+_KEPT = 64  # robots whose arrays' addresses are known
+_known: dict[int, tuple["Structure", "_Robot"]] = {}
+
+
+class _Robot(ctypes.Structure):
+    """``Robot`` of lanes.cpp: the fields of a structure, and how many there are."""
+
+    _fields_ = (
+        ("size", ctypes.c_double),
+        ("platform", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_int64) for name in _COUNTS),
+    )
+
+
+class _Points(ctypes.Structure):
+    """``Points`` of lanes.cpp."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64), ("T", ctypes.c_void_p), ("errors", ctypes.c_void_p),
+        ("mismatch", ctypes.c_void_p), ("own_errors", ctypes.c_int64),
+    )  # fmt: skip
+
+
+def assemble_side_by_side(
+    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: "Solutions",
+) -> bool:  # fmt: skip
+    """Solve every point; see :class:`~assembly.linear.compiled_energy.Solutions`.
+
+    Args:
+        structure: the robot.
+        T: (k, n, 4, 4) frames.
+        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        out: arrays to fill.
+
+    Returns:
+        Whether it did; not where there is no compiler, or for cones of three columns.
+    """
+    return _side_by_side("assemble_all", structure, (T, errors, mismatch), out)
+
+
+def margins_side_by_side(
+    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: tuple[NDArray, NDArray, NDArray],
+) -> bool:  # fmt: skip
+    """Margins of all points, with their lower bounds.
+
+    Args:
+        structure: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        out: (k,) margins, their bounds and outcomes to fill, as
+            :func:`assembly.linear.compiled_zone.all_margins` does.
+
+    Returns:
+        Whether it did, as above.
+    """
+    return _side_by_side("all_margins", structure, (T, errors, mismatch), out)
+
+
+def _side_by_side(
+    name: str, structure: "Structure", points: tuple[NDArray, NDArray, NDArray],
+    out: tuple[NDArray, ...],
+) -> bool:  # fmt: skip
+    """Call a function of the library on every point; whether it did."""
+    library = load_library(SOURCE)
+    if library is None:
+        return False
+    T, errors, mismatch = points
+    given = _Points(
+        len(T), T.ctypes.data, errors.ctypes.data, mismatch.ctypes.data, len(errors) > 1
+    )
+    rows = [column.ctypes.data if column.size else None for column in out]
+    filled = (ctypes.c_void_p * len(rows))(*rows)
+    robot = _robot(structure)
+    function = getattr(library, name)
+    return bool(function(*map(ctypes.byref, (robot, given, filled))))
+
+
+def _robot(structure: "Structure") -> _Robot:
+    """A structure's addresses; it is kept as long as they are."""
+    known = _known.get(id(structure))
+    if known is None:
+        if len(_known) >= _KEPT:
+            _known.clear()
+        s = structure
+        counts = (
+            len(s.on_path), s.patterns.shape[1], len(s.patterns), len(s.springs),
+            len(s.groups) - 1, len(s.cone_frame), len(s.starts) - 1, len(s.free_frame),
+        )  # fmt: skip
+        arrays = [getattr(s, name).ctypes.data for name in _ARRAYS]
+        robot = _Robot(s.size, s.platform, *arrays, *counts)
+        known = _known[id(structure)] = structure, robot
+    return known[1]

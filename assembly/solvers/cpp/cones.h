@@ -1,0 +1,478 @@
+// Small cone programmes side by side, assembly/solvers/interior.py and dual_newton.py
+// in lanes:
+//
+//     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = 0,  |u_k| <= 1, each cone k
+//
+// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector, and without H
+// by Newton's method on the dual, smoothed about u_old by sigma:
+//
+//     maximise  y.h - |y|^2 / 2 - sum_k |(G^T y - d)_k|
+//
+// ========  ===========================================================================
+// M         (r + p, nu) rows of G, then of H
+// y         their multipliers: G u + h, and those of H u = 0
+// z         (z0, z1), the cones' multipliers: z1 = M^T y - d
+// w, rho    Nesterov and Todd's points, W = rho^1/2 (w); here l = (w) z, and right sides
+//           of the scaled complementarity are rho^1/2 t: no root of rho is taken
+// D         W^2 without its heads, of each cone
+// S         M D M^T + diag(1 .. 1, 0 .. 0)
+// ========  ===========================================================================
+//
+// Sources: those of the two Python files; the lanes solve the same equations.
+#pragma once
+
+#include <algorithm>
+
+#include "real.h"
+
+constexpr int ITERATIONS = 60;      // most of the interior-point method
+constexpr double START = 0.03;      // heads of z begin this far inside their cones
+constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a cone
+constexpr int HALVINGS = 12;        // of a step of Newton's
+constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
+
+// The cones' columns: discs of two columns each first, then intervals of one.
+struct Cones {
+    int discs = 0, count = 0, nu = 0;
+    std::vector<int64_t> column;  // (nu,) as the robot counts them
+    bool known = true;            // no cone has more than two columns
+
+    Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
+        for (int size = 2; size >= 1; --size)
+            for (int c = 0; c < cones; ++c)
+                if (starts[c + 1] - starts[c] == size) {
+                    discs += size == 2;
+                    for (int k = 0; k < size; ++k) column.push_back(starts[c] + k);
+                }
+        known = int(column.size()) == nu;
+    }
+
+    // Calls visit.template operator()<size>(cone, first column) for every cone.
+    template <typename Visit> void each(Visit visit) const {
+        for (int c = 0; c < discs; ++c) visit(Size<2>{}, c, 2 * c);
+        for (int c = discs; c < count; ++c) visit(Size<1>{}, c, discs + c);
+    }
+    template <int size> struct Size {
+        constexpr operator int() const { return size; }
+    };
+};
+
+// A problem in each lane, and its answer.
+struct Programme {
+    const Cones &cones;
+    int r, p;     // rows of G and of H
+    Table M;      // (r + p, nu)
+    Row h, d;     // (r,), (nu,)
+    Row u, y;     // (nu,), (r + p,) the answer
+    Programme(const Cones &cones, int rows)
+        : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu),
+          u(cones.nu), y(rows) {}
+};
+
+// Symmetric systems S x = right, factored in the lower half of S: S = L D L^T, no roots.
+class System {
+public:
+    Table S;
+    explicit System(int rows) : S(rows, rows), size(rows) {}
+
+    // Lanes where every pivot is a number; one lost to rounding is made huge, or, where
+    // that is not allowed, fails.  The diagonal is overwritten with D^-1.
+    Whole factor(int m, bool replace) {
+        Whole good = whole(-1);
+        for (int j = 0; j < m; ++j) size[j] = S[j][j];
+        for (int j = 0; j < m; ++j) {
+            const Real pivot = S[j][j];
+            const Whole clear = pivot > (replace ? 1e-15 * size[j] : Real{});
+            S[j][j] = clear ? 1.0 / pivot : real(1e-128);
+            good &= replace ? clear | ((pivot == pivot) & (size[j] >= 0.0)) : clear;
+            for (int i = j + 1; i < m; ++i) {
+                const Real own = S[i][j], weight = own * S[j][j];
+                for (int l = j + 1; l < i; ++l) S[i][l] -= weight * S[j][l];
+                S[i][i] -= weight * own;
+                S[j][i] = own, S[i][j] = weight;  // D L^T above, L below
+            }
+        }
+        return good;
+    }
+
+    void solve(int m, Real *x) {
+        for (int j = 0; j < m; ++j) {
+            x[j] *= S[j][j];
+            for (int i = j + 1; i < m; ++i) x[i] -= S[j][i] * x[j];
+        }
+        for (int j = m - 1; j >= 0; --j)
+            for (int i = 0; i < j; ++i) x[i] -= S[j][i] * x[j];
+    }
+
+private:
+    Row size;
+};
+
+class Solver {
+public:
+    explicit Solver(const Cones &cones, int rows)
+        : k(cones), system(rows), B(2, cones.nu), heads(cones.count),
+          z0(cones.count), z1(cones.nu), u(cones.nu), du(cones.nu), dz0(cones.count),
+          dz1(cones.nu), t0(cones.count), t1(cones.nu), r0(cones.count), e(cones.nu),
+          f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu) {}
+
+    Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
+    Whole dual_newton(
+        Programme &q, int steps, double first_sigma, double relative, Real absolute,
+        Whole asked);
+
+private:
+    // Nesterov and Todd's scaling of a cone
+    struct Head {
+        Real rho, w0, w[2], l0, l[2];
+        Real D[3];                            // 11, 12, 22
+        Real s2, z2;                          // 1 - u.u, z0^2 - z1.z1
+        Real over_s2, over_z2, over_z0, over_rho, over_l0, over_head;  // 1 / (1 + w0)
+    };
+
+    const Cones &k;
+    System system;
+    Table B;
+    std::vector<Head> heads;
+    Row z0, z1, u, du, dz0, dz1, t0, t1, r0, e, f, y, right, residual, start, old;
+
+    Whole scale();
+    template <int R> void square_scaled(Real *const *x, Real *const *out) const;
+    void fill_system(const Programme &q);
+    void direction(Programme &q);
+    Real fastest() const;
+    void correct(Real target);
+    struct Slopes { Real smooth, residual, kink, primal; };
+    Slopes slopes(const Programme &q, Real sigma, const Real *y);
+};
+
+// Overwrites the scaling with that of (u, z); lanes whose cones all have points.
+inline Whole Solver::scale() {
+    Whole inside = whole(-1);
+    k.each([&](auto size, int c, int at) {
+        Head &o = heads[c];
+        Real s2 = real(1.0), z2 = z0[c] * z0[c], sz = z0[c];
+        for (int i = at; i < at + size; ++i) {
+            s2 -= u[i] * u[i];
+            z2 -= z1[i] * z1[i];
+            sz += u[i] * z1[i];
+        }
+        inside &= (s2 > 0.0) & (z2 > 0.0);
+        o.s2 = s2, o.z2 = z2;
+        // divisions take as long as ten products: one for three
+        const Real both = s2 * z2, over = 1.0 / (both * z0[c]), heads_over = z0[c] * over;
+        o.over_z0 = both * over, o.over_s2 = z2 * heads_over, o.over_z2 = s2 * heads_over;
+        o.rho = root(s2 * o.over_z2), o.over_rho = z2 * o.rho * o.over_s2;
+        // (1, u) / |s| and (z0, -z1) / |z|, halfway between
+        const Real half = 1.0 / root(2.0 * (s2 + o.rho * sz));
+        o.w0 = (1.0 + o.rho * z0[c]) * half;
+        Real ww = {}, wz = {};
+        for (int i = 0; i < size; ++i) {
+            o.w[i] = (u[at + i] - o.rho * z1[at + i]) * half;
+            ww += o.w[i] * o.w[i];
+            wz += o.w[i] * z1[at + i];
+        }
+        o.l0 = o.w0 * z0[c] + wz;
+        const Real head = 1.0 + o.w0, wide = 1.0 + 2.0 * ww;
+        const Real most = head * o.l0, once = 1.0 / (most * wide), fewer = wide * once;
+        o.over_head = o.l0 * fewer, o.over_l0 = head * fewer;
+        const Real along = o.rho * most * once;  // of D, which is rho across w
+        for (int i = 0; i < size; ++i)
+            o.l[i] = z1[at + i] + (z0[c] + wz * o.over_head) * o.w[i];
+        o.D[0] = along;
+        if (size == 2) {
+            o.D[0] = along * (1.0 + 2.0 * o.w[1] * o.w[1]);
+            o.D[1] = -2.0 * along * o.w[0] * o.w[1];
+            o.D[2] = along * (1.0 + 2.0 * o.w[0] * o.w[0]);
+        }
+    });
+    return inside;
+}
+
+// D x of R rows x.
+template <int R>
+inline void Solver::square_scaled(Real *const *x, Real *const *out) const {
+    k.each([&](auto size, int c, int at) {
+        const Real *o = heads[c].D, D[3] = {o[0], o[1], o[2]};
+        for (int i = 0; i < R; ++i) {
+            const Real first = x[i][at];
+            if (size == 1) {
+                out[i][at] = D[0] * first;
+            } else {
+                const Real second = x[i][at + 1];
+                out[i][at] = D[0] * first + D[1] * second;
+                out[i][at + 1] = D[1] * first + D[2] * second;
+            }
+        }
+    });
+}
+
+// S's lower half, two rows at a time: B = D M stays near the processor.
+inline void Solver::fill_system(const Programme &q) {
+    const int m = q.r + q.p;
+    Real *const *M = q.M.rows(), **S = system.S.rows();
+    int i = 0;
+    for (; i + 2 <= m; i += 2) {
+        square_scaled<2>(M + i, B.rows());
+        products<2>(B.rows(), M, i + 2, k.nu, S + i);
+    }
+    if (i < m) {
+        square_scaled<1>(M + i, B.rows());
+        products<1>(B.rows(), M, m, k.nu, S + i);
+    }
+    for (i = 0; i < q.r; ++i) S[i][i] += 1.0;
+}
+
+// Step for the scaled right sides t, M's rows eliminated.  dz0 comes from s.dz + z.ds =
+// r0, the first row of the scaled complementarity: W^-1 t - W^-2 ds cancels.
+inline void Solver::direction(Programme &q) {
+    const int m = q.r + q.p;
+    k.each([&](auto size, int c, int at) {  // f = (W^-1 t)_1
+        const Head &o = heads[c];
+        Real part = {};
+        for (int i = 0; i < size; ++i) part += o.w[i] * t1[at + i];
+        part = part * o.over_head - t0[c];
+        for (int i = 0; i < size; ++i) f[at + i] = (t1[at + i] + part * o.w[i]) * o.over_rho;
+    });
+    Real *own = f.data(), *squared = e.data();
+    square_scaled<1>(&own, &squared);
+    multiply(q.M.rows(), m, e.data(), k.nu, right.data());
+    for (int i = 0; i < q.p; ++i) right[q.r + i] -= residual[i];
+    system.solve(m, right.data());
+    std::fill(dz1.begin(), dz1.end(), Real{});
+    combine(q.M.rows(), m, right.data(), k.nu, dz1.data());
+    for (int j = 0; j < k.nu; ++j) e[j] = f[j] - dz1[j];
+    own = du.data();
+    square_scaled<1>(&squared, &own);
+    k.each([&](auto size, int c, int at) {
+        dz0[c] = r0[c];
+        for (int i = at; i < at + size; ++i) dz0[c] -= z1[i] * du[i] + u[i] * dz1[i];
+    });
+}
+
+// The inverse of the longest step that keeps every s and z in its cone.
+inline Real Solver::fastest() const {
+    Real most = {};
+    // 1 / t for the smallest t > 0 with a t^2 + 2 b t + c = 0, c < 0
+    const auto crossing = [](Real a, Real b, Real minus_c, Real over_c) {
+        const Real under = b * b + a * minus_c;
+        const Real below = b + root(under > 0.0 ? under : Real{});
+        return (under >= 0.0) & (below > 0.0) ? below * over_c : Real{};
+    };
+    k.each([&](auto size, int c, int at) {
+        const Head &o = heads[c];
+        Real aa = {}, ab = {}, ya = -dz0[c] * dz0[c], yb = -z0[c] * dz0[c];
+        for (int i = at; i < at + size; ++i) {
+            aa += du[i] * du[i], ab += u[i] * du[i];
+            ya += dz1[i] * dz1[i], yb += z1[i] * dz1[i];
+        }
+        most = larger(crossing(aa, ab, o.s2, o.over_s2), most);
+        most = larger(crossing(ya, yb, o.z2, o.over_z2), most);
+        most = larger(-dz0[c] * o.over_z0, most);
+    });
+    return most;
+}
+
+// Solves l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t.
+inline void Solver::correct(Real target) {
+    k.each([&](auto size, int c, int at) {
+        const Head &o = heads[c];
+        Real ds = {}, dz = {};
+        for (int i = 0; i < size; ++i) {
+            ds += o.w[i] * du[at + i];
+            dz += o.w[i] * dz1[at + i];
+        }
+        const Real s0 = -ds, y0 = o.w0 * dz0[c] + dz;
+        Real head = o.l0 * o.l0, product = s0 * y0, lt = {};
+        ds *= o.over_head, dz = dz0[c] + dz * o.over_head;
+        for (int i = 0; i < size; ++i) {
+            const Real s1 = du[at + i] + ds * o.w[i], y1 = dz1[at + i] + dz * o.w[i];
+            head += o.l[i] * o.l[i], product += s1 * y1;
+            t1[at + i] = -(s0 * y1 + y0 * s1) - 2.0 * o.rho * o.l0 * o.l[i];
+            lt += o.l[i] * t1[at + i];
+        }
+        r0[c] = target - product - o.rho * head;
+        t0[c] = (o.l0 * r0[c] - lt) * o.over_z2;  // |l| = |z|
+        for (int i = 0; i < size; ++i)
+            t1[at + i] = (t1[at + i] - t0[c] * o.l[i]) * o.over_l0;
+    });
+}
+
+// Minimises in the lanes asked for, from u = 0; q.u and q.y of H are overwritten there
+// with the last iterate.  Returns the lanes where the gap came down to tolerance +
+// relative |G u + h|^2 / 2.
+inline Whole Solver::interior_point(
+    Programme &q, Real tolerance, double relative, Whole asked) {
+    const int r = q.r, p = q.p, m = r + p;
+    const auto dual = [&] {  // z1 = M^T y - d
+        for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
+        combine(q.M.rows(), m, y.data(), k.nu, z1.data());
+    };
+    std::fill(u.begin(), u.end(), Real{});
+    for (int i = 0; i < m; ++i) y[i] = i < r ? q.h[i] : Real{};
+    dual();
+    k.each([&](auto size, int c, int at) {
+        z0[c] = root(inner(&z1[at], &z1[at], size)) + START;
+    });
+    Whole going = asked, done = {};
+    for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+        Real gap = inner(z1.data(), u.data(), k.nu), energy = 0.5 * inner(y.data(), y.data(), r);
+        for (const Real &head : z0) gap += head;
+        multiply(q.M.rows() + r, p, u.data(), k.nu, residual.data());
+        Real worst = {};
+        for (int i = 0; i < p; ++i) {
+            residual[i] = -residual[i];
+            worst = larger(magnitude(residual[i]), worst);
+        }
+        const Whole close = (gap <= tolerance + relative * energy) & (worst <= 1e-13);
+        done |= going & close;
+        going &= ~close;
+        if (!any(going)) break;
+        going &= scale();
+        fill_system(q);
+        going &= system.factor(m, true);
+        if (!any(going)) break;
+        // predictor: no centring, no correction
+        k.each([&](auto size, int c, int at) {
+            const Head &o = heads[c];
+            t0[c] = -o.rho * o.l0;
+            r0[c] = -z0[c];
+            for (int i = 0; i < size; ++i) {
+                t1[at + i] = -o.rho * o.l[i];
+                r0[c] -= u[at + i] * z1[at + i];
+            }
+        });
+        direction(q);
+        Real length = 1.0 / larger(fastest(), real(1.0));
+        // 1.5 where 3 is usual: a sixth less iterations on these problems
+        const Real sigma = (1.0 - length) * root(1.0 - length);
+        correct(sigma * gap / double(k.count));
+        direction(q);
+        length = BACK_OFF / larger(fastest(), real(BACK_OFF));
+        going &= length >= 1e-10;
+        // lanes that have ended stay where they are
+        for (int j = 0; j < k.nu; ++j) u[j] = going ? u[j] + length * du[j] : u[j];
+        for (int c = 0; c < k.count; ++c) z0[c] = going ? z0[c] + length * dz0[c] : z0[c];
+        // the balance holds by construction; computed anew it cannot drift
+        multiply(q.M.rows(), r, u.data(), k.nu, y.data());
+        for (int i = 0; i < r; ++i) y[i] += q.h[i];
+        for (int i = r; i < m; ++i) y[i] = going ? y[i] + length * right[i] : y[i];
+        dual();
+    }
+    for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
+    for (int i = r; i < m; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    return done;
+}
+
+// Value and derivatives at y of the dual smoothed about `old`: the clearances u, the
+// gradient `right`, and D of minus the curvature M D M^T + 1.
+inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real *y) {
+    for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
+    combine(q.M.rows(), q.r, y, k.nu, z1.data());
+    const Real over_twice = 0.5 / sigma;
+    Slopes at = {};
+    k.each([&](auto size, int c, int first) {
+        Real *own = &u[first], *z = &z1[first], *kept = &old[first];
+        Real *D = heads[c].D, along = {}, moved = {}, force;
+        for (int i = 0; i < size; ++i) own[i] = kept[i] - sigma * z[i];
+        if (size == 1) {
+            const Whole inside = magnitude(own[0]) <= 1.0;
+            own[0] = inside ? own[0] : own[0] > 0.0 ? real(1.0) : real(-1.0);
+            D[0] = inside ? sigma : Real{};
+            force = magnitude(z[0]);
+        } else {
+            const Real length = root(own[0] * own[0] + own[1] * own[1]);
+            const Whole inside = length <= 1.0;
+            const Real shorter = 1.0 / (inside ? real(1.0) : length);
+            own[0] *= shorter, own[1] *= shorter;
+            // on the disc's edge only turning is left
+            const Real across = sigma * shorter;
+            D[0] = inside ? sigma : across * own[1] * own[1];
+            D[1] = inside ? Real{} : -across * own[0] * own[1];
+            D[2] = inside ? sigma : across * own[0] * own[0];
+            force = root(z[0] * z[0] + z[1] * z[1]);
+        }
+        for (int i = 0; i < size; ++i) {
+            along += z[i] * own[i];
+            moved += (own[i] - kept[i]) * (own[i] - kept[i]);
+        }
+        at.smooth += along + moved * over_twice;
+        at.kink += larger(force + along, Real{});
+    });
+    multiply(q.M.rows(), q.r, u.data(), k.nu, right.data());
+    for (int i = 0; i < q.r; ++i) {
+        at.smooth += y[i] * (q.h[i] - 0.5 * y[i]);
+        const Real strain = right[i] + q.h[i];
+        right[i] = strain - y[i];
+        at.residual += 0.5 * right[i] * right[i];
+        at.primal += 0.5 * strain * strain;
+    }
+    return at;
+}
+
+// Maximises the dual in the lanes asked for; q.u is the first guess, and q.u and q.y
+// are overwritten there with the solution.
+//
+// steps        most Newton steps;
+// first_sigma  times the mean |(G^T h)_k|: the larger, the better the guess must be;
+//              0 leaves the dual as it is, with its kinks, and stops at the first one;
+// relative, absolute  gap asked for.
+//
+// Returns the lanes that converged.
+inline Whole Solver::dual_newton(
+    Programme &q, int steps, double first_sigma, double relative, Real absolute,
+    Whole asked) {
+    const int r = q.r;
+    old = q.u;
+    for (int i = 0; i < r; ++i) y[i] = q.h[i];
+    multiply(q.M.rows(), r, old.data(), k.nu, right.data());
+    for (int i = 0; i < r; ++i) y[i] += right[i];
+    for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
+    combine(q.M.rows(), r, q.h.data(), k.nu, z1.data());
+    Real mean = {};
+    for (int j = 0; j < k.nu; ++j) mean += magnitude(z1[j]);
+    mean /= double(k.nu);
+    Real sigma = first_sigma > 0.0 ? first_sigma / larger(mean, real(1e-12)) : real(1e30);
+    Real before = real(-INFINITY);
+    Whole going = asked, done = {}, halvings = {}, taken = {};
+    Row step(r);
+    while (true) {
+        Slopes at = slopes(q, sigma, y.data());
+        const Whole close = at.residual + at.kink <= relative * at.primal + absolute;
+        done |= going & close;
+        going &= ~close;
+        const Whole climbs = at.smooth >= before - 1e-14;
+        halvings = climbs ? Whole{} : halvings + 1;
+        going &= climbs | (halvings <= (first_sigma > 0.0 ? HALVINGS : 0));
+        going &= ~climbs | (taken < steps);
+        if (!any(going)) break;
+        // shorter where it did not climb, else on
+        const Whole shorter = going & ~climbs, on = going & climbs;
+        for (int i = 0; i < r; ++i) {
+            step[i] = shorter ? 0.3 * step[i] : step[i];
+            y[i] = shorter ? start[i] + step[i] : y[i];
+        }
+        if (!any(on)) continue;
+        before = on ? at.smooth : before;
+        taken -= on;
+        const Whole moves = on & (at.residual <= INNER_SHARE * (at.residual + at.kink));
+        if (any(moves)) {
+            for (int j = 0; j < k.nu; ++j) old[j] = moves ? u[j] : old[j];
+            sigma = moves ? sigma * SIGMA_GROWTH : sigma;
+            before = moves ? real(-INFINITY) : before;
+            slopes(q, sigma, y.data());
+        }
+        fill_system(q);
+        going &= ~on | system.factor(r, false);
+        system.solve(r, right.data());
+        const Whole ahead = on & going;
+        for (int i = 0; i < r; ++i) {
+            start[i] = ahead ? y[i] : start[i];
+            step[i] = ahead ? right[i] : step[i];
+            y[i] = ahead ? y[i] + step[i] : y[i];
+        }
+    }
+    for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
+    for (int i = 0; i < r; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    return done;
+}

@@ -1,0 +1,99 @@
+"""C++ of this package, compiled where a compiler stands: problems side by side.
+
+A library is compiled at its first use, for this very processor, and kept beside what
+numba keeps.  Its name and what it says of itself hold a digest of its source, of the
+compiler's options and of the processor, so that none is used that is out of date.
+Where no compiler stands, or it fails, there is no library, and callers use numba.
+"""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
+# lanes must not depend on each other: nothing that lets sums be reordered
+_OPTIONS = (
+    "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fvisibility=hidden",
+    "-shared", "-fPIC",
+)  # fmt: skip
+_COMPILERS = ("c++", "g++", "clang++")
+_LONGEST = 120  # [s] a compiler may take
+
+
+@cache
+def load_library(source: str) -> ctypes.CDLL | None:
+    """The library of a source file, compiled before if it has to be.
+
+    Args:
+        source: file below this package, such as ``"linear/lanes.cpp"``, that exports
+            ``source_digest``.
+
+    Returns:
+        The library; None where there is no compiler, or it cannot compile it.
+    """
+    from assembly.solvers.compiled import folder_of_compiled
+
+    digest = _digest(source)
+    path = folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
+    library = _loaded(path, digest)
+    if library is None and not path.with_suffix(".failed").exists():
+        try:
+            _compile(source, digest, path)
+        except OSError:  # no folder to write to
+            return None
+        library = _loaded(path, digest)
+    return library
+
+
+def _digest(source: str) -> str:
+    """Of all that the machine code depends on."""
+    from assembly.solvers.compiled import processor
+
+    parts = [" ".join(_OPTIONS), processor()]
+    for file in (_PACKAGE / source, *sorted((_PACKAGE / "solvers/cpp").glob("*.h"))):
+        parts.append(file.read_text(encoding="utf-8"))
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
+    """What is on disk, if it is that and can be loaded."""
+    try:
+        library = ctypes.CDLL(str(path))
+        library.source_digest.restype = ctypes.c_char_p
+        return library if library.source_digest() == digest.encode() else None
+    except (OSError, AttributeError):
+        return None
+
+
+def _compile(source: str, digest: str, path: Path) -> None:
+    """Write the library, whole or not at all; where that fails, a note that it did."""
+    from assembly.solvers.compiled import announce
+
+    compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
+    if compiler is None:
+        return
+    announce()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
+    os.close(handle)
+    command = [
+        compiler, *_OPTIONS, f'-DSOURCE_DIGEST="{digest}"', str(_PACKAGE / source),
+        "-o", unfinished,
+    ]  # fmt: skip
+    try:
+        run = subprocess.run(
+            command, capture_output=True, timeout=_LONGEST, check=False
+        )
+        if run.returncode == 0:
+            os.replace(unfinished, path)
+        else:
+            path.with_suffix(".failed").write_bytes(run.stderr)
+    except subprocess.TimeoutExpired:
+        path.with_suffix(".failed").touch()
+    finally:
+        Path(unfinished).unlink(missing_ok=True)

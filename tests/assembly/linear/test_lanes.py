@@ -1,0 +1,301 @@
+"""Problems side by side in C++ against numba's kernels, and against each other."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear import energy as module
+from assembly.linear import zone
+from assembly.linear.assemblies import COMPILED
+from assembly.linear.closure import linearise, virtual_joints
+from assembly.linear.energy import minimise_energies
+from assembly.linear.fallback import reference_assembly, reference_margin
+from assembly.linear.lanes import (
+    SOURCE,
+    assemble_side_by_side,
+    margins_side_by_side,
+)
+from assembly.linear.robot_structure import structure_of
+from assembly.linear.zone import zone_margins
+from assembly.robots import BUILT_IN
+from assembly.solvers import compiled, native
+from assembly.solvers.native import load_library
+from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, stack
+
+needs_compiler = pytest.mark.skipif(
+    load_library(SOURCE) is None, reason="no C++ compiler"
+)
+ROWS = (
+    "outcome", "energy", "bound", "energy_without_clearance", "platform_screw",
+    "closure_residual", "clearances", "motions", "multipliers",
+)  # fmt: skip
+
+
+@pytest.fixture
+def by_numba(monkeypatch):
+    """Least energies by numba's kernel alone."""
+
+    def solve(*given):
+        with monkeypatch.context() as context:
+            context.setattr(module, "assemble_side_by_side", lambda *given: False)
+            return minimise_energies(*given)
+
+    return solve
+
+
+def assert_both_proved(lanes, numba):
+    """Each energy is above the other's certified bound, and each proves its gap."""
+    assert lanes.certified.all()
+    assert numba.certified.all()
+    rounding = 1e-12 * numba.energy_without_clearance + 1e-30
+    assert np.all(lanes.energy >= numba.bound - rounding)
+    assert np.all(numba.energy >= lanes.bound - rounding)
+    assert lanes.energy_without_clearance == pytest.approx(
+        numba.energy_without_clearance, rel=1e-7, abs=1e-30
+    )
+    assert lanes.closure_residual.max(initial=0.0) < 1e-11
+    assert lanes.clearance_excess.max(initial=0.0) < 1e-14
+
+
+@needs_compiler
+@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 0.2, 0.5, 1.0])
+def test_all_points_of_the_papers_robot_are_certified(grid, by_numba, kappa):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    lanes = minimise_energies(robot, T, kappa * robot.errors, mismatch)
+    assert lanes.fallbacks() == {}
+    assert_both_proved(lanes, by_numba(robot, T, kappa * robot.errors, mismatch))
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+@pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
+def test_every_built_in_robot_has_numbas_energies(name, size, by_numba, rng):
+    home = home_posture(BUILT_IN[name]())
+    T = np.broadcast_to(home.transforms, (7, *home.transforms.shape))
+    errors = size * rng.normal(size=(7, len(home.robot.frames), 6))
+    if name == "irsbot2":  # its proximal loops are rigid and perfect
+        errors[:, ~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
+    given = home.robot, T, errors, home.mismatch
+    lanes, numba = minimise_energies(*given), by_numba(*given)
+    assert lanes.fallbacks() == numba.fallbacks() == {}
+    assert_both_proved(lanes, numba)
+
+
+@needs_compiler
+def test_random_robots_have_numbas_energies_or_its_reasons():
+    """What numba's kernel leaves to the fallback, these leave, for the same reason."""
+    from assembly.linear.compiled_energy import assemble_all
+
+    solved = 0
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        robot = random_robot(rng, legs=1 + seed % 3, joints=1 + seed // 3 % 3)
+        home = home_posture(robot)
+        joints, structure = structure_of(robot)
+        errors = np.array([robot.errors, 0.3 * robot.errors, -robot.errors])
+        T = np.repeat(home.transforms[None], 3, axis=0)
+        off = np.full(3, home.mismatch)
+        lanes, numba = (rows_for(joints, robot, 3) for _ in range(2))
+        assert assemble_side_by_side(structure, T, errors, off, lanes)
+        assemble_all(structure, T, errors, off, numba)
+        left = numba.outcome >= COMPILED
+        assert np.array_equal(lanes.outcome[left], numba.outcome[left])
+        assert np.all(lanes.outcome[~left] < COMPILED)
+        allowed = 2e-8 * numba.energy + 2e-12 * numba.without_clearance + 1e-30
+        off = np.abs(lanes.energy - numba.energy)
+        assert np.all(off[~left] <= allowed[~left])
+        solved += np.sum(~left)
+        for i in np.flatnonzero(~left).tolist():
+            # the deformation of every spring holds the energy
+            stored = 0.5 * np.sum(lanes.elastic[i] ** 2)
+            assert stored == pytest.approx(lanes.energy[i], rel=1e-10, abs=1e-25)
+    assert solved > 150
+
+
+def rows_for(joints, robot, count):
+    """Arrays for answers of so many points, their springs' deformation included."""
+    from assembly.linear.compiled_energy import Solutions
+
+    def zeros(*shape):
+        return np.zeros((count, *shape))
+
+    closures = 6 * len(robot.closures)
+    return Solutions(
+        np.zeros(count, dtype=np.int64), zeros(), zeros(), zeros(), zeros(6),
+        zeros(joints.cones.shape[1]), zeros(joints.free.shape[1]), zeros(closures),
+        zeros(), zeros(len(joints.links)),
+    )  # fmt: skip
+
+
+@needs_compiler
+def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
+    """By the complementary energy in numpy, which shares nothing with the lanes."""
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    lanes = minimise_energies(robot, T, mismatch=mismatch)
+    for i in (0, 11, 20, 33):
+        one = reference_assembly(postures[i])
+        proved = replace(one, multipliers=lanes.multipliers[i]).bound
+        assert proved == pytest.approx(lanes.bound[i], rel=1e-9)
+
+
+@needs_compiler
+@pytest.mark.parametrize("kappa", [0.2, 1.0])
+def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
+    """Other order, other neighbours, alone: not a bit changes."""
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    errors = kappa * robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
+    errors[::7] = 0.0  # some need nothing, others many iterations
+    whole = minimise_energies(robot, T, errors, mismatch)
+    for _ in range(4):
+        order = rng.permutation(len(T))
+        other = minimise_energies(robot, T[order], errors[order], mismatch[order])
+        for name in ROWS:
+            assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
+    for i in range(0, len(T), 5):
+        alone = minimise_energies(robot, T[[i]], errors[[i]], mismatch[[i]])
+        for name in ROWS:
+            assert np.array_equal(getattr(alone, name)[0], getattr(whole, name)[i])
+
+
+@needs_compiler
+def test_postures_of_different_rank_stand_side_by_side(rng):
+    """Three parallel hinges: their turns are independent unless they stand in line."""
+    home = home_posture(BUILT_IN["five_bar"]())
+    robot, T = home.robot, np.repeat(home.transforms[None], 8, axis=0)
+    T[::3, :, 1:3, 3] = 0.0
+    free = virtual_joints(robot).free
+    ranks = [
+        np.linalg.matrix_rank(linearise(replace(home, transforms=own)).rows @ free)
+        for own in T[:2]
+    ]
+    assert ranks == [2, 3]
+    errors = 1e-4 * rng.normal(size=(8, len(robot.frames), 6))
+    whole = minimise_energies(robot, T, errors)
+    for i in range(8):
+        alone = minimise_energies(robot, T[[i]], errors[[i]])
+        for name in ROWS:
+            assert np.array_equal(
+                getattr(alone, name)[0], getattr(whole, name)[i], equal_nan=True
+            )
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_are_numbas_and_proved(grid, compliant, monkeypatch):
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for kappa in (0.05, 0.1, 0.2, 0.5, 1.0):
+        given = robot, T, compliant, mismatch, kappa * robot.errors
+        lanes = zone_margins(*given)
+        with monkeypatch.context() as context:
+            context.setattr(zone, "margins_side_by_side", lambda *given: False)
+            numba = zone_margins(*given)
+        assert not lanes.fallback.any()
+        assert lanes.margin == pytest.approx(numba.margin, rel=2e-8)
+        assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
+        assert np.all(lanes.bound <= numba.margin * (1 + 1e-11))
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_any_robot_are_numbas(compliant, rng):
+    """They leave nothing to the fallback that numba's kernel does not."""
+    from assembly.linear.compiled_zone import all_margins
+
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(120):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    solved = 0
+    for home in homes:
+        _, structure = structure_of(home.robot, compliant)
+        errors = 1e-4 * rng.normal(size=(5, len(home.robot.frames), 6))
+        errors[2] = 0.0  # needs no clearance
+        T = np.repeat(home.transforms[None], 5, axis=0)
+        lanes, numba = ((*np.full((2, 5), np.nan), np.ones(5, int)) for _ in range(2))
+        given = structure, T, errors, np.full(5, home.mismatch)
+        assert margins_side_by_side(*given, lanes)
+        all_margins(*given, *numba)
+        assert np.all(lanes[2] <= numba[2])
+        for i in np.flatnonzero(lanes[2] == 0).tolist():
+            expected = numba[0][i]
+            if numba[2][i]:
+                erring = replace(home, robot=home.robot.with_errors(errors[i]))
+                expected = reference_margin(erring, compliant)[0]
+            assert lanes[0][i] == pytest.approx(expected, rel=2e-8)
+            solved += 1
+    assert solved > 200
+
+
+@needs_compiler
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
+    robot, postures = grid
+    T, off = stack(postures)
+    errors = robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
+    errors[::5] = 0.0
+    whole = zone_margins(robot, T, compliant, off, errors)
+    orders = [rng.permutation(len(T)) for _ in range(4)] + [[i] for i in range(8)]
+    for order in orders:
+        other = zone_margins(robot, T[order], compliant, off[order], errors[order])
+        for name in ("margin", "bound", "fallback"):
+            assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
+
+
+def test_without_a_compiler_numba_answers(grid, by_numba, tmp_path, monkeypatch):
+    robot, postures = grid
+    T, mismatch = stack(postures[:3])
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiled, "folder_of_compiled", lambda: tmp_path)
+    load_library.cache_clear()
+    try:
+        batch = minimise_energies(robot, T, mismatch=mismatch)
+        assert load_library(SOURCE) is None
+    finally:
+        load_library.cache_clear()
+    assert list(tmp_path.iterdir()) == []
+    numba = by_numba(robot, T, None, mismatch)
+    assert np.array_equal(batch.energy, numba.energy)
+
+
+def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
+    asked = []
+
+    def fail(command, **options):
+        asked.append(command)
+        return subprocess.CompletedProcess(command, 1, b"", b"no <cmath>")
+
+    monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
+    monkeypatch.setattr(compiled, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(native.subprocess, "run", fail)
+    for _ in range(2):
+        load_library.cache_clear()
+        assert load_library(SOURCE) is None
+    load_library.cache_clear()
+    assert len(asked) == 1
+    (note,) = tmp_path.iterdir()
+    assert note.read_bytes() == b"no <cmath>"
+
+
+@needs_compiler
+def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
+    """A file of the right name that says it was made from something else."""
+    made = Path(load_library(SOURCE)._name)
+    monkeypatch.setattr(compiled, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr(native, "_digest", lambda source: "0" * 16)
+    shutil.copy(made, tmp_path / f"lanes.{'0' * 16}.so")
+    load_library.cache_clear()
+    try:
+        assert load_library(SOURCE) is None
+    finally:
+        load_library.cache_clear()
