@@ -68,7 +68,7 @@ def spoilt(solve):
 
     def solver(G, h, d, H, k, group):
         u, rigid, status = solve(G, h, d, H, k, group)
-        return 0.9999 * u, rigid, status
+        return None if u is None else 0.9999 * u, rigid, status
 
     return solver
 
