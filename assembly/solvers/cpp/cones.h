@@ -31,6 +31,11 @@ constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a 
 constexpr int HALVINGS = 12;        // of a step of Newton's
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
 
+// of assembly/linear/compiled_energy.py's small_answer: gap from which Newton's method
+// finishes, of the energy and of that without clearance; its steps; its first sigma
+constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
+constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
+
 // The cones' columns: discs of two columns each first, then intervals of one.
 struct Cones {
     int discs = 0, count = 0, nu = 0;
@@ -116,6 +121,11 @@ public:
           dz1(cones.nu), t0(cones.count), t1(cones.nu), r0(cones.count), e(cones.nu),
           f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu) {}
 
+    Whole newton_alone(Programme &q, double relative, Real absolute, Whole asked) {
+        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
+    }
+    void interior_then_newton(
+        Programme &q, double relative, Real absolute, Whole asked);
     Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
@@ -475,4 +485,24 @@ inline Whole Solver::dual_newton(
     for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
     for (int i = 0; i < r; ++i) q.y[i] = asked ? y[i] : q.y[i];
     return done;
+}
+
+// Least |G u + h|^2 / 2 in the lanes asked for, to a gap of absolute + relative times it.
+inline void Solver::interior_then_newton(
+    Programme &q, double relative, Real absolute, Whole asked) {
+    const Real without = 0.5 * inner(q.h.data(), q.h.data(), q.r);
+    // near a zone's edge the interior point stops early; Newton then takes longer
+    for (int attempt = 0; attempt < 2 && any(asked); ++attempt) {
+        if (attempt == 0)
+            interior_point(q, NEAR_WITHOUT_CLEARANCE * without, NEAR, asked);
+        else
+            interior_point(q, absolute, relative, asked);
+        k.each([&](auto size, int, int at) {  // rounding may have left the cones
+            const Real length = root(inner(&q.u[at], &q.u[at], size));
+            const Real shorter = asked ? larger(length, real(1.0)) : real(1.0);
+            for (int i = at; i < at + size; ++i) q.u[i] /= shorter;
+        });
+        const int steps = attempt == 0 ? STEPS : STEPS_LAST;
+        asked &= ~dual_newton(q, steps, FIRST_SIGMA, relative, absolute, asked);
+    }
 }
