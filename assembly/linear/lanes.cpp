@@ -732,7 +732,7 @@ void Assembler::farthest(int count, Whole asked, Real &reach, Real &most) {
     Programme &q = programme;
     Real **B = q.M.rows();
     std::rotate(B, B + 1, B + count);  // the rows H u = 0 first
-    q.r = 0, q.p = count - 1;
+    q.r = 0, q.p = count - 1, q.loaded = true;
     const Real *along = B[q.p];
     std::copy(along, along + nu, q.d.begin());
     solver.interior_point(q, real(MARGIN_STOP), 0.0, asked);
