@@ -9,7 +9,7 @@ from assembly.batch.draws_side_by_side import SOURCE, least_energies_side_by_sid
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
 from assembly.robots import BUILT_IN
-from assembly.solvers.native import load_library
+from assembly.solvers.native import by_numba, load_library
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 needs_compiler = pytest.mark.skipif(
@@ -30,13 +30,11 @@ def draws_of(name, size, rng):
 @needs_compiler
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
-def test_draws_have_numbas_energies(name, size, rng, monkeypatch):
+def test_draws_have_numbas_energies(name, size, rng):
     one, errors = draws_of(name, size, rng)
     lanes = one.solve(errors)
-    monkeypatch.setattr(
-        one_posture, "least_energies_side_by_side", lambda *given: False
-    )
-    numba = one.solve(errors)
+    with by_numba():
+        numba = one.solve(errors)
     assert lanes.fallback.sum() <= numba.fallback.sum()
     # each above the other's certified bound, which is 1e-8 below its own energy
     rounding = 1e-8 * numba.energy + 2e-12 * numba.energy.max() + 1e-30
