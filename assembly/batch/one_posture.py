@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.batch.draws import Draws
+from assembly.batch.draws_side_by_side import least_energies_side_by_side
 from assembly.batch.posture_loads import PostureLoads
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
@@ -143,7 +144,9 @@ def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
         slip=float(np.linalg.norm(slip)),
     )
     h = e @ one.misfit[:, erring].T
-    least_energies(reduced, h, Energies(u, y, energy, bound, outcome))
+    out = Energies(u, y, energy, bound, outcome)
+    if not least_energies_side_by_side(reduced, h, out):
+        least_energies(reduced, h, out)
     parts = np.hstack([u, e])
     fallback = (outcome > 0) | bool(len(one.H))
     for rows, limit in ((left, np.full(len(left), OPEN)), (motions, one.ranges)):

@@ -19,6 +19,7 @@
 // u, v, y                  clearances, strains G u + h, multipliers of the springs
 // B, w      (p, nu), (p,)  of (21): B u = w must hold, B's rows orthonormal, |u_k| <= t
 // ========  =============  ============================================================
+#include "../solvers/cpp/block.h"
 #include "../solvers/cpp/cones.h"
 #include "../solvers/cpp/householder.h"
 
@@ -28,9 +29,7 @@ constexpr double ROWS_RANK = 1e-9, INFEASIBLE = 1e-13, MARGIN_GAP = 1e-8;
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
 // assembly/linear/compiled_energy.py
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED };
-constexpr double STOP = 3e-3, NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9;
-constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
-constexpr double FIRST_SIGMA = 1e6;
+constexpr double STOP = 3e-3;
 // assembly/linear/compiled_zone.py
 enum { SOLVED, FALLBACK };
 constexpr double MARGIN_STOP = 1e-9;
@@ -72,21 +71,6 @@ struct Margins {
 };
 
 namespace {
-
-// The points of one block of lanes.
-struct Block {
-    int64_t point[LANES];
-
-    Real read(const double *from, int64_t stride, int64_t at) const {
-        Real x;
-        for (int l = 0; l < LANES; ++l) x[l] = from[point[l] * stride + at];
-        return x;
-    }
-    void write(double *to, int64_t stride, int64_t at, Real x, Whole where) const {
-        for (int l = 0; l < LANES; ++l)
-            if (where[l]) to[point[l] * stride + at] = x[l];
-    }
-};
 
 // The rank in the first of these lanes.
 inline int rank_of_first(Whole ranks, Whole lanes) {
@@ -439,30 +423,17 @@ Whole Assembler::minimise(int r, Whole asked) {
         q.h[i] *= over;
         for (int c = 0; c < nu; ++c) q.M[i][c] *= over;
     }
-    const Real without = 0.5 * inner(q.h.data(), q.h.data(), r);
-    const Real absolute = STOP * GAP_WITHOUT_CLEARANCE * without;
-    Whole left = asked & ~solver.dual_newton(q, STEPS_ALONE, 0.0, STOP * GAP, absolute, asked);
-    const Whole interior = left;
-    // near a zone's edge the interior point stops early; Newton then takes longer
-    for (int attempt = 0; attempt < 2 && any(left); ++attempt) {
-        if (attempt == 0)
-            solver.interior_point(q, NEAR_WITHOUT_CLEARANCE * without, NEAR, left);
-        else
-            solver.interior_point(q, absolute, STOP * GAP, left);
-        cones.each([&](auto of, int, int at) {
-            const Real length = root(inner(&q.u[at], &q.u[at], of));
-            for (int i = at; i < at + of; ++i) q.u[i] /= larger(length, real(1.0));
-        });
-        const int steps = attempt == 0 ? STEPS : STEPS_LAST;
-        left &= ~solver.dual_newton(q, steps, FIRST_SIGMA, STOP * GAP, absolute, left);
-    }
+    const Real absolute =
+        STOP * GAP_WITHOUT_CLEARANCE * 0.5 * inner(q.h.data(), q.h.data(), r);
+    const Whole left = asked & ~solver.newton_alone(q, STOP * GAP, absolute, asked);
+    solver.interior_then_newton(q, STOP * GAP, absolute, left);
     multiply(q.M.rows(), r, q.u.data(), nu, v.data());
     for (int i = 0; i < r; ++i) {
         v[i] = (v[i] + q.h[i]) * size;
         q.y[i] = asked ? q.y[i] * size : q.y[i];
         q.h[i] *= size;
     }
-    return interior ? whole(INTERIOR) : whole(NEWTON);
+    return left ? whole(INTERIOR) : whole(NEWTON);
 }
 
 // Multipliers of the closures, the least ones where they are not unique.
@@ -761,7 +732,7 @@ void Assembler::farthest(int count, Whole asked, Real &reach, Real &most) {
     Programme &q = programme;
     Real **B = q.M.rows();
     std::rotate(B, B + 1, B + count);  // the rows H u = 0 first
-    q.r = 0, q.p = count - 1;
+    q.r = 0, q.p = count - 1, q.loaded = true;
     const Real *along = B[q.p];
     std::copy(along, along + nu, q.d.begin());
     solver.interior_point(q, real(MARGIN_STOP), 0.0, asked);
@@ -784,47 +755,26 @@ void Assembler::farthest(int count, Whole asked, Real &reach, Real &most) {
     reach = inner(along, q.u.data(), nu);
 }
 
-// Every point in blocks of lanes; solve returns the lanes that it left.
-template <typename Solve> void in_blocks(int64_t count, Solve solve) {
-    for (int64_t first = 0; first < count; first += LANES) {
-        Block block;
-        Whole pending;
-        for (int l = 0; l < LANES; ++l) {
-            const bool inside = first + l < count;
-            block.point[l] = inside ? first + l : count - 1;
-            pending[l] = inside ? -1 : 0;
-        }
-        while (any(pending)) pending = solve(block, pending);
-    }
-}
-
 }  // namespace
-
-#ifndef SOURCE_DIGEST
-#define SOURCE_DIGEST ""
-#endif
-extern "C" __attribute__((visibility("default"))) const char *source_digest() {
-    return SOURCE_DIGEST;
-}
 
 // Solves every point, as assemble_all of compiled_energy.py does.  Returns whether this
 // kind of robot is covered: no cone of more than two columns.
-extern "C" __attribute__((visibility("default"))) int assemble_all(
+EXPORTED int assemble_all(
     const Robot *robot, const Points *points, Solutions *out) {
     Assembler assembler(*robot, *points);
     if (!assembler.covers()) return 0;
-    in_blocks(points->count, [&](const Block &block, Whole pending) {
+    in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return assembler.solve(*points, block, pending, *out);
     });
     return 1;
 }
 
 // Margins of every point of a robot without springs, as compiled_zone.py's all_margins.
-extern "C" __attribute__((visibility("default"))) int all_margins(
+EXPORTED int all_margins(
     const Robot *robot, const Points *points, Margins *out) {
     Assembler assembler(*robot, *points);
     if (robot->ng || !assembler.covers()) return 0;
-    in_blocks(points->count, [&](const Block &block, Whole pending) {
+    in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return assembler.margins(*points, block, pending, *out);
     });
     return 1;

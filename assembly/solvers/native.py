@@ -12,6 +12,9 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 
@@ -25,7 +28,19 @@ _COMPILERS = ("c++", "g++", "clang++")
 _LONGEST = 120  # [s] a compiler may take
 
 
-@cache
+_refused: ContextVar[bool] = ContextVar("refused", default=False)
+
+
+@contextmanager
+def by_numba() -> Generator[None, None, None]:
+    """Within it there are no libraries: callers use numba."""
+    token = _refused.set(True)
+    try:
+        yield
+    finally:
+        _refused.reset(token)
+
+
 def load_library(source: str) -> ctypes.CDLL | None:
     """The library of a source file, compiled before if it has to be.
 
@@ -36,6 +51,12 @@ def load_library(source: str) -> ctypes.CDLL | None:
     Returns:
         The library; None where there is no compiler, or it cannot compile it.
     """
+    return None if _refused.get() else _library(source)
+
+
+@cache
+def _library(source: str) -> ctypes.CDLL | None:
+    """The library, or None, found out once."""
     from assembly.solvers.compiled import folder_of_compiled
 
     digest = _digest(source)

@@ -1,6 +1,7 @@
 """Compilation of all compiled functions in advance: ``forcefit warm-up``."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
 from assembly.linear.zone import zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
+from assembly.solvers.native import by_numba
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.worst_clearance import worst_error_slopes
 
@@ -37,8 +39,14 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
         # what the fallback calls
         lambda: reference_margin(posture, "rigid"),
         lambda: reference_pose_error(reference_assembly(posture), Asked()),
-        lambda: minimise_energies(robot, T),
-        lambda: zone_margins(robot, T),
+        *(
+            partial(_by_each_method, compute)
+            for compute in (
+                lambda: minimise_energies(robot, T),
+                lambda: zone_margins(robot, T),
+                lambda: prepared.solve(errors[None]),
+            )
+        ),
         lambda: platform_stiffnesses(robot, T),
         lambda: bound_pose_errors(robot, T),
         lambda: prepare_margins(posture).solve(errors[None]),
@@ -53,6 +61,13 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
     for done, compute in enumerate(computations, start=1):
         compute()
         progress(done, len(computations))
+
+
+def _by_each_method(compute: Callable[[], object]) -> None:
+    """In C++, where a compiler stands, and by numba, which is at hand for the rest."""
+    compute()
+    with by_numba():
+        compute()
 
 
 def _finish_with_newton() -> None:

@@ -31,6 +31,11 @@ constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a 
 constexpr int HALVINGS = 12;        // of a step of Newton's
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
 
+// of assembly/linear/compiled_energy.py's small_answer: gap from which Newton's method
+// finishes, of the energy and of that without clearance; its steps; its first sigma
+constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
+constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
+
 // The cones' columns: discs of two columns each first, then intervals of one.
 struct Cones {
     int discs = 0, count = 0, nu = 0;
@@ -64,6 +69,7 @@ struct Programme {
     Table M;      // (r + p, nu)
     Row h, d;     // (r,), (nu,)
     Row u, y;     // (nu,), (r + p,) the answer
+    bool loaded = false;  // else d is zero
     Programme(const Cones &cones, int rows)
         : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu),
           u(cones.nu), y(rows) {}
@@ -111,30 +117,34 @@ private:
 class Solver {
 public:
     explicit Solver(const Cones &cones, int rows)
-        : k(cones), system(rows), B(2, cones.nu), heads(cones.count),
-          z0(cones.count), z1(cones.nu), u(cones.nu), du(cones.nu), dz0(cones.count),
-          dz1(cones.nu), t0(cones.count), t1(cones.nu), r0(cones.count), e(cones.nu),
+        : k(cones), system(rows), B(2, cones.nu), heads(cones.count), z0(cones.count),
+          z1(cones.nu), u(cones.nu), du(cones.nu), dz0(cones.count), dz1(cones.nu),
           f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu) {}
 
+    Whole newton_alone(Programme &q, double relative, Real absolute, Whole asked) {
+        return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
+    }
+    void interior_then_newton(
+        Programme &q, double relative, Real absolute, Whole asked);
     Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
         Whole asked);
 
 private:
-    // Nesterov and Todd's scaling of a cone
+    // Nesterov and Todd's scaling of a cone.  What two products give is not kept: all
+    // that an iteration touches has to fit into the fastest cache.
     struct Head {
-        Real rho, w0, w[2], l0, l[2];
-        Real D[3];                            // 11, 12, 22
-        Real s2, z2;                          // 1 - u.u, z0^2 - z1.z1
-        Real over_s2, over_z2, over_z0, over_rho, over_l0, over_head;  // 1 / (1 + w0)
+        Real rho, w0, w[2];
+        Real D[3];                                    // 11, 12, 22
+        Real over_s2, over_z0, over_l0, over_head;    // 1 / (1 - u.u) ..  1 / (1 + w0)
     };
 
     const Cones &k;
     System system;
     Table B;
     std::vector<Head> heads;
-    Row z0, z1, u, du, dz0, dz1, t0, t1, r0, e, f, y, right, residual, start, old;
+    Row z0, z1, u, du, dz0, dz1, f, y, right, residual, start, old;
 
     Whole scale();
     template <int R> void square_scaled(Real *const *x, Real *const *out) const;
@@ -158,11 +168,10 @@ inline Whole Solver::scale() {
             sz += u[i] * z1[i];
         }
         inside &= (s2 > 0.0) & (z2 > 0.0);
-        o.s2 = s2, o.z2 = z2;
         // divisions take as long as ten products: one for three
         const Real both = s2 * z2, over = 1.0 / (both * z0[c]), heads_over = z0[c] * over;
-        o.over_z0 = both * over, o.over_s2 = z2 * heads_over, o.over_z2 = s2 * heads_over;
-        o.rho = root(s2 * o.over_z2), o.over_rho = z2 * o.rho * o.over_s2;
+        o.over_z0 = both * over, o.over_s2 = z2 * heads_over;
+        o.rho = root(s2 * s2 * heads_over);
         // (1, u) / |s| and (z0, -z1) / |z|, halfway between
         const Real half = 1.0 / root(2.0 * (s2 + o.rho * sz));
         o.w0 = (1.0 + o.rho * z0[c]) * half;
@@ -172,13 +181,10 @@ inline Whole Solver::scale() {
             ww += o.w[i] * o.w[i];
             wz += o.w[i] * z1[at + i];
         }
-        o.l0 = o.w0 * z0[c] + wz;
-        const Real head = 1.0 + o.w0, wide = 1.0 + 2.0 * ww;
-        const Real most = head * o.l0, once = 1.0 / (most * wide), fewer = wide * once;
-        o.over_head = o.l0 * fewer, o.over_l0 = head * fewer;
+        const Real l0 = o.w0 * z0[c] + wz, head = 1.0 + o.w0, wide = 1.0 + 2.0 * ww;
+        const Real most = head * l0, once = 1.0 / (most * wide), fewer = wide * once;
+        o.over_head = l0 * fewer, o.over_l0 = head * fewer;
         const Real along = o.rho * most * once;  // of D, which is rho across w
-        for (int i = 0; i < size; ++i)
-            o.l[i] = z1[at + i] + (z0[c] + wz * o.over_head) * o.w[i];
         o.D[0] = along;
         if (size == 2) {
             o.D[0] = along * (1.0 + 2.0 * o.w[1] * o.w[1]);
@@ -223,29 +229,26 @@ inline void Solver::fill_system(const Programme &q) {
     for (i = 0; i < q.r; ++i) S[i][i] += 1.0;
 }
 
-// Step for the scaled right sides t, M's rows eliminated.  dz0 comes from s.dz + z.ds =
-// r0, the first row of the scaled complementarity: W^-1 t - W^-2 ds cancels.
+// Step for f = (W^-1 t)_1 of the scaled right sides t, M's rows eliminated.  dz0, which
+// comes as r0, follows from s.dz + z.ds = r0, the first row of the scaled
+// complementarity: W^-1 t - W^-2 ds cancels.
 inline void Solver::direction(Programme &q) {
     const int m = q.r + q.p;
-    k.each([&](auto size, int c, int at) {  // f = (W^-1 t)_1
-        const Head &o = heads[c];
-        Real part = {};
-        for (int i = 0; i < size; ++i) part += o.w[i] * t1[at + i];
-        part = part * o.over_head - t0[c];
-        for (int i = 0; i < size; ++i) f[at + i] = (t1[at + i] + part * o.w[i]) * o.over_rho;
-    });
-    Real *own = f.data(), *squared = e.data();
+    Real *own = f.data(), *squared = du.data();
     square_scaled<1>(&own, &squared);
-    multiply(q.M.rows(), m, e.data(), k.nu, right.data());
+    multiply(q.M.rows(), m, squared, k.nu, right.data());
     for (int i = 0; i < q.p; ++i) right[q.r + i] -= residual[i];
     system.solve(m, right.data());
     std::fill(dz1.begin(), dz1.end(), Real{});
     combine(q.M.rows(), m, right.data(), k.nu, dz1.data());
-    for (int j = 0; j < k.nu; ++j) e[j] = f[j] - dz1[j];
-    own = du.data();
-    square_scaled<1>(&squared, &own);
     k.each([&](auto size, int c, int at) {
-        dz0[c] = r0[c];
+        const Real *D = heads[c].D, first = f[at] - dz1[at];
+        du[at] = D[0] * first;
+        if (size == 2) {
+            const Real second = f[at + 1] - dz1[at + 1];
+            du[at] += D[1] * second;
+            du[at + 1] = D[1] * first + D[2] * second;
+        }
         for (int i = at; i < at + size; ++i) dz0[c] -= z1[i] * du[i] + u[i] * dz1[i];
     });
 }
@@ -261,40 +264,52 @@ inline Real Solver::fastest() const {
     };
     k.each([&](auto size, int c, int at) {
         const Head &o = heads[c];
-        Real aa = {}, ab = {}, ya = -dz0[c] * dz0[c], yb = -z0[c] * dz0[c];
+        Real aa = {}, ab = {}, s2 = real(1.0);
+        Real ya = -dz0[c] * dz0[c], yb = -z0[c] * dz0[c], z2 = z0[c] * z0[c];
         for (int i = at; i < at + size; ++i) {
-            aa += du[i] * du[i], ab += u[i] * du[i];
-            ya += dz1[i] * dz1[i], yb += z1[i] * dz1[i];
+            aa += du[i] * du[i], ab += u[i] * du[i], s2 -= u[i] * u[i];
+            ya += dz1[i] * dz1[i], yb += z1[i] * dz1[i], z2 -= z1[i] * z1[i];
         }
-        most = larger(crossing(aa, ab, o.s2, o.over_s2), most);
-        most = larger(crossing(ya, yb, o.z2, o.over_z2), most);
+        most = larger(crossing(aa, ab, s2, o.over_s2), most);
+        most = larger(crossing(ya, yb, z2, o.rho * o.rho * o.over_s2), most);
         most = larger(-dz0[c] * o.over_z0, most);
     });
     return most;
 }
 
-// Solves l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t.
+// Solves l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t; f = (W^-1 t)_1.
 inline void Solver::correct(Real target) {
     k.each([&](auto size, int c, int at) {
         const Head &o = heads[c];
-        Real ds = {}, dz = {};
+        Real ds = {}, dz = {}, wz = {}, z2 = z0[c] * z0[c];
         for (int i = 0; i < size; ++i) {
             ds += o.w[i] * du[at + i];
             dz += o.w[i] * dz1[at + i];
+            wz += o.w[i] * z1[at + i];
+            z2 -= z1[at + i] * z1[at + i];
         }
-        const Real s0 = -ds, y0 = o.w0 * dz0[c] + dz;
-        Real head = o.l0 * o.l0, product = s0 * y0, lt = {};
+        const Real l0 = o.w0 * z0[c] + wz, s0 = -ds, y0 = o.w0 * dz0[c] + dz;
+        Real squares = l0 * l0, product = s0 * y0, lt = {}, wt = {}, l[2], t[2];
         ds *= o.over_head, dz = dz0[c] + dz * o.over_head;
+        wz = z0[c] + wz * o.over_head;
         for (int i = 0; i < size; ++i) {
             const Real s1 = du[at + i] + ds * o.w[i], y1 = dz1[at + i] + dz * o.w[i];
-            head += o.l[i] * o.l[i], product += s1 * y1;
-            t1[at + i] = -(s0 * y1 + y0 * s1) - 2.0 * o.rho * o.l0 * o.l[i];
-            lt += o.l[i] * t1[at + i];
+            l[i] = z1[at + i] + wz * o.w[i];
+            squares += l[i] * l[i], product += s1 * y1;
+            t[i] = -(s0 * y1 + y0 * s1) - 2.0 * o.rho * l0 * l[i];
+            lt += l[i] * t[i];
         }
-        r0[c] = target - product - o.rho * head;
-        t0[c] = (o.l0 * r0[c] - lt) * o.over_z2;  // |l| = |z|
-        for (int i = 0; i < size; ++i)
-            t1[at + i] = (t1[at + i] - t0[c] * o.l[i]) * o.over_l0;
+        const Real r0 = target - product - o.rho * squares;
+        const Real over_z2 = o.rho * o.rho * o.over_s2;  // and |l| = |z|
+        const Real t0 = (l0 * r0 - lt) * over_z2;
+        for (int i = 0; i < size; ++i) {
+            t[i] = (t[i] - t0 * l[i]) * o.over_l0;
+            wt += o.w[i] * t[i];
+        }
+        wt = wt * o.over_head - t0;
+        const Real over_rho = o.rho * z2 * o.over_s2;
+        for (int i = 0; i < size; ++i) f[at + i] = (t[i] + wt * o.w[i]) * over_rho;
+        dz0[c] = r0;
     });
 }
 
@@ -305,7 +320,7 @@ inline Whole Solver::interior_point(
     Programme &q, Real tolerance, double relative, Whole asked) {
     const int r = q.r, p = q.p, m = r + p;
     const auto dual = [&] {  // z1 = M^T y - d
-        for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
+        for (int j = 0; j < k.nu; ++j) z1[j] = q.loaded ? -q.d[j] : Real{};
         combine(q.M.rows(), m, y.data(), k.nu, z1.data());
     };
     std::fill(u.begin(), u.end(), Real{});
@@ -332,14 +347,12 @@ inline Whole Solver::interior_point(
         fill_system(q);
         going &= system.factor(m, true);
         if (!any(going)) break;
-        // predictor: no centring, no correction
+        // predictor: no centring, no correction; t = -l, W^-1 l = z
         k.each([&](auto size, int c, int at) {
-            const Head &o = heads[c];
-            t0[c] = -o.rho * o.l0;
-            r0[c] = -z0[c];
-            for (int i = 0; i < size; ++i) {
-                t1[at + i] = -o.rho * o.l[i];
-                r0[c] -= u[at + i] * z1[at + i];
+            dz0[c] = -z0[c];
+            for (int i = at; i < at + size; ++i) {
+                f[i] = -z1[i];
+                dz0[c] -= u[i] * z1[i];
             }
         });
         direction(q);
@@ -475,4 +488,24 @@ inline Whole Solver::dual_newton(
     for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
     for (int i = 0; i < r; ++i) q.y[i] = asked ? y[i] : q.y[i];
     return done;
+}
+
+// Least |G u + h|^2 / 2 in the lanes asked for, to a gap of absolute + relative times it.
+inline void Solver::interior_then_newton(
+    Programme &q, double relative, Real absolute, Whole asked) {
+    const Real without = 0.5 * inner(q.h.data(), q.h.data(), q.r);
+    // near a zone's edge the interior point stops early; Newton then takes longer
+    for (int attempt = 0; attempt < 2 && any(asked); ++attempt) {
+        if (attempt == 0)
+            interior_point(q, NEAR_WITHOUT_CLEARANCE * without, NEAR, asked);
+        else
+            interior_point(q, absolute, relative, asked);
+        k.each([&](auto size, int, int at) {  // rounding may have left the cones
+            const Real length = root(inner(&q.u[at], &q.u[at], size));
+            const Real shorter = asked ? larger(length, real(1.0)) : real(1.0);
+            for (int i = at; i < at + size; ++i) q.u[i] /= shorter;
+        });
+        const int steps = attempt == 0 ? STEPS : STEPS_LAST;
+        asked &= ~dual_newton(q, steps, FIRST_SIGMA, relative, absolute, asked);
+    }
 }

@@ -31,12 +31,14 @@ inline void reflect(
         along[i] *= turn;
         rows[i][from] -= along[i] * own[from];
     }
-    for (int a = from + 1; a < to; ++a)
+    for (int a = from + 1; a < to; ++a) {
+        const Real weight = once(own[a]);
         for (int i = 0; i < R; ++i) {
-            const Real left = rows[i][a] - along[i] * own[a];
+            const Real left = rows[i][a] - along[i] * weight;
             rows[i][a] = left;
             if (sized) size[i] += left * left;
         }
+    }
     if (sized) std::copy(size, size + R, sizes);
 }
 

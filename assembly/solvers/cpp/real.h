@@ -29,6 +29,15 @@ inline Real root(Real x) {
     return x;
 }
 
+// A number that is used several times, read once: compilers would rather read it again
+// with every product, and reading is what these loops wait for.
+inline Real once(Real x) {
+#if defined(__x86_64__)
+    asm("" : "+x"(x));
+#endif
+    return x;
+}
+
 inline bool any(Whole mask) {
     int64_t bits = 0;
     for (int l = 0; l < LANES; ++l) bits |= mask[l];
@@ -60,10 +69,14 @@ inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real 
     Real total[R][PARTS] = {};
     int a = from;
     for (; a + PARTS <= to; a += PARTS)
-        for (int i = 0; i < R; ++i)
-            for (int b = 0; b < PARTS; ++b) total[i][b] += rows[i][a + b] * x[a + b];
-    for (; a < to; ++a)
-        for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * x[a];
+        for (int b = 0; b < PARTS; ++b) {
+            const Real own = once(x[a + b]);
+            for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
+        }
+    for (; a < to; ++a) {
+        const Real own = once(x[a]);
+        for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
+    }
     for (int i = 0; i < R; ++i) {
         for (int half = PARTS / 2; half > 0; half /= 2)
             for (int b = 0; b < half; ++b) total[i][b] += total[i][b + half];
@@ -89,8 +102,10 @@ template <int C>
 inline void combine_tile(Real *const *A, int count, const Real *y, int column, Real *out) {
     Real total[C];
     for (int j = 0; j < C; ++j) total[j] = out[column + j];
-    for (int i = 0; i < count; ++i)
-        for (int j = 0; j < C; ++j) total[j] += y[i] * A[i][column + j];
+    for (int i = 0; i < count; ++i) {
+        const Real own = once(y[i]);
+        for (int j = 0; j < C; ++j) total[j] += own * A[i][column + j];
+    }
     for (int j = 0; j < C; ++j) out[column + j] = total[j];
 }
 
@@ -106,9 +121,14 @@ template <int R, int C>
 inline void product_tile(
     Real *const *B, Real *const *M, int column, int width, Real *const *out) {
     Real total[R][C] = {};
-    for (int a = 0; a < width; ++a)
-        for (int i = 0; i < R; ++i)
-            for (int j = 0; j < C; ++j) total[i][j] += B[i][a] * M[column + j][a];
+    for (int a = 0; a < width; ++a) {
+        Real own[R];
+        for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
+        for (int j = 0; j < C; ++j) {
+            const Real other = once(M[column + j][a]);
+            for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
+        }
+    }
     for (int i = 0; i < R; ++i)
         for (int j = 0; j < C; ++j) out[i][column + j] = total[i][j];
 }

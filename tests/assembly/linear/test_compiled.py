@@ -15,6 +15,7 @@ from assembly.linear.fallback import (
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
+from assembly.solvers.native import by_numba
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -254,9 +255,6 @@ def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
     """The kernel's own certificate: asked for more than is possible, it refuses."""
     robot, postures = grid
     from assembly.linear import compiled_energy as compiled_assembly
-    from assembly.linear import energy
-
-    monkeypatch.setattr(energy, "assemble_side_by_side", lambda *given: False)
 
     assemble_all = compiled_assembly.assemble_all
 
@@ -271,7 +269,8 @@ def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
 
     monkeypatch.setattr(compiled_assembly, "assemble_all", spoilt)
     T, _ = stack(postures[:2])
-    batch = minimise_energies(robot, T)
+    with by_numba():
+        batch = minimise_energies(robot, T)
     assert batch.fallbacks() == {"uncertified": 2}
     assert batch.certified.all()
     one = reference_assembly(postures[0])

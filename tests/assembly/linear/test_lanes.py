@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear import energy as module
-from assembly.linear import zone
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
@@ -25,7 +23,7 @@ from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margins
 from assembly.robots import BUILT_IN
 from assembly.solvers import compiled, native
-from assembly.solvers.native import load_library
+from assembly.solvers.native import by_numba, load_library
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, stack
 
 needs_compiler = pytest.mark.skipif(
@@ -37,16 +35,10 @@ ROWS = (
 )  # fmt: skip
 
 
-@pytest.fixture
-def by_numba(monkeypatch):
+def numbas_energies(*given):
     """Least energies by numba's kernel alone."""
-
-    def solve(*given):
-        with monkeypatch.context() as context:
-            context.setattr(module, "assemble_side_by_side", lambda *given: False)
-            return minimise_energies(*given)
-
-    return solve
+    with by_numba():
+        return minimise_energies(*given)
 
 
 def assert_both_proved(lanes, numba):
@@ -65,25 +57,25 @@ def assert_both_proved(lanes, numba):
 
 @needs_compiler
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 0.2, 0.5, 1.0])
-def test_all_points_of_the_papers_robot_are_certified(grid, by_numba, kappa):
+def test_all_points_of_the_papers_robot_are_certified(grid, kappa):
     robot, postures = grid
     T, mismatch = stack(postures)
     lanes = minimise_energies(robot, T, kappa * robot.errors, mismatch)
     assert lanes.fallbacks() == {}
-    assert_both_proved(lanes, by_numba(robot, T, kappa * robot.errors, mismatch))
+    assert_both_proved(lanes, numbas_energies(robot, T, kappa * robot.errors, mismatch))
 
 
 @needs_compiler
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
-def test_every_built_in_robot_has_numbas_energies(name, size, by_numba, rng):
+def test_every_built_in_robot_has_numbas_energies(name, size, rng):
     home = home_posture(BUILT_IN[name]())
     T = np.broadcast_to(home.transforms, (7, *home.transforms.shape))
     errors = size * rng.normal(size=(7, len(home.robot.frames), 6))
     if name == "irsbot2":  # its proximal loops are rigid and perfect
         errors[:, ~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
     given = home.robot, T, errors, home.mismatch
-    lanes, numba = minimise_energies(*given), by_numba(*given)
+    lanes, numba = minimise_energies(*given), numbas_energies(*given)
     assert lanes.fallbacks() == numba.fallbacks() == {}
     assert_both_proved(lanes, numba)
 
@@ -190,14 +182,13 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
 
 @needs_compiler
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margins_are_numbas_and_proved(grid, compliant, monkeypatch):
+def test_margins_are_numbas_and_proved(grid, compliant):
     robot, postures = grid
     T, mismatch = stack(postures)
     for kappa in (0.05, 0.1, 0.2, 0.5, 1.0):
         given = robot, T, compliant, mismatch, kappa * robot.errors
         lanes = zone_margins(*given)
-        with monkeypatch.context() as context:
-            context.setattr(zone, "margins_side_by_side", lambda *given: False)
+        with by_numba():
             numba = zone_margins(*given)
         assert not lanes.fallback.any()
         assert lanes.margin == pytest.approx(numba.margin, rel=2e-8)
@@ -251,19 +242,19 @@ def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
-def test_without_a_compiler_numba_answers(grid, by_numba, tmp_path, monkeypatch):
+def test_without_a_compiler_numba_answers(grid, tmp_path, monkeypatch):
     robot, postures = grid
     T, mismatch = stack(postures[:3])
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(compiled, "folder_of_compiled", lambda: tmp_path)
-    load_library.cache_clear()
+    native._library.cache_clear()
     try:
         batch = minimise_energies(robot, T, mismatch=mismatch)
         assert load_library(SOURCE) is None
     finally:
-        load_library.cache_clear()
+        native._library.cache_clear()
     assert list(tmp_path.iterdir()) == []
-    numba = by_numba(robot, T, None, mismatch)
+    numba = numbas_energies(robot, T, None, mismatch)
     assert np.array_equal(batch.energy, numba.energy)
 
 
@@ -278,9 +269,9 @@ def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled, "folder_of_compiled", lambda: tmp_path)
     monkeypatch.setattr(native.subprocess, "run", fail)
     for _ in range(2):
-        load_library.cache_clear()
+        native._library.cache_clear()
         assert load_library(SOURCE) is None
-    load_library.cache_clear()
+    native._library.cache_clear()
     assert len(asked) == 1
     (note,) = tmp_path.iterdir()
     assert note.read_bytes() == b"no <cmath>"
@@ -294,8 +285,8 @@ def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(native, "_digest", lambda source: "0" * 16)
     shutil.copy(made, tmp_path / f"lanes.{'0' * 16}.so")
-    load_library.cache_clear()
+    native._library.cache_clear()
     try:
         assert load_library(SOURCE) is None
     finally:
-        load_library.cache_clear()
+        native._library.cache_clear()

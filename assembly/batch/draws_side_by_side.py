@@ -1,0 +1,65 @@
+"""Problem (22) for several draws side by side at one posture, by ``draws.cpp``.
+
+The same equations and thresholds as :mod:`assembly.batch.compiled_draws`; draws that
+need the interior point are collected first, so that no lane waits for another.
+"""
+
+import ctypes
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.solvers.native import load_library
+
+if TYPE_CHECKING:
+    from assembly.batch.compiled_draws import Energies, Reduced
+
+SOURCE = "batch/draws.cpp"
+
+
+class _Reduced(ctypes.Structure):
+    """``Reduced`` of draws.cpp."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("nu", "r", "cones")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("Gt", "starts", "inverse", "forces", "gram")
+        ),
+        ("slip", ctypes.c_double),
+    )
+
+
+def least_energies_side_by_side(
+    reduced: "Reduced", h: NDArray, out: "Energies"
+) -> bool:
+    """Minimise |G u + h|^2 / 2 for every row of h.
+
+    Args:
+        reduced: of the posture.
+        h: (k, r) [sqrt(2 J)].
+        out: arrays to fill.
+
+    Returns:
+        Whether it did; not where there is no compiler, or for cones of three columns.
+    """
+    library = load_library(SOURCE)
+    if library is None:
+        return False
+    shared = (
+        reduced.Gt, reduced.starts, reduced.inverse, reduced.cones, reduced.gram
+    )  # fmt: skip
+    arrays = [np.ascontiguousarray(array) for array in (*shared, h)]
+    *fields, rows = (array.ctypes.data for array in arrays)
+    nu, r = reduced.Gt.shape
+    given = _Reduced(nu, r, len(reduced.starts) - 1, *fields, reduced.slip)
+    filled = (ctypes.c_void_p * len(out))(*(column.ctypes.data for column in out))
+    count = ctypes.c_int64(len(h))
+    function = library.least_energies
+    return bool(
+        function(
+            ctypes.byref(given), ctypes.c_void_p(rows), ctypes.byref(count),
+            ctypes.byref(filled),
+        )
+    )  # fmt: skip
