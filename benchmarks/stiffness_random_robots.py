@@ -12,10 +12,10 @@ tangent with errors and under a load against that linearised system.  Every robo
 matrix or a reason; differences are entries over sqrt(C_ii C_jj).
 ``--seed 10000 --robots 100`` draws others.
 
-Differences by the load are extrapolated from several steps, each by itself, and of them
-that is taken which differs least from its neighbours (Ridders): small steps leave the
-rounding of positions, 1e-14 m, beside a small motion, large ones meet other contacts or
-no equilibrium.  The compared tangent has no part in the choice.
+Differences by the load are extrapolated from several steps, and that is taken which
+differs least from its neighbours: small steps leave the rounding of positions, 1e-14 m,
+beside a small motion, large ones meet other contacts or no equilibrium.  The compared
+tangent has no part in the choice.
 
 Under load joints that are locked about some axes and elastic about others are elastic
 about all, 1e8 where they were locked: how such a joint turns far has no one law (see
@@ -44,6 +44,7 @@ from assembly.robots import BUILT_IN, load_robot
 from assembly.solvers.conic import SolverFailed
 from tests.robots_for_tests import random_robot
 from validation.crosscheck.link_models import link_models
+from validation.multibody.extrapolation import steadiest, without_squares
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
 from validation.multibody.simulation import without_clearance as unplayed
 from validation.multibody.tangent import simulated_tangent
@@ -67,14 +68,12 @@ def relative(C: NDArray, other: NDArray) -> float:
     return float(np.nan_to_num(off, posinf=0.0).max(initial=0.0))
 
 
-def limit(slopes: NDArray) -> NDArray:
-    """(6,) central differences at step zero, from (k, 6) at falling steps."""
-    square = (_STEPS[0] / _STEPS[1]) ** 2
-    better = (square * slopes[1:] - slopes[:-1]) / (square - 1)
+def limit(steps: list[float], slopes: list[NDArray]) -> NDArray:
+    """(6,) central differences at step zero."""
+    better = without_squares(steps, slopes)
     # rotations and translations of one column have the sizes they have
     size = np.abs(better).max(axis=0) + 1e-300
-    change = np.abs(np.diff(better, axis=0) / size).max(axis=1)
-    return better[int(np.argmin(change)) + 1]
+    return steadiest(better, lambda change: float((change / size).max()))[0]
 
 
 def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
@@ -87,9 +86,9 @@ def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
     return solve_exact(posture, 0.01 * load), 0.01
 
 
-def slopes_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
-    """(k, 6) central differences along a load, at falling steps."""
-    slopes: list[NDArray] = []
+def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
+    """(6,) derivative along a load, by differences at falling steps."""
+    steps, slopes = list[float](), list[NDArray]()
     for step in _STEPS:
         try:
             ahead, back = (
@@ -103,10 +102,12 @@ def slopes_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
             # a large step may leave what any equilibrium carries
             if step <= _STEPS[-3]:
                 raise
+            steps.clear()
             slopes.clear()
         else:
+            steps.append(step)
             slopes.append((ahead - back) / (2 * step))
-    return np.array(slopes)
+    return limit(steps, slopes)
 
 
 def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
@@ -117,7 +118,7 @@ def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
         finite = np.flatnonzero(np.isfinite(C).all(axis=0))
         size = share * _SIZE
         columns = [
-            limit(slopes_by(equilibrium, size[row] * np.eye(6)[row])) / size[row]
+            slope_by(equilibrium, size[row] * np.eye(6)[row]) / size[row]
             for row in finite
         ]
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

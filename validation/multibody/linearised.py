@@ -4,9 +4,8 @@ Exudyn's residual is differentiated at its equilibrium, with the forces that are
 loads, and reactions of joints and closures, kept while everything else moves.  It is
 differentiated along the motions that joints and closures leave, so that nothing stiff
 that cannot move enters with its noise.  These are taken along the modes of Exudyn's own
-Jacobian, which keeps soft ones apart from stiff ones, and differences of two steps are
-extrapolated; what changes with the next two is the uncertainty, and the least of all is
-taken (Ridders).
+Jacobian, which keeps soft ones apart from stiff ones, and differences are extrapolated
+to no step.
 
 Weak springs hold what nothing resists, to be solved at all.  Without them the
 compliance is more by k X (1 - k B)^-1 X', X how the platform and B how their joints
@@ -15,13 +14,13 @@ answer to loads on these joints (Woodbury), which is added again.
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from stiffness.screws import rotation_vector
+from validation.multibody.extrapolation import steadiest, without_squares
 from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import Closure
 from validation.multibody.exudyn_reading import (
@@ -126,21 +125,13 @@ def _compliance(
     K = _held(model, stiffness(q, Z, steps[-1]), motion(q, Z, steps[-1])[gaps.stop :])
     for _ in range(polish):
         q = q - Z @ _solve(K, Z.T @ forces(q))
-    known = [(stiffness(q, Z, step), motion(q, Z, step)[gaps.stop :]) for step in steps]
-    extrapolated = []
-    for (step, (K1, V1)), (half, (K2, V2)) in pairwise(zip(steps, known, strict=True)):
-        square = (step / half) ** 2
-        K, V = (
-            (square * two - one) / (square - 1) for one, two in ((K1, K2), (V1, V2))
-        )
-        extrapolated.append(_by_modes(model, K, V))
-    size = np.sqrt(np.abs(np.diag(extrapolated[-1])))
-    changes = [
-        float(np.abs((two - one) / np.outer(size, size)).max())
-        for one, two in pairwise(extrapolated)
-    ]
-    best = int(np.argmin(changes))
-    return extrapolated[best + 1], changes[best]
+    K = without_squares(steps, [stiffness(q, Z, step) for step in steps])
+    V = without_squares(steps, [motion(q, Z, step)[gaps.stop :] for step in steps])
+    found = [_by_modes(model, *pair) for pair in zip(K, V, strict=True)]
+    size = np.sqrt(np.abs(np.diag(found[-1])))
+    units = np.outer(size, size)
+    C, change = steadiest(found, lambda change: float((change / units).max()))
+    return C, float((change / units).max())
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:

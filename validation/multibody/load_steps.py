@@ -3,15 +3,16 @@
 At its equilibrium the simulation is loaded a little along each axis, both ways, by
 steps that fall; half the difference of the platform's motions per load is the
 compliance but for the steps' square.  How far that is depends on what moves inside:
-a joint may turn a hundred times as much as the platform.  So two steps each are
-extrapolated to none, and of all the two whose answers differ least are taken (Ridders):
-large steps leave terms of higher order, small ones the rounding of positions.
+a joint may turn a hundred times as much as the platform.  So they are extrapolated.
 """
+
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.screws import rotation_vector
+from validation.multibody.extrapolation import steadiest, without_squares
 from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import idle_motions, pose
@@ -72,6 +73,7 @@ def stepped_compliance(
     columns, changes, turns = [], [], []
     for unit, size in zip(np.eye(6), sizes, strict=True):
         slopes: list[NDArray] = []
+        steps: list[float] = []
         drift = np.zeros_like(first[1])
         for step in _LARGEST / size / _RATIO ** np.arange(_SIZES):
             try:
@@ -85,11 +87,15 @@ def stepped_compliance(
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()
+                steps.clear()
                 continue
             turn = rotation_vector(ahead[:3, :3] @ back[:3, :3].T)
             motion = [*turn, *(ahead - back)[:3, 3], *(idle - still)]
             slopes.append(np.array(motion) / (2 * step))
-        column, change = _limit(np.array(slopes))
+            steps.append(step)
+        better = without_squares(steps, slopes)
+        largest = np.abs(better)[:, :6].max(axis=0) + 1e-300
+        column, change = steadiest(better, partial(_relative, largest))
         columns.append(column[:6])
         changes.append(change[:6])
         turns.append(column[6:])
@@ -99,11 +105,6 @@ def stepped_compliance(
     return C, float((np.column_stack(changes) / np.outer(size, size)).max())
 
 
-def _limit(slopes: NDArray) -> tuple[NDArray, NDArray]:
-    """(n,) differences at step zero, from (k, n) at falling steps, and their error."""
-    square = _RATIO**2
-    better = (square * slopes[1:] - slopes[:-1]) / (square - 1)
-    change = np.abs(np.diff(better, axis=0))
-    size = np.abs(better[:, :6]).max(axis=0) + 1e-300
-    best = int(np.argmin((change[:, :6] / size).max(axis=1)))
-    return better[best + 1], change[best]
+def _relative(sizes: NDArray, change: NDArray) -> float:
+    """The largest of a change of the platform's motion, of its size along each axis."""
+    return float((change[:6] / sizes).max())
