@@ -4,13 +4,14 @@ A link that is a spring has the energy s.K s / 2, s the logarithm of the motion 
 its ends.  Exudyn applies K s half-way between the ends, which is the gradient only to
 first order in the bending: as a potential it is off by the square of the turn, and so
 is the stiffness of a robot whose springs are bent.  Here the gradient is exact, by the
-inverse of the exponential's derivative.
+inverse of the exponential's derivative; its half for shifts is the derivative of its
+half for turns, along the shift (a screw is a dual vector).
 
 Exudyn calls it some hundred thousand times, so vectors are tuples of floats here.
 
 Sources:
     Selig (2005), Geometric fundamentals of robotics, section 4.5 (the series in
-    Bernoulli's numbers, [ad s]^2k B_2k / (2k)!).
+    Bernoulli's numbers), section 9.6 (dual vectors).
 """
 
 import math
@@ -19,9 +20,12 @@ from collections.abc import Sequence
 _Vector = tuple[float, float, float]
 _BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6,
               -3617 / 510, 43867 / 798, -174611 / 330)  # fmt: skip
-# turns are below a radian: what is left out is below (1 / 2 pi)^22
-_SERIES = tuple(B / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1))
-_NEGLIGIBLE = 1e-17  # of the wrench, the next term of its series
+# of 1 - t/2 cot(t/2) over t^2 in t^2; turns are below a radian: what is left out is
+# below (1 / 2 pi)^22
+_SERIES = tuple(
+    abs(B) / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1)
+)  # fmt: skip
+_SLOPES = tuple(2 * k * factor for k, factor in enumerate(_SERIES))[1:]
 
 
 def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[float]:
@@ -38,19 +42,27 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
     """
     a, b, c, d, e, g = screw
     w, v = (a, b, c), (d, e, g)
-    Ks = [sum(k * s for k, s in zip(row, screw, strict=True)) for row in K]
-    m, f = (Ks[0], Ks[1], Ks[2]), (Ks[3], Ks[4], Ks[5])
-    # at the near end: J^-T K s, J the derivative of the exponential from the left
-    term = _bracket(w, v, m, f)
-    moment, force = _sum(m, 0.5, term[0]), _sum(f, 0.5, term[1])
-    term = _bracket(w, v, *term)
-    turn = math.hypot(*w)
-    for k, factor in enumerate(_SERIES):
-        moment, force = _sum(moment, factor, term[0]), _sum(force, factor, term[1])
-        if k and (turn / 6.0) ** (2 * k) < _NEGLIGIBLE:
-            break
-        term = _bracket(w, v, *_bracket(w, v, *term))
-    moment, force = _turned_back(w, turn, moment), _turned_back(w, turn, force)
+    x, y, z, p, q, r = (
+        k[0] * a + k[1] * b + k[2] * c + k[3] * d + k[4] * e + k[5] * g for k in K
+    )
+    m, f = (x, y, z), (p, q, r)
+    square = a * a + b * b + c * c
+    if not square:
+        return [x, y, z, p, q, r]
+    turn = math.sqrt(square)
+    factor, slope = _power_series(_SERIES, square), _power_series(_SLOPES, square)
+    across_f, across_m = _cross(w, f), _cross(w, m)
+    twice_f = _cross(w, across_f)
+    # at the near end: J^-T K s, J the derivative of the exponential from the left; a
+    # turn of it by half of w is symmetric
+    short = (1 - turn / 2 / math.sin(turn / 2)) / square
+    force = _sum(f, short, twice_f)
+    by_shift = _cross(v, f)
+    mixed = _sum(_cross(w, by_shift), 1.0, _cross(v, across_f))
+    along = a * d + b * e + c * g
+    lever = _sum(by_shift, 2 * factor, mixed)  # twice what the force adds
+    lever = _turned_back(w, turn, _sum(lever, 2 * slope * along, twice_f))
+    moment = _sum(_sum(m, short, _cross(w, across_m)), 0.5, lever)
     return [*_sum(moment, -0.5, _cross(v, force)), *force]
 
 
@@ -82,9 +94,12 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     return [short * m for m in _turned_back(w, turn, couple)]
 
 
-def _bracket(w: _Vector, v: _Vector, m: _Vector, f: _Vector) -> tuple[_Vector, _Vector]:
-    """-[ad s]' of a wrench."""
-    return _sum(_cross(w, m), 1.0, _cross(v, f)), _cross(w, f)
+def _power_series(factors: Sequence[float], x: float) -> float:
+    """Sum of factors times powers of x."""
+    value = 0.0
+    for factor in reversed(factors):
+        value = factor + x * value
+    return value
 
 
 def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
