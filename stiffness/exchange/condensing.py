@@ -19,6 +19,8 @@ from stiffness.surface.interface import Interface, parse_interface
 
 _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
+_WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 _ON = 1e-6  # of the body's size: how near a node lies on its interface
 
 
@@ -27,7 +29,9 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
 
     Args:
         path: the file; lines that begin with ``*`` or ``#`` are passed over. Of a deck
-            of Abaqus or CalculiX the lines after ``*NODE``, of Nastran's ``GRID``.
+            of Abaqus or CalculiX the lines after ``*NODE``, of Nastran's ``GRID``. Of
+            a named selection of Ansys' Workbench the lines below its head, whose
+            numbers may have decimal commas.
         unit: [m] of its lengths.
 
     Returns:
@@ -37,7 +41,11 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
         BadInput: a line of something else.
     """
     nodes: dict[int, NDArray] = {}
-    for number, words, line in _node_lines(read_text(path)):
+    text = read_text(path)
+    head = _WORKBENCH.match(text)
+    if head and abs(_LENGTHS.get(head[1], 0.0) - unit) > 1e-9 * unit:
+        raise BadInput(f"{path}: found lengths in {head[1]}, expected that as --unit")
+    for number, words, line in _node_lines(text):
         try:
             place = np.array([real(path, word) for word in words[1:4]])
             node = int(words[0])
@@ -58,6 +66,11 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
     """Lines that place a node: their number, number and coordinates, the line."""
     if _GRID.search(text):
         yield from _grids(text)
+        return
+    if _WORKBENCH.match(text):
+        for number, line in enumerate(text.split("\n")[1:], 2):
+            if line.strip():
+                yield number, line.replace(",", ".").split(), line
         return
     deck = bool(_NODE.search(text))
     listed = not deck

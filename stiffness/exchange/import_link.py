@@ -70,7 +70,9 @@ def import_link(
     link = link_of_both_ends(K12, who, known[0], known[1])
     if mass is None:
         return link
-    heavy = in_metres(reordered(read_matrix(mass, "mass", numbers), order), length)
+    heavy = in_metres(
+        reordered(read_matrix(mass, "mass", numbers, path), order), length
+    )
     if heavy.freedoms != matrix.freedoms:
         raise BadInput(f"{mass}: its freedoms are not those of {path}")
     M12 = fields.T @ (heavy.matrix @ fields)

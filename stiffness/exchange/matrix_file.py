@@ -3,7 +3,9 @@
 =================  ===============================================================
 file               written by
 =================  ===============================================================
-Matrix Market      Ansys (HBMAT's successor), SciPy, Exudyn scripts: ``.mtx``
+Matrix Market      Ansys (``*EXPORT,..,MMF``), SciPy, Exudyn scripts: ``.mtx``
+Harwell-Boeing     Ansys (``HBMAT``): ``.matrix``; see
+                   :mod:`stiffness.exchange.ansys_files` for its ``.mapping``
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
 five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
 three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
@@ -25,19 +27,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, tril, triu
 
 from forcefit.inputs.errors import BadInput, describe, one_line
 from forcefit.inputs.table import read_text
+from stiffness.exchange.ansys_files import (
+    LARGEST,
+    both_halves,
+    harwell_boeing,
+    read_mapping,
+)
 
 Freedom = tuple[int, int]
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 _ENDINGS = (
-    ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz"
+    ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz",
+    ".mmf", ".matrix",
 )  # fmt: skip
+_HARWELL_BOEING = re.compile(r"[^\n]*\n[\d ]+\n[RCP][A-Z]{2}\s", re.I)
 _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
 _INITIALS = {"stiffness": "K", "mass": "M"}  # of a DMIG's name
-_LARGEST = 2_000_000  # rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +67,10 @@ class FileMatrix:
 
 
 def read_matrix(
-    path: Path | str, which: str = "stiffness", nodes: Sequence[int] | None = None
+    path: Path | str,
+    which: str = "stiffness",
+    nodes: Sequence[int] | None = None,
+    mapped: Path | str | None = None,
 ) -> FileMatrix:
     """A matrix of a file, its kind told by its content.
 
@@ -66,6 +78,8 @@ def read_matrix(
         path: the file.
         which: ``"stiffness"`` or ``"mass"``, where the file holds both.
         nodes: in the order of rows that the file does not name; None: 1, 2, ..
+        mapped: a matrix of the same rows, whose ``.mapping`` counts where this one has
+            none beside it.
 
     Returns:
         The matrix; rows that the file does not name are three a node of ``nodes``, as
@@ -88,13 +102,37 @@ def read_matrix(
         text = read_text(path)
         if text.startswith("%%MatrixMarket"):
             matrix, freedoms = _matrix_market(path, text), None
+        elif _HARWELL_BOEING.match(text):
+            matrix, freedoms = harwell_boeing(path, text), None
         elif re.search(r"^\s*\*USER ELEMENT", text, re.M | re.I):
             matrix, freedoms = _user_element(path, text, which)
         elif re.search(r"^DMIG", text, re.M):
             matrix, freedoms = _dmig(path, text, which)
         else:
             matrix, freedoms = _columns(path, text)
+    for beside in (path, mapped):
+        mapping = None if beside is None else Path(beside).with_suffix(".mapping")
+        if freedoms is None and mapping is not None and mapping.exists():
+            freedoms = _mapped(mapping, matrix.shape[0])
     return _checked(path, matrix, freedoms, nodes)
+
+
+def _mapped(path: Path, n: int) -> list[Freedom]:
+    """Freedoms of n rows by a mapping file."""
+    given = read_mapping(path)
+    freedoms: list[Freedom] = []
+    each = n // len(given)
+    for item in given:
+        if isinstance(item, tuple):
+            freedoms.append(item)
+        else:
+            freedoms += [(item, direction) for direction in range(1, each + 1)]
+    if len(freedoms) != n or each > 6:
+        raise BadInput(
+            f"{path}: found {len(given)} rows or nodes, expected those of a matrix "
+            f"with {n} rows"
+        )
+    return freedoms
 
 
 def _checked(
@@ -167,11 +205,15 @@ def _matrix_market(path: Path, text: str) -> csr_array:
     from scipy.io import mmread
 
     try:
-        matrix = mmread(io.BytesIO(text.encode()))
-        return csr_array(matrix, dtype=float)
+        matrix = csr_array(mmread(io.BytesIO(text.encode())), dtype=float)
     except (ValueError, TypeError, OverflowError, MemoryError) as error:
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: no Matrix Market file: {reason}") from None
+    # Ansys writes one half, whatever its head says
+    by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
+    if by_ansys and (not triu(matrix, 1).nnz or not tril(matrix, -1).nnz):
+        return both_halves(matrix)
+    return matrix
 
 
 def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
@@ -238,10 +280,10 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
         if len(where) == 4:
             a, b, c, d = where
             named[(a, b), (c, d)] = real(path, value)
-        elif min(where) < 1 or max(where) > _LARGEST:
+        elif min(where) < 1 or max(where) > LARGEST:
             raise BadInput(
                 f"{path}: line {number}: found row {where[0]}, column {where[1]}, "
-                f"expected 1 to {_LARGEST}"
+                f"expected 1 to {LARGEST}"
             )
         else:
             unnamed[where[0], where[1]] = real(path, value)
@@ -332,7 +374,7 @@ def _from_entries(
 ) -> tuple[csr_array, list[Freedom]]:
     """A matrix from entries of one half or both."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
-    if not freedoms or len(freedoms) > _LARGEST:
+    if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
     row = {freedom: k for k, freedom in enumerate(freedoms)}
     return _of_rows(entries, row), freedoms

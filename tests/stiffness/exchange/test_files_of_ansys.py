@@ -1,0 +1,164 @@
+"""Matrices as Ansys writes them: one half, rows in an order of its own, a mapping."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, tril
+
+from forcefit.inputs.errors import BadInput
+from stiffness.exchange.import_link import import_link
+from stiffness.exchange.matrix_file import read_matrix
+from tests.stiffness.exchange.test_full_matrices import full_matrix, write_solid
+from tests.stiffness.exchange.test_links_of_others import assert_same
+
+ENDS = {"base": "z=0", "tip": "z=0.2"}
+HEAD = "%%MatrixMarket matrix coordinate real {}\n%===\n% Creator: ANSYS Inc\n%===\n"
+
+
+def matrix_market(K, symmetry="symmetric"):
+    """``*EXPORT,K,MMF``: the lower half, from 1 on."""
+    half = tril(K).tocoo()
+    entries = zip(half.row + 1, half.col + 1, half.data.tolist(), strict=True)
+    lines = [f"{i} {j} {v:.16e}" for i, j, v in entries]
+    n = K.shape[0]
+    return HEAD.format(symmetry) + "\n".join([f"{n} {n} {len(lines)}", *lines, ""])
+
+
+def harwell_boeing(K, kind="RSA", right_side=True):
+    """``HBMAT``: pointers, rows and values, one to a line."""
+    half = csc_array(tril(K)) if kind == "RSA" else csc_array(K)
+    half.sort_indices()
+    n, entries = half.shape[0], half.nnz
+    counts = [n + 1, entries, entries, n if right_side else 0]
+    rhs = [f"{0.0:25.15E}".replace("E", "D")] * counts[3]
+    head = [
+        f"{'STIFFNESS MATRIX FROM ANSYS FULL FILE':72s}file",
+        "".join(f"{count:14d}" for count in [sum(counts), *counts]),
+        f"{kind:14s}" + "".join(f"{count:14d}" for count in (n, n, entries, 0)),
+        "(1I14)          (1I14)          (1D25.15)           (1D25.15)",
+        *(["F                          1             0"] if right_side else []),
+    ]
+    body = [f"{k + 1:14d}" for k in (*half.indptr.tolist(), *half.indices.tolist())]
+    values = [f"{v:25.15E}".replace("E", "D") for v in half.data.tolist()]
+    return "\n".join([*head, *body, *values, *rhs, ""])
+
+
+def node_vector(numbers):
+    """``*EXPORT`` of the nodes in the order of rows."""
+    head = "%%MatrixMarket matrix array integer general\n% Creator: ANSYS Inc\n"
+    return head + "\n".join(map(str, [f"{len(numbers)} 1", *numbers, ""]))
+
+
+def mapping(freedoms):
+    """``HBMAT,..,YES``: row, node, label."""
+    labels = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+    lines = [
+        f"{row:12d}{node:12d}   {labels[direction - 1]}"
+        for row, (node, direction) in enumerate(freedoms, 1)
+    ]
+    return "\n".join(["  Matrix Eqn       Node   DOF", *lines, ""])
+
+
+@pytest.fixture
+def solid(tmp_path):
+    """A folder with a solid in a known format, its matrix, shuffled, and the order."""
+    nodes, K = full_matrix((1, 1, 2))
+    write_solid(tmp_path, nodes, K)
+    order = np.random.default_rng(2).permutation(len(nodes))
+    rows = (3 * order[:, None] + np.arange(3)).ravel()
+    return tmp_path, K.tocsr()[rows][:, rows], order
+
+
+@pytest.mark.parametrize("symmetry", ["symmetric", "general"])
+def test_matrix_market_and_the_vector_of_nodes(solid, symmetry):
+    """One half, whatever the head says; rows by node in the order of the vector."""
+    folder, K, order = solid
+    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    (folder / "full.mmf").write_text(matrix_market(K, symmetry))
+    (folder / "full.mapping").write_text(node_vector((order + 1).tolist()))
+    link = import_link(folder / "full.mmf", nodes=folder / "nodes.csv", **ENDS)
+    assert_same(link.stiffness, expected.stiffness)
+
+
+@pytest.mark.parametrize("kind", ["RSA", "RUA"])
+def test_harwell_boeing_and_its_mapping(solid, kind):
+    folder, K, order = solid
+    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    freedoms = [(node + 1, d) for node in order.tolist() for d in (1, 2, 3)]
+    shuffled = np.random.default_rng(4).permutation(len(freedoms))
+    K = K[shuffled][:, shuffled]
+    (folder / "stiff.matrix").write_text(harwell_boeing(K, kind))
+    (folder / "stiff.mapping").write_text(mapping([freedoms[k] for k in shuffled]))
+    M = csc_array((np.full(K.shape[0], 0.324 / len(order)), (range(K.shape[0]),) * 2))
+    (folder / "mass.matrix").write_text(harwell_boeing(M, right_side=False))
+    link = import_link(
+        folder / "stiff.matrix", mass=folder / "mass.matrix",
+        nodes=folder / "nodes.csv", **ENDS,
+    )  # fmt: skip
+    assert_same(link.stiffness, expected.stiffness)
+    assert link.mass == pytest.approx(0.324)
+
+
+def test_nodes_of_a_named_selection_with_decimal_commas(solid):
+    folder, K, order = solid
+    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
+    lines = ["\t".join(words).replace(".", ",") + "\t" for words in places]
+    head = "Node Number\tX Location (m)\tY Location (m)\tZ Location (m)\t"
+    (folder / "nodes.txt").write_text("\n".join([head, *lines, ""]))
+    (folder / "full.mtx").write_text(matrix_market(K))
+    (folder / "full.mapping").write_text(node_vector((order + 1).tolist()))
+    link = import_link(folder / "full.mtx", nodes=folder / "nodes.txt", **ENDS)
+    assert_same(link.stiffness, expected.stiffness)
+    with pytest.raises(BadInput, match="found lengths in m, expected that as --unit"):
+        import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
+
+
+def test_six_freedoms_a_node(tmp_path):
+    """A superelement of two nodes, the second one first."""
+    B = np.random.default_rng(0).normal(size=(12, 12))
+    K = B @ B.T
+    rows = np.r_[6:12, 0:6]
+    (tmp_path / "k.mtx").write_text(matrix_market(csc_array(K[np.ix_(rows, rows)])))
+    (tmp_path / "k.mapping").write_text(node_vector([2, 1]))
+    read = read_matrix(tmp_path / "k.mtx")
+    assert read.named
+    assert read.freedoms[:3] == ((2, 1), (2, 2), (2, 3))
+    back = np.argsort([6 * node + d for node, d in read.freedoms])
+    np.testing.assert_allclose(read.matrix.toarray()[np.ix_(back, back)], K)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (node_vector([1, 1, 2]), "found 2 nodes, expected 3"),
+        (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
+        ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
+        ("1 1 UX\n3 1 UY\n", "rows that do not run from 1"),
+        ("1 1\n", "expected row, node and label"),
+        ("Matrix Eqn\n", "rows that do not run from 1"),
+    ],
+)
+def test_a_mapping_that_is_none(text, message, tmp_path):
+    (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
+    (tmp_path / "k.mapping").write_text(text)
+    with pytest.raises(BadInput) as caught:
+        read_matrix(tmp_path / "k.mtx")
+    assert message in str(caught.value).replace('"', "'")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.replace("RSA", "CSA"), "expected RSA or RUA"),
+        (lambda t: "\n".join(t.split("\n")[:3]), "its head is cut off"),
+        (lambda t: "\n".join(t.split("\n")[:20]), "expected 12"),
+        (lambda t: t.replace("1.000000000000000D+00", "1.0000x0000000000D+00", 1),
+         "expected a number"),
+    ],
+)  # fmt: skip
+def test_a_harwell_boeing_file_that_is_none(change, message, tmp_path):
+    text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
+    (tmp_path / "k.matrix").write_text(change(text))
+    with pytest.raises(BadInput, match=message):
+        read_matrix(tmp_path / "k.matrix")
