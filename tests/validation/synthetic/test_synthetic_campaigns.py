@@ -287,8 +287,10 @@ def test_what_cannot_be_hidden_is_refused():
     away = CampaignDesign(configurations=8, rows=40, load=1e-3)
     with pytest.raises(NotApplicable, match="hardly show it"):
         quick({"drive_compliance": 5.0}, design=away)
-    with pytest.raises(BadInput, match='found "gravity"'):
+    with pytest.raises(BadInput, match='found "gravity"') as caught:
         draw_effect("gravity", two_axes(), 1.0, rng)
+    assert "self_weight" in str(caught.value)
+    assert " _" not in str(caught.value)  # those outside the library are for proofs
     with pytest.raises(BadInput, match="configurations"):
         CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
