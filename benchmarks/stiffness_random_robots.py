@@ -55,7 +55,7 @@ TIME_LIMIT = 20.0  # [s] of one simulation
 ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
 _FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
-_STEPS = 0.5 * 0.2 ** np.arange(7)  # of the loads' sizes
+_STEPS = 0.5 * 0.2 ** np.arange(8)  # of the loads' sizes; contacts change within 1e-3
 _MOVES = 0.03  # [rad or reference lengths] of a loaded platform
 _STIFF = 1e8  # [N m/rad, N/m]
 

@@ -85,6 +85,24 @@ def tangent_space(
     return D, D.T @ H @ D
 
 
+def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, NDArray]:
+    """Motions along which second derivatives do not mix.
+
+    Args:
+        D: (N, k) basis of motions.
+        H: (k, k) [J] the potential's second derivative in it.
+        units: (N,) of the unknowns, in which the modes are orthonormal.
+
+    Returns:
+        (k,) [J] second derivatives, lowest first, and (N, k) the motions.
+    """
+    Q, R = np.linalg.qr(D / units[:, None])
+    back = np.linalg.inv(R)
+    H = back.T @ H @ back
+    values, turned = np.linalg.eigh((H + H.T) / 2)
+    return values, units[:, None] * (Q @ turned)
+
+
 def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
     """Clearances that carry a force at an equilibrium.
 

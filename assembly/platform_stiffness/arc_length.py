@@ -30,12 +30,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.dead_load import dead_loads, work_gradient
 from assembly.exact.descent import Expansion, NotConverged, energy_of, expand
+from assembly.exact.equilibrium import curvature_modes
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.placement import place
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.deflection import DeflectionCurve, Event, mode_text
-from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
+from assembly.platform_stiffness.exact_tangent import (
+    FLAT,
+    part_owners,
+    platform_moves,
+)
 from assembly.platform_stiffness.matrices import Part
 
 _STEPS = 400  # of the path at most
@@ -43,7 +48,6 @@ _CORRECTIONS = 8  # of a step
 _CLOSED = 1e-10  # [-] size of a last correction, of a step
 _SMALLEST = 1e-6  # of the first step
 _HALVINGS = 20  # of a step, to bracket a critical load in it
-_FLAT = 1e-12  # of the largest curvature: what less counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +120,10 @@ class _Path:
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
         """Second derivatives of the potential, lowest first, and their motions Z."""
-        units = local.placement.model.units
-        Q, R = np.linalg.qr(local.basis / units[:, None])
-        back = np.linalg.inv(R)
-        H = back.T @ local.basis.T @ local.hessian @ local.basis @ back
-        values, vectors = np.linalg.eigh((H + H.T) / 2)
+        B, units = local.basis, local.placement.model.units
+        values, motions = curvature_modes(B, B.T @ local.hessian @ B, units)
         kept = np.sort(np.argsort(np.abs(values))[self.idle :])
-        return values[kept], units[:, None] * (Q @ vectors[:, kept])
+        return values[kept], motions[:, kept]
 
 
 def follow_load(
@@ -191,7 +192,7 @@ def _begin(
     """The first equilibrium, its tangent, and the weight that balances both lengths."""
     local = start.expansion
     values, _ = path.modes(local)
-    flat = np.abs(values) <= _FLAT * np.abs(values).max(initial=0.0)
+    flat = np.abs(values) <= FLAT * np.abs(values).max(initial=0.0)
     path = replace(path, idle=int(flat.sum()))
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exact.descent import Expansion
-from assembly.exact.equilibrium import tangent_space
+from assembly.exact.equilibrium import curvature_modes, tangent_space
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.platform_stiffness.linear_tangent import Side, owners
@@ -32,7 +32,7 @@ from assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-_FLAT = 1e-12  # of the largest curvature: what less counts as none
+FLAT = 1e-12  # of the largest curvature: what less counts as none
 
 
 def exact_tangent(
@@ -51,11 +51,8 @@ def exact_tangent(
     local = equilibrium.expansion
     model, at = local.placement.model, local.placement
     D, H = tangent_space(local, hold_touching=side == "holding")
-    Q, R = np.linalg.qr(D / model.units[:, None])
-    back = np.linalg.inv(R)
-    curvature, turned = np.linalg.eigh(back.T @ H @ back)
-    flat = np.abs(curvature) <= _FLAT * np.abs(curvature).max(initial=0.0)
-    modes = model.units[:, None] * (Q @ turned)
+    curvature, modes = curvature_modes(D, H, model.units)
+    flat = np.abs(curvature) <= FLAT * np.abs(curvature).max(initial=0.0)
     bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))
     moves, length = platform_moves(local), model.size
     return PlatformStiffness(

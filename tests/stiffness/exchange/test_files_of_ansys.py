@@ -162,3 +162,42 @@ def test_a_harwell_boeing_file_that_is_none(change, message, tmp_path):
     (tmp_path / "k.matrix").write_text(change(text))
     with pytest.raises(BadInput, match=message):
         read_matrix(tmp_path / "k.matrix")
+
+
+@pytest.mark.parametrize(
+    ("head", "numbers"),
+    [
+        ("coordinate real general", "3 3 5\n1 1 2\n2 2 3\n3 3 4D0\n1 2 1\n2 1 1\n"),
+        ("coordinate integer symmetric", "3 3 4\n1 1 2\n2 2 3\n3 3 4\n2 1 1\n"),
+        ("array real general", "3 3\n2\n1\n0\n1\n3\n0\n0\n0\n4\n"),
+        ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
+    ],
+)
+def test_every_kind_of_matrix_market(head, numbers, tmp_path):
+    """Full ones run down their columns; of symmetric ones the lower half is there."""
+    matrix = np.array([[2.0, 1, 0], [1, 3, 0], [0, 0, 4]])
+    path = tmp_path / "k.mtx"
+    path.write_text(f"%%MatrixMarket matrix {head}\n% a comment\n{numbers}")
+    assert np.array_equal(read_matrix(path, nodes=[1]).matrix.toarray(), matrix)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("coordinate pattern general\n2 2 1\n1 1\n", "no Matrix Market file"),
+        ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n", "not as many as said"),
+        ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "a place beyond 2 by 2"),
+        ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a place beyond"),
+        ("coordinate real general\n", "expected a square"),
+        ("coordinate real general\n2 2\n", "not as many as said"),
+        ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
+        ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
+        ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
+        ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
+    ],
+)
+def test_a_damaged_matrix_market_file_is_one_line(text, message, tmp_path):
+    """SciPy's reader ends the process on some of these."""
+    (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
+    with pytest.raises(BadInput, match=message):
+        read_matrix(tmp_path / "k.mtx")
