@@ -35,7 +35,6 @@ from stiffness.mesh.lagrange import lattice, quadrature, shape_functions
 from stiffness.mesh.mesh import Solid
 from stiffness.mesh.refine import refine
 from stiffness.surface.beam_surfaces import shape_beam, shape_surface
-from stiffness.surface.decimate import coarser_surface
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.intersections import crossing_triangles
 from stiffness.surface.patches import find_patches
@@ -160,15 +159,13 @@ def shapes(nudge: float) -> Any:
 
 
 def surface(name: str, nudge: float) -> Any:
-    """Patches of a surface and what was recognised in them; a coarser surface."""
+    """Patches of a surface and what was recognised in them."""
     base, tip = map(parse_interface, ENDS[name])
     read = read_surface(MESHES / f"{name}.stl")
     read = replace(read, points=read.points * (1 + nudge))
-    coarse = coarser_surface(read, 1e-3) if len(read.triangles) < 300 else None
     return {
         "surface": read,
         "patches": find_patches(read, base, tip),
-        "coarse": coarse,
         "crossing": crossing_triangles(read.points, read.triangles),
     }
 

@@ -155,3 +155,15 @@ def test_errors_of_a_plan_are_within_their_tolerances_and_as_wide_as_it_says(
     assert 0.9 < np.abs(drawn).max() <= 1.0
     deviation = 0.25 if kind == "truncated" else 1 / np.sqrt(3)
     assert np.std(drawn) == pytest.approx(deviation, rel=0.05)
+
+
+def test_what_a_tolerance_file_leaves_out_is_as_documented(write_file):
+    """A price of 1, anything from 0 to 0.1 rad or 10 mm, and to go together by play."""
+    tables = [f'[[tolerance]]\nframes = ["link_a"]\ncomponents = ["{c}"]\n' for c in
+              ("RX", "TX")]  # fmt: skip
+    plan = read_plan(write_file("".join(tables)), load_robot("irsbot2"))
+    np.testing.assert_array_equal(plan.costs, [1.0, 1.0])
+    np.testing.assert_array_equal(plan.least, [0.0, 0.0])
+    np.testing.assert_array_equal(plan.most, [0.1, 0.01])
+    assert plan.names == ("leg1.link_a.RX", "leg1.link_a.TX")
+    assert (plan.limits, plan.asked_yield) == ({"margin_free": 1.0}, 1.0)

@@ -155,3 +155,12 @@ def test_a_tolerance_given_is_used_whatever_the_readings_say(rng):
     behind = background([given], Evidence([given], CELLS).best(rng.normal(size=CELLS)))
     assert np.array_equal(behind.size, np.full(12, 1e-4))
     assert NOTHING.unknowns == 0.0
+
+
+def test_a_machine_made_as_declared_has_no_small_unknowns_and_they_cost_nothing(drawn):
+    terms, z, _, _ = drawn
+    none = Evidence(terms, CELLS).none()
+    assert (none.cost, none.evidence, none.scales) == (0.0, 0.0, {})
+    behind = background(terms, none)
+    assert not any(used.any() for used in none.used)
+    np.testing.assert_array_equal(behind.whitened(z), z)
