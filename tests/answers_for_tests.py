@@ -4,7 +4,8 @@
 
 Stored numbers prove nothing about mechanics; the laws beside them do.  They tell that a
 change which was to change nothing changed nothing.  Left out is what rounding decides:
-what changes where the inputs are moved by 1e-12, or on an older processor.
+what changes where the inputs are moved by 1e-12, or on an older processor that has no
+compiler for C++.
 """
 
 import dataclasses
@@ -30,6 +31,7 @@ from assembly.model.robot import Frame, Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import exact_of, solution_of
 from assembly.robots import load_robot
+from assembly.solvers.native import by_numba
 from assembly.statistics.allocated_tolerances import allocation_of
 from assembly.statistics.allocation import allocate
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
@@ -347,12 +349,24 @@ def main() -> None:
     """Store answers."""
     names = [name for name in sys.argv[1:] if name != PRINTED] or [*QUESTIONS]
     if PRINTED in sys.argv:
-        print(json.dumps({name: leaves(QUESTIONS[name](0.0)) for name in names}))
+        with by_numba():
+            answers = {name: leaves(QUESTIONS[name](0.0)) for name in names}
+        print(json.dumps(answers))
         return
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}
     stored |= stored_anew(names)
-    kept = {name: stored[name] for name in QUESTIONS if name in stored}
-    STORED.write_text(json.dumps(kept, indent=0) + "\n")
+    STORED.write_text(_a_leaf_a_line({
+        name: stored[name] for name in QUESTIONS if name in stored
+    }))  # fmt: skip
+
+
+def _a_leaf_a_line(answers: dict[str, dict[str, Leaf]]) -> str:
+    """JSON in which changes are seen line by line."""
+    parts = []
+    for name, answer in answers.items():
+        lines = (f"{json.dumps(k)}: {json.dumps(v)}" for k, v in answer.items())
+        parts.append(f"{json.dumps(name)}: {{\n" + ",\n".join(lines) + "\n}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 if __name__ == "__main__":
