@@ -85,6 +85,17 @@ struct Entry {
     double sign;
 };
 
+// Places of the patterns with clearances; -1 for the others.
+inline std::vector<int> loose_patterns(const Robot &s) {
+    std::vector<int> slot(s.np, -1);
+    int next = 0;
+    for (int c = 0; c < s.nu; ++c) {
+        int &own = slot[s.pattern_of[s.cone_frame[c]]];
+        if (own < 0) own = next++;
+    }
+    return slot;
+}
+
 // Solves blocks of points of one robot, one after the other.
 class Assembler {
 public:
@@ -99,7 +110,8 @@ private:
     const int n, m, np, ng, nu, nq;
     const Cones cones;
     std::vector<std::vector<Entry>> patterns;
-    std::vector<bool> felt, erring, loose;  // frames; frames; patterns with clearances
+    std::vector<bool> felt, erring;  // frames
+    std::vector<int> slot;         // of the patterns with clearances, in parts; else -1
     Table P;                       // (n, 18) the three turns of each frame: `column`
     Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
     Triangle free, springs;        // F; Y with Z beside it
@@ -146,8 +158,8 @@ private:
 Assembler::Assembler(const Robot &s, const Points &points)
     : s(s), n(int(s.n)), m(int(6 * s.closures)), np(int(s.np)), ng(int(s.ng)),
       nu(int(s.nu)), nq(int(s.nq)), cones(s.starts, int(s.cones)), patterns(np), felt(n),
-      erring(n), loose(np), P(n, 18), motion(nq, 6), play(nu, 6), elastic(int(s.ny), 6),
-      free(nq, m), springs(m, 6 * ng + m), rows(ng ? 0 : m, nu + 1), L(6 * ng, 6), parts(m, 6 * np), known(m),
+      erring(n), slot(loose_patterns(s)), P(n, 18), motion(nq, 6), play(nu, 6), elastic(int(s.ny), 6),
+      free(nq, m), springs(m, 6 * ng + m), rows(ng ? 0 : m, nu + 1), L(6 * ng, 6), parts(m, 6 * (1 + *std::max_element(slot.begin(), slot.end()))), known(m),
       programme(cones, m), solver(cones, m), v(m), Z(m), widest(6) {
     for (int g = 0; g < np; ++g)
         for (int k = 0; k < s.closures; ++k)
@@ -155,10 +167,7 @@ Assembler::Assembler(const Robot &s, const Points &points)
                 patterns[g].push_back({k, sign});
     for (int g = 0; g < ng; ++g)
         widest = std::max(widest, int(s.groups[g + 1] - s.groups[g]));
-    for (int c = 0; c < nu; ++c) {
-        felt[s.cone_frame[c]] = true;
-        loose[s.pattern_of[s.cone_frame[c]]] = true;
-    }
+    for (int c = 0; c < nu; ++c) felt[s.cone_frame[c]] = true;
     for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
     for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
     // a frame without errors at any point adds exact zeros
@@ -339,7 +348,7 @@ void Assembler::eliminate_springs(int rank, int count) {
 void Assembler::clearance_parts(int count) {
     for (int i = 0; i < count; ++i)
         for (int g = 0; g < np; ++g)
-            if (loose[g]) part(Z[i], g, parts[i] + 6 * g);
+            if (slot[g] >= 0) part(Z[i], g, parts[i] + 6 * slot[g]);
 }
 
 // What clearance c is in a row, of which screws of its pattern are `part`.
@@ -363,9 +372,9 @@ Real Assembler::largest_clearance() const {
 Whole Assembler::rigid_rows(int rank, int count, Real tolerance) {
     std::vector<Real> most(np), sizes(nu);
     for (int g = 0; g < np; ++g)
-        for (int i = rank; loose[g] && i < count; ++i)
+        for (int i = rank; slot[g] >= 0 && i < count; ++i)
             for (int a = 0; a < 6; ++a)
-                most[g] = larger(magnitude(parts[i][6 * g + a]), most[g]);
+                most[g] = larger(magnitude(parts[i][6 * slot[g] + a]), most[g]);
     Real worst = {};
     for (int c = 0; c < nu; ++c)
         for (int a = 0; a < 6; ++a) sizes[c] = larger(magnitude(play[c][a]), sizes[c]);
@@ -375,7 +384,7 @@ Whole Assembler::rigid_rows(int rank, int count, Real tolerance) {
         const Whole near = 6.0 * sizes[c] * most[g] > limit;
         if (!any(near)) continue;  // as nearly all are
         for (int i = rank; i < count; ++i) {
-            const Real total = enters(c, parts[i] + 6 * g);
+            const Real total = enters(c, parts[i] + 6 * slot[g]);
             worst = near ? larger(magnitude(total), worst) : worst;
         }
     }
@@ -391,7 +400,7 @@ void Assembler::small_problem(int r) {
     programme.r = r;
     for (int i = 0; i < r; ++i) programme.h[i] = -inner(known.data(), Z[i], m);
     for (int c = 0; c < nu; ++c) {
-        const int own = int(cones.column[c]), g = int(s.pattern_of[s.cone_frame[own]]);
+        const int own = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[own]]];
         Real screw[6];
         for (int a = 0; a < 6; ++a) screw[a] = -play[own][a];
         for (int i = 0; i < r; ++i) {

@@ -26,7 +26,7 @@
 #include "real.h"
 
 constexpr int ITERATIONS = 60;      // most of the interior-point method
-constexpr double START = 0.03;      // heads of z begin this far inside their cones
+constexpr double START = 0.03;      // heads of z begin this far inside (numba: 1)
 constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a cone
 constexpr int HALVINGS = 12;        // of a step of Newton's
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
