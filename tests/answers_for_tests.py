@@ -111,7 +111,9 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
         value = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         for name, one in value.items():
-            if not any(word in str(name) for word in LEFT_OUT):
+            # equal joints of another robot come from a cache with that robot
+            cached = name == "robot" and place.endswith("/joints")
+            if not cached and not any(word in str(name) for word in LEFT_OUT):
                 # what is named by its number or its frame is gathered
                 own = name if str(name).isidentifier() else ""
                 _gather(one, f"{place}/{own}", to, above)

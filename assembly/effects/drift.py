@@ -16,7 +16,8 @@ _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)  # time constants, in durations of the campai
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
-    settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
+    with np.errstate(over="ignore"):  # of a time constant near zero: a step
+        settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
     drift = settled[:, None] * amplitude
     return replace(conditions, reading=conditions.reading + drift)
 

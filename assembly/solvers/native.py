@@ -107,14 +107,9 @@ def _compile(source: str, digest: str, path: Path) -> None:
         "-o", unfinished,
     ]  # fmt: skip
     try:
-        run = subprocess.run(
-            command, capture_output=True, timeout=_LONGEST, check=False
-        )
-        if run.returncode == 0:
-            os.replace(unfinished, path)
-        else:
-            path.with_suffix(".failed").write_bytes(run.stderr)
-    except subprocess.TimeoutExpired:
+        subprocess.run(command, capture_output=True, timeout=_LONGEST, check=True)
+        os.replace(unfinished, path)
+    except subprocess.SubprocessError:  # it refused, or took too long
         path.with_suffix(".failed").touch()
     finally:
         Path(unfinished).unlink(missing_ok=True)

@@ -177,8 +177,8 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
     axes = figure.subplots(3, 2).ravel()
     panels = _panels(data)
     for panel, (key, scale, title, colours) in zip(axes, panels, strict=False):
-        values = quantity(data, key).transpose(y, x) * scale
-        finite = values.where(np.isfinite(values))
+        values = quantity(data, key).transpose(y, x)
+        finite = scale * values.where(np.isfinite(values))
         image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
         low, high = float(finite.min()), float(finite.max())
         if low < high:
@@ -214,8 +214,8 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
     figure = Figure(figsize=(11, 9), layout="constrained")
     axes = figure.subplots(3, 2).ravel()
     for panel, (key, scale, title, _) in zip(axes, _panels(data), strict=False):
-        values = quantity(data, key).values * scale
-        values = np.where(np.isfinite(values), values, np.nan)
+        values = quantity(data, key).values
+        values = scale * np.where(np.isfinite(values), values, np.nan)
         panel.plot(along, values, ".-", color="tab:blue")
         panel.plot(along[near], values[near], "kx", label="near a singularity")
         if key.startswith("margin"):

@@ -202,6 +202,12 @@ def test_a_reading_drifts_and_settles():
     assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
 
 
+def test_a_drift_that_takes_no_time_is_a_step():
+    values = {"amplitude.tx": 1e-5, "time_constant": 1e-307}
+    seen = change(here(arm(), time=50.0), "drift", values)
+    assert seen == pytest.approx([0, 0, 0, 1e-5, 0, 0], abs=1e-18)
+
+
 def test_no_effect_is_left_without_a_closed_form():
     """The list above is the library's: a new effect needs a test of its own."""
     source = Path(__file__).read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ from scipy.stats import binom, f, kstest
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import structure
-from validation.diagnosis.holdout import gain_over_blocks, split
+from validation.diagnosis.holdout import split
 from validation.diagnosis.lack_of_fit import (
     SIGNIFICANT,
     believed_noise,
@@ -224,10 +224,3 @@ def test_noise_shows_a_trend_as_rarely_as_stated(rng, monkeypatch):
         campaign = varied(rng, 20)
         alarms += bool(trends(campaign, conditions_of(campaign), campaign.measured))
     assert binom.cdf(alarms, 100, 0.05) < 1 - 1e-3
-
-
-def test_what_blocks_gain_and_how_surely_by_hand():
-    """Blocks gain 1, 2 and 6: 9 in all, sqrt(3) times the deviation of one."""
-    less, blocks = np.array([1.0, 0.5, 1.5, 2.0, 4.0]), np.array([7, 3, 3, 9, 9])
-    assert gain_over_blocks(less, blocks) == pytest.approx((9.0, np.sqrt(3 * 7)))
-    assert gain_over_blocks(less, np.zeros(5)) == (9.0, 0.0)

@@ -81,7 +81,7 @@ def test_the_command_writes_a_campaign_to_be_measured(tmp_path, run):
     ("option", "value", "says"),
     [
         ("--rows", "7", "--rows: found 7, expected at least 8"),
-        ("--position", "0", "--position: found 0, expected > 0"),
+        ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
         ("--temperature", "hot", 'temperature: found "hot", expected swing'),
     ],
 )
