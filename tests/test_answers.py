@@ -10,7 +10,13 @@ ANSWERS = json.loads(STORED.read_text())
 RELATIVE = 1e-6
 
 
-@pytest.mark.parametrize("name", QUESTIONS)
+LONG = ("inaccurate", "planar")  # diagnoses; a short one is asked always
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in QUESTIONS],
+)
 def test_answers_are_those_stored(name):
     stored, now = ANSWERS[name], leaves(QUESTIONS[name](0.0))
     other = {
