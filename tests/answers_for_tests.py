@@ -62,6 +62,7 @@ from validation.synthetic.design import CampaignDesign
 from validation.synthetic.generator import generate_campaign, write_campaign
 
 STORED = Path(__file__).with_name("answers.json")
+ROOT = Path(__file__).parents[1]  # wherever that is checked out
 NUDGE = 1e-12  # relative, of inputs
 # differs from one run or machine to the next, or is the size of rounding
 LEFT_OUT = (
@@ -103,7 +104,7 @@ def leaves(answer: Any) -> dict[str, Leaf]:
 def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> None:
     """Words and arrays of a tree of objects, under the names that lead to them."""
     if isinstance(value, str):
-        to.setdefault(f"{place}:", []).append(value)
+        to.setdefault(f"{place}:", []).append(value.replace(f"{ROOT}{os.sep}", ""))
     if value is None or isinstance(value, str) or id(value) in above:
         return
     above = above | {id(value)}
@@ -200,7 +201,7 @@ def drawn(clearance_model: str, nudge: float) -> Any:
 
 def sources_of(nudge: float) -> Any:
     """Distributions of the paper's errors."""
-    path = Path(__file__).parents[1] / "examples" / "irsbot2_errors.toml"
+    path = ROOT / "examples" / "irsbot2_errors.toml"
     sources = read_sources(path, load_robot("irsbot2"))
     return dataclasses.replace(sources, limit=sources.limit * (1 + nudge))
 
