@@ -67,7 +67,7 @@ NUDGE = 1e-12  # relative, of inputs
 # differs from one run or machine to the next, or is the size of rounding
 LEFT_OUT = (
     "seconds", "version", "sha256", "created", "path", "solver", "residual", "gap",
-    "excess", "stationarity", "mismatch", "linearisation_error",
+    "excess", "stationarity", "mismatch", "linearisation_error", "cuts",
 )  # fmt: skip
 STEADY = 3e-8  # relative change of an answer so moved that is none
 SMALLEST = 1e-8  # in SI: what is smaller is compared with it

@@ -16,7 +16,10 @@ import pytest
 import typer
 from hypothesis import settings
 
+from assembly.solvers.compiled import folder_of_compiled
 from forcefit.commands import app as command
+from forcefit.commands.warm_up import warm_up
+from forcefit.inputs.locking import locked_file
 
 # a command is the same whenever it is called: its options are read from the signatures
 # once, not in each of a thousand tests
@@ -27,6 +30,15 @@ typer.main.get_command = cache(typer.main.get_command)
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("repeatable")
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Of several processes with the tests, one compiles, and the others wait for it."""
+    if hasattr(session.config, "workerinput"):
+        folder = folder_of_compiled()
+        folder.mkdir(parents=True, exist_ok=True)
+        with locked_file(folder / "tests.lock"):
+            warm_up()
 
 
 @pytest.fixture

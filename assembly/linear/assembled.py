@@ -67,7 +67,8 @@ class Assembly:
     def _figures(self) -> Figures:
         """What ``forcefit assembly solve`` prints of it."""
         forces = np.linalg.norm(self.wrenches[:, 3:], axis=1)
-        most = int(forces.argmax())
+        # bodies in a row carry the same force: the first, whatever rounding says
+        most = int(np.argmax(forces >= (1 - 1e-9) * forces.max()))
         return {
             "pose": f"{numbers(self.posture.pose().values())} m, rad",
             **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),

@@ -18,6 +18,8 @@ from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 
+from forcefit.inputs.locking import locked_file
+
 _PACKAGE = Path(__file__).parents[1]
 # lanes must not depend on each other: nothing that lets sums be reordered
 _OPTIONS = (
@@ -64,10 +66,15 @@ def _library(source: str) -> ctypes.CDLL | None:
     library = _loaded(path, digest)
     if library is None and not path.with_suffix(".failed").exists():
         try:
-            _compile(source, digest, path)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # other programs that need it too wait for this one
+            with locked_file(path.with_suffix(".lock")):
+                library = _loaded(path, digest)
+                if library is None:
+                    _compile(source, digest, path)
+                    library = _loaded(path, digest)
         except OSError:  # no folder to write to
             return None
-        library = _loaded(path, digest)
     return library
 
 
@@ -99,7 +106,6 @@ def _compile(source: str, digest: str, path: Path) -> None:
     if compiler is None:
         return
     announce()
-    path.parent.mkdir(parents=True, exist_ok=True)
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
     command = [

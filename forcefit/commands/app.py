@@ -1,8 +1,13 @@
 """The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
 
+import signal
 import sys
+import threading
 import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -102,31 +107,57 @@ def main() -> None:
     if not sys.warnoptions:
         # libraries' warnings are for programmers; ``python -W default -m forcefit``
         warnings.simplefilter("ignore")
-    try:
-        status = app(prog_name="forcefit", standalone_mode=False)
-    except BadInput as error:
-        sys.exit(_complain(str(error), 2))
-    except (KeyboardInterrupt, typer.Abort):
-        sys.exit(_complain("interrupted", 130))
-    except SystemError as error:
-        # Ctrl-C while compiled code ran
-        if not isinstance(error.__cause__, KeyboardInterrupt):
-            raise
-        sys.exit(_complain("interrupted", 130))
-    except typer.Exit as error:
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
-    except Exception as error:
-        # an option misspelt or missing: the parser's own kind of error
-        if not hasattr(error, "format_message"):
-            raise
-        sys.exit(_complain(_with_found(error.format_message(), error), 2))
+    with _interrupts() as interrupts:
+        try:
+            status = app(prog_name="forcefit", standalone_mode=False)
+        except BaseException as error:
+            sys.exit(_status_after(error, interrupted=bool(interrupts)))
     sys.exit(status if isinstance(status, int) else 0)
 
 
-def _with_found(message: str, error: Exception) -> str:
+def _status_after(error: BaseException, interrupted: bool) -> int:
+    """The exit status after an exception, with its message on stderr, if it has one."""
+    if interrupted or isinstance(error, KeyboardInterrupt | typer.Abort):
+        return _complain("interrupted", 130)
+    match error:
+        case BadInput():
+            return _complain(str(error), 2)
+        case typer.Exit():
+            return error.exit_code
+        case BrokenPipeError():
+            sys.stderr.close()
+            return 1
+    # an option misspelt or missing: the parser's own kind of error
+    if not hasattr(error, "format_message"):
+        raise error
+    return _complain(_with_found(error.format_message(), error), 2)
+
+
+@contextmanager
+def _interrupts() -> Generator[list[int], None, None]:
+    """Ctrl-C is recorded, and raised as always.
+
+    Compiled code that is interrupted fails with errors of its own, such as matplotlib's
+    ``ValueError: Invalid bounding box``; what was recorded tells what they mean.
+    """
+    recorded: list[int] = []
+    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if not usual or threading.current_thread() is not threading.main_thread():
+        yield recorded
+        return
+
+    def record(number: int, frame: FrameType | None) -> None:
+        recorded.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, record)
+    try:
+        yield recorded
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _with_found(message: str, error: BaseException) -> str:
     """A parser's message and the value refused, which newer ones leave out."""
     refused: list[dict] = getattr(error.__cause__, "errors", list)()
     values = [str(one.get("input")) for one in refused[:1] if one.get("input")]

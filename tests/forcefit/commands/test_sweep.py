@@ -2,6 +2,8 @@
 
 import json
 import os
+import signal
+import time
 import zlib
 
 import pytest
@@ -275,16 +277,30 @@ def test_a_sweep_replaces_its_own_file(run, tmp_path):
         assert data.ty.values.tolist() == [0.14]
 
 
-def test_ctrl_c_in_compiled_code_is_130_too(run, monkeypatch):
-    """Python says so by a SystemError whose cause is the interrupt."""
+@pytest.mark.parametrize("kind", [SystemError, ValueError, KeyboardInterrupt])
+def test_ctrl_c_in_compiled_code_is_130_too(kind, run, monkeypatch):
+    """Which fails with errors of its own; matplotlib's are ValueErrors."""
 
     def interrupted(**_):
-        raise SystemError("returned a result with an exception set") from (
-            KeyboardInterrupt()
-        )
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)  # until the signal is there
+        except KeyboardInterrupt:
+            raise kind("Invalid bounding box") from None
 
     monkeypatch.setattr(command, "app", interrupted)
-    assert run("study")[0] == 130
+    status, _, err = run("study")
+    assert (status, err) == (130, "forcefit: interrupted\n")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_the_same_error_without_ctrl_c_is_shown_whole(run, monkeypatch):
+    def failed(**_):
+        raise ValueError("Invalid bounding box")
+
+    monkeypatch.setattr(command, "app", failed)
+    with pytest.raises(ValueError, match="bounding box"):
+        run("study")
 
 
 def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypatch):
