@@ -10,7 +10,8 @@ ANSWERS = json.loads(STORED.read_text())
 RELATIVE = 1e-6
 
 
-LONG = ("inaccurate", "planar")  # diagnoses; a short one is asked always
+# others of their kind are asked always
+LONG = ("inaccurate", "planar", "diagnosis constant_temperature", "tube")
 
 
 @pytest.mark.parametrize(

@@ -120,6 +120,7 @@ def test_hilti_from_urdf(tmp_path):
     assert np.abs(flat.covariates["column_ry"]).max() < 0.02  # [rad]
 
 
+@pytest.mark.slow
 @needs("ipa_ur10")
 def test_both_series_of_the_ur10_are_read(tmp_path):
     """As many poses as their README counts."""

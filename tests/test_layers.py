@@ -189,6 +189,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed(module):
     assert loaded(module, ROOT) == []
 
 
+@pytest.mark.slow
 def test_nothing_heavy_is_imported_with_all_files_at_once():
     files = [path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")]
     # files of compiled loops, and the one that says how they are compiled

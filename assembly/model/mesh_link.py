@@ -13,6 +13,8 @@ from stiffness.screws import rotation_matrix
 
 if TYPE_CHECKING:
     from stiffness.fem.fea import MeshedLink
+    from stiffness.surface.interface import Interface
+    from stiffness.surface.surface import Surface
 
 
 def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
@@ -34,12 +36,12 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
     if not isinstance(link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     place = f'frame "{frame.name}".link.mesh'
-    solved = solved_mesh(link, place, accuracy).link
-    span = solved.tip - solved.base
+    # what can be refused is refused before the finite elements
+    span = _span(link, place)
     turn = mesh_turn(frame, span)
     if link.axis is None:
         _check_tip(place, turn @ span, _between_origins(frame))
-    return turn_link(solved, turn)
+    return turn_link(solved_mesh(link, place, accuracy).link, turn)
 
 
 def mesh_compliance(frame: Frame) -> NDArray:
@@ -47,7 +49,9 @@ def mesh_compliance(frame: Frame) -> NDArray:
     return mesh_link_stiffness(frame).compliance
 
 
-_SOLVED: "dict[tuple[object, ...], MeshedLink]" = {}  # by this process
+# by this process
+_SOLVED: "dict[tuple[object, ...], MeshedLink]" = {}
+_SPANS: dict[tuple[object, ...], NDArray] = {}
 
 
 def solved_mesh(
@@ -71,8 +75,46 @@ def solved_mesh(
     """
     from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
+
+    density = link.density or 0.0
+    key = (*_shape_key(link, place), link.young, link.poisson, density, link.interface,
+           accuracy)  # fmt: skip
+    if key not in _SOLVED:
+        _SOLVED[key] = solve_link(
+            *_shape(link, place),
+            (Material(link.young, link.poisson, density),),
+            options=FemOptions(accuracy, link.interface),
+        )
+    return _SOLVED[key]
+
+
+def _span(link: MeshLink, place: str) -> NDArray:
+    """(3,) [m] from the base interface's centre to the tip's, in the mesh's axes."""
+    from stiffness.fem.fea import interface_center
+
+    key = _shape_key(link, place)
+    if key not in _SPANS:
+        surface, base, tip = _shape(link, place)
+        _SPANS[key] = interface_center(surface, tip, "tip") - interface_center(
+            surface, base, "base"
+        )
+    return _SPANS[key]
+
+
+def _shape(link: MeshLink, place: str) -> "tuple[Surface, Interface, Interface]":
+    """Surface, base and tip, as they are read from its file and its entries."""
     from stiffness.surface.interface import parse_interface
     from stiffness.surface.surface import read_surface
+
+    return (
+        read_surface(link.surface, link.unit),
+        parse_interface(link.base, f"{place}.base"),
+        parse_interface(link.tip, f"{place}.tip"),
+    )
+
+
+def _shape_key(link: MeshLink, place: str) -> tuple[object, ...]:
+    """What a link's shape depends on: its entries, and which state of its file."""
     from stiffness.surface.surface_files import named_solid
 
     try:
@@ -81,18 +123,7 @@ def solved_mesh(
         raise BadInput(
             f"{place}: surface {link.surface} cannot be read: {error.strerror}"
         ) from None
-    shape = (link.surface, stamp, link.unit, repr(link.base), repr(link.tip))
-    density = link.density or 0.0
-    key = (*shape, link.young, link.poisson, density, link.interface, accuracy)
-    if key not in _SOLVED:
-        _SOLVED[key] = solve_link(
-            read_surface(link.surface, link.unit),
-            parse_interface(link.base, f"{place}.base"),
-            parse_interface(link.tip, f"{place}.tip"),
-            (Material(link.young, link.poisson, density),),
-            options=FemOptions(accuracy, link.interface),
-        )
-    return _SOLVED[key]
+    return link.surface, stamp, link.unit, repr(link.base), repr(link.tip)
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:

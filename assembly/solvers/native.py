@@ -64,15 +64,18 @@ def _library(source: str) -> ctypes.CDLL | None:
     digest = _digest(source)
     path = folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
     library = _loaded(path, digest)
-    if library is None and not path.with_suffix(".failed").exists():
+    compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
+    refused = path.with_suffix(".failed")
+    if library is None and compiler is not None and not refused.exists():
+        lock = path.with_suffix(".lock")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            # other programs that need it too wait for this one
-            with locked_file(path.with_suffix(".lock")):
-                library = _loaded(path, digest)
-                if library is None:
-                    _compile(source, digest, path)
+            with locked_file(lock):
+                library = _loaded(path, digest)  # another program was waited for
+                if library is None and not refused.exists():
+                    _compile(compiler, source, digest, path)
                     library = _loaded(path, digest)
+                lock.unlink()
         except OSError:  # no folder to write to
             return None
     return library
@@ -98,13 +101,10 @@ def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
         return None
 
 
-def _compile(source: str, digest: str, path: Path) -> None:
+def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     """Write the library, whole or not at all; where that fails, a note that it did."""
     from assembly.solvers.compiled import announce
 
-    compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
-    if compiler is None:
-        return
     announce()
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)

@@ -26,7 +26,7 @@ from stiffness.fem.adaptive_step import (
 )
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.mass_properties import PointMass, mass_properties
-from stiffness.fem.material import Material
+from stiffness.fem.material import Material, check_materials
 from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
@@ -159,9 +159,10 @@ def solve_link(
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is not proper.
+        BadInput: an interface is not proper, or there is no material.
     """
     start = time.monotonic()
+    check_materials(materials)
     centers = np.array([
         interface_center(surface, side, name)
         for side, name in ((base, "base"), (tip, "tip"))

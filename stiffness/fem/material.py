@@ -48,8 +48,7 @@ def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArr
     Raises:
         BadInput: there is none, or the first does not fill the link.
     """
-    if not materials:
-        raise BadInput("materials: at least one is needed")
+    check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
     table = np.zeros((len(centers), 3))
     for material in materials:
@@ -59,3 +58,16 @@ def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArr
     if not (table[:, 1] > 0).all():
         raise BadInput("materials: the first must fill the whole link")
     return table
+
+
+def check_materials(materials: Sequence[Material]) -> None:
+    """Refuse a link without a material.
+
+    Args:
+        materials: of a link.
+
+    Raises:
+        BadInput: there is none.
+    """
+    if not materials:
+        raise BadInput("materials: at least one is needed")

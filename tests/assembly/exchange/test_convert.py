@@ -29,6 +29,7 @@ def test_example_robots_convert_and_close(name, tmp_path):
     assert posture.mismatch < 1e-9
 
 
+@pytest.mark.slow
 def test_a_loop_that_cannot_close_is_named_and_nothing_is_written(tmp_path):
     """Kangaroo's file says 6d where a rod needs a ball: three turns cannot close it."""
     target = tmp_path / "robot.toml"

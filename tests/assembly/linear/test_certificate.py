@@ -73,6 +73,7 @@ def spoilt(solve):
     return solver
 
 
+@pytest.mark.slow
 def test_what_no_solver_proves_is_not_certified(monkeypatch):
     """The edge of the zone with Newton's method taken away and the others spoilt."""
     from assembly.linear import energy

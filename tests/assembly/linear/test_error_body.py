@@ -68,6 +68,7 @@ def test_directions_are_unit_vectors_spread_over_all_octants():
     assert np.bincount(octants).min() >= 20
 
 
+@pytest.mark.slow
 def test_the_picture_shows_the_body_and_says_its_size():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
     plotter = plot_assembly(answer, errors="translation", reading="frozen")

@@ -82,6 +82,7 @@ def test_the_tangent_is_the_slope_of_the_curve():
     assert 1 / slope == pytest.approx(curve.stiffness[1], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_euler_s_column_is_found_to_buckle():
     width, E = 0.02, 70e9
     link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=16,

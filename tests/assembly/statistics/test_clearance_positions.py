@@ -50,6 +50,7 @@ def test_in_a_box_every_side_is_uniform():
         assert stats.kstest(side, stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
 
+@pytest.mark.slow
 def test_a_cut_disc_agrees_with_rejection():
     """Row u0 = u2 / 2 with |u2| <= 1 leaves the strip |u0| <= 1/2 of the unit disc."""
     u = walked([[1, 0, -0.5]], [0, 2, 3])

@@ -47,6 +47,7 @@ def test_ishigamis_function_has_its_known_indices():
     assert found.variance[0] == pytest.approx(13.845, rel=0.03)
 
 
+@pytest.mark.slow
 def test_without_play_the_closed_form_holds():
     """Then the platform's screw is linear in the errors."""
     robot = load_robot("irsbot2")

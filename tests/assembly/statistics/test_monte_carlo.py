@@ -203,6 +203,7 @@ def test_limits_that_are_none_are_refused(text):
         parse_limit(text)
 
 
+@pytest.mark.slow
 def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(ERRORS)

@@ -65,7 +65,10 @@ def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
     assert data.duality_gap.values == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("load", [None, [5.0, 0, 0, 100.0, -40.0, -200.0]])
+@pytest.mark.parametrize(
+    "load",
+    [pytest.param(None, marks=pytest.mark.slow), [5.0, 0, 0, 100.0, -40.0, -200.0]],
+)
 def test_points_with_effects_are_those_of_one_posture(load):
     robot = replace(irsbot2_with(NUMBERS["cases"][0]), effects=EFFECTS)
     data = swept(robot, GRID, under={"temperature": 8.0}, linearisation=True,

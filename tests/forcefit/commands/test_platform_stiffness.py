@@ -157,6 +157,7 @@ def test_bad_input_is_one_line_and_exit_2(run, words, message):
     assert len(err.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
     status, out, _ = run(
         "assembly",

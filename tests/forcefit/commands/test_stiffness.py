@@ -152,6 +152,7 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
     assert "the asked 0.005 was reached" in text
 
 
+@pytest.mark.slow
 def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
     """Without Poisson's effect plane sections stay plane and compliances add up:
     of pure bending h/EI, of torsion h/GJ with G = E/2, of tension h/EA.
@@ -176,6 +177,7 @@ def test_fea_of_two_materials_in_series_with_a_mass_at_the_tip():
     np.testing.assert_allclose(found["center_of_mass"], center, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_compare_writes_both_and_draws(tmp_path):
     figure = tmp_path / "k.png"
     options = ["--radius", "0.04", "--figure", str(figure), "--json", "-"]

@@ -57,6 +57,7 @@ def grid(count, axes):
     return xarray.Dataset(data, coords, {"robot": ODD[0]})
 
 
+@pytest.mark.slow
 def test_maps_and_paths_of_joints_with_odd_names_are_drawn():
     both = grid((2, 3), (f"q.{ODD[0]}", f"{ODD[2]}.link.length"))
     shown = drawn_texts(map_figure(both))

@@ -92,6 +92,7 @@ def test_the_three_files_of_calculix(tmp_path):
         import_link(tmp_path / "bar.sti", nodes=tmp_path / "nodes.csv", **ends)
 
 
+@pytest.mark.slow
 @pytest.mark.exudyn
 def test_a_solid_is_condensed_as_exudyn_condenses_it(tmp_path):
     """Rigid faces at both ends (RBE2), static modes of Hurty-Craig-Bampton, to 1e-8."""

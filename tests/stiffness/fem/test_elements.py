@@ -19,6 +19,10 @@ from tests.solids_for_tests import bar_solid, box_solid, outward
 
 E, NU = 60e9, 0.3
 LAM, MU = lame(E, NU)
+MESHES = [  # order, and whether edges are cut into layers
+    (2, False), (3, False), (2, True),
+    pytest.param(3, True, marks=pytest.mark.slow),
+]  # fmt: skip
 
 
 def constants(mesh):
@@ -61,9 +65,7 @@ def solved(solid, order, kind="rigid", tip=None):
 both_orders = pytest.mark.parametrize("order", [2, 3])
 
 
-@pytest.mark.parametrize(
-    ("order", "layers"), [(2, False), (3, False), (2, True), (3, True)]
-)
+@pytest.mark.parametrize(("order", "layers"), MESHES)
 def test_six_rigid_motions_cost_nothing(rng, order, layers):
     """Curved and cut elements included: they hold linear fields exactly."""
     mesh = curved_mesh(order, layers)
@@ -84,9 +86,7 @@ def test_six_rigid_motions_cost_nothing(rng, order, layers):
     assert np.abs(values[:6]).max() < 1e-10 * values[6]
 
 
-@pytest.mark.parametrize(
-    ("order", "layers"), [(2, False), (3, False), (2, True), (3, True)]
-)
+@pytest.mark.parametrize(("order", "layers"), MESHES)
 def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
     """The patch test: inner nodes find the linear field that the boundary has."""
     solid = split_joining_edges(crooked(rng), (0, 1))
@@ -322,7 +322,10 @@ def harmonic_slope(x):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-@pytest.mark.parametrize(("order", "counts"), [(2, (6, 12)), (3, (4, 8))])
+@pytest.mark.parametrize(
+    ("order", "counts"),
+    [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)],
+)
 def test_strains_converge_with_the_power_of_the_mesh(order, counts):
     """The gradient of a harmonic function is in equilibrium without body force.
 

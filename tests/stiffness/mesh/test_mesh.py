@@ -68,6 +68,7 @@ def test_refining_halves_as_often_as_asked():
     assert volumes.max() <= cube.volumes()[0] / 8 * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_a_meshed_bar_has_exact_interfaces_and_a_round_side(tmp_path):
     """24 facets: the polygon lacks 1.1 % of area; the corners lie on the circle."""
     base, tip = parse_interface("z=0"), parse_interface("z=0.1")

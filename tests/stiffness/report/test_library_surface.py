@@ -63,6 +63,7 @@ def bar_stl(tmp_path, monkeypatch, cache):
     return path
 
 
+@pytest.mark.slow
 def test_a_surface_is_an_entry_with_its_files_digest_and_error(bar_stl, tmp_path):
     """Held ends make a bar of L / r = 7 stiffer than its beam, by less than 10 %."""
     spec = tmp_path / "spec.toml"

@@ -63,6 +63,7 @@ def test_a_solid_moved_as_a_whole_costs_nothing_and_else_is_a_beam():
     assert difference(link_compliance(frame), np.linalg.inv(solid.spread)) < 0.08
 
 
+@pytest.mark.slow
 def test_virtual_joints_lose_nothing_of_solids_that_act_at_their_ends(posture):
     """Condensed K_E against the displacement method over all bodies: rounding."""
     costs = platform_costs([posture])

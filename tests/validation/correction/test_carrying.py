@@ -126,6 +126,7 @@ def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
     assert day["uncertainty"] > 10 * day["left_in_setup"]
 
 
+@pytest.mark.slow
 def test_zeros_set_anew_are_found_when_asked_for(machine, run):
     folder = measured(machine, 80, 0.8, zero=5e-4)
     _, _, (without,), _ = carried(run, machine, folder, "--setup", "30")

@@ -124,6 +124,7 @@ def test_what_the_library_lacks_is_learned(diagnosed, tmp_path):
     assert_saved_predicts(found, tmp_path)
 
 
+@pytest.mark.slow
 def test_places_that_do_the_same_are_listed(diagnosed):
     """In a planar arm any body that moves out of the plane reads the same."""
     found = diagnosed("sag")
@@ -134,6 +135,7 @@ def test_places_that_do_the_same_are_listed(diagnosed):
     assert len((places | {one["where"]}) & {"one", "two", "tool", "reading"}) >= 3
 
 
+@pytest.mark.slow
 def test_scatter_teaches_nothing(diagnosed):
     """Three times the noise stated, and no repeats that would say so."""
     found = diagnosed("scatter")
