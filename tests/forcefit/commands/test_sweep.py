@@ -68,6 +68,7 @@ def test_what_takes_long_is_said_at_once(capsys, monkeypatch):
         assert said == "points: 3 of 12\n"
 
 
+@pytest.mark.slow
 def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     grid = "tx=-0.01:0.01:0.01,ty=0.12:0.14:0.02"

@@ -65,6 +65,7 @@ def test_a_solid_of_three_columns_takes_its_nodes_from_the_deck(order, tmp_path)
     assert_same(link.stiffness, named.stiffness)
 
 
+@pytest.mark.slow
 def test_the_three_files_of_calculix(tmp_path):
     """``.sti`` and ``.mas``, upper halves by columns; ``.dof`` names their rows."""
     nodes, K = full_matrix((1, 1, 2))

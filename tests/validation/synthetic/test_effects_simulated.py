@@ -90,7 +90,11 @@ def test_no_effect_is_left_out():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("program", ["springs", "multibody"])
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize(
+    "name",  # every third by default
+    [pytest.param(n, marks=[pytest.mark.slow] * (i % 3 > 0))
+     for i, n in enumerate(EFFECTS)],
+)  # fmt: skip
 def test_an_effect_adds_what_the_machine_that_has_it_shows(
     name, program, robot, machine
 ):
