@@ -211,9 +211,9 @@ def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
 
 
 def snapshot() -> dict[str, bytes]:
-    """All files here, by name."""
+    """All files here, by name, and all empty folders, with a stroke at the end."""
     return {
-        str(p): p.read_bytes() if p.is_file() else b""
+        str(p) if p.is_file() else f"{p}/": p.read_bytes() if p.is_file() else b""
         for p in sorted(Path().rglob("*"))
         if p.is_file() or not any(p.iterdir())
     }

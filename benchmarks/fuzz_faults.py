@@ -7,7 +7,7 @@ from pathlib import Path
 # progress, verdicts and what meshing says
 _OURS = re.compile(
     r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
-    r"|\S+ *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
+    r"|[a-z][a-z -]* *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
 )
 
 
@@ -53,7 +53,12 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
 
 
 def may_change(name: str, after: dict[str, bytes]) -> bool:
-    """Whether a file that was there may be another now: ours, of the same kind."""
+    """Whether a file that was there may be another now: ours, of the same kind.
+
+    An empty folder may be filled.
+    """
+    if name.endswith("/"):
+        return any(other.startswith(name) for other in after)
     journal = name.endswith(".journal")
     return journal or (name in after and is_whole(name, after[name]))
 

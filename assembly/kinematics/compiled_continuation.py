@@ -84,9 +84,9 @@ class Free(NamedTuple):
 
 @kernel
 def follow_all(
-    tree: Tree, start: NDArray, poses: NDArray, held: NDArray, guess: bool, T: NDArray,
-    still_open: NDArray,
-) -> tuple[NDArray, NDArray]:  # fmt: skip
+    tree: Tree, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
+    ends: NDArray, progress: NDArray, T: NDArray, still_open: NDArray,
+) -> None:  # fmt: skip
     """Follow every target along its straight line.
 
     Args:
@@ -95,14 +95,12 @@ def follow_all(
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
         held: (k, n) coordinates, NaN where free.
         guess: the start is one, and does not close: one step, of any length.
-        T: (k, n, 4, 4) to fill: rotations and origins of all frames where tracks end.
+        ends: (k, n) to fill: coordinates where each track ends.
+        progress: (k,) to fill: part of the way, 1 where the target was reached.
+        T: (k, n, 4, 4) to fill: rotations and origins of all frames there.
         still_open: (k, closures) to fill [rad, m]: largest component of each closure.
-
-    Returns:
-        (k, n) coordinates where each track ends and (k,) progress, 1 where reached.
     """
     count, n = held.shape
-    ends, progress = matrix(count, n), vector(count)
     pose, turn = vector(6), vector(3)
     for i in range(count):
         for k in range(6):
@@ -122,7 +120,6 @@ def follow_all(
                 # written so that NaN stays
                 if not most <= still_open[i, c]:
                     still_open[i, c] = most
-    return ends, progress
 
 
 @part

@@ -3,20 +3,19 @@
 Many targets are followed at once, each along its straight line from the home pose.
 Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
 undetermined stays unchanged, and overconstrained robots are no special case.  The
-loops are compiled, in :mod:`assembly.kinematics.compiled_continuation`.
+loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`, and
+:mod:`assembly.kinematics.compiled_continuation` where no compiler for C++ stands.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.continuation_side_by_side import follow_side_by_side
 from assembly.model.robot import JOINTS, Robot
-
-if TYPE_CHECKING:
-    from assembly.kinematics.compiled_continuation import Tree
 
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
@@ -94,17 +93,15 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 
 
 @lru_cache(maxsize=64)
-def _tree(robot: Robot) -> "Tree":
-    """The arrays, once for each robot."""
-    from assembly.kinematics.compiled_continuation import Tree
-
+def _tree(robot: Robot) -> dict[str, Any]:
+    """Fields of a compiled tree, once for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     # a joint's motion comes after its own frame
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])
     moves = [(j, int(signs[j])) for signs in moved for j in np.flatnonzero(signs)]
-    return Tree(
+    return dict(
         parents=np.array(robot.parents),
         kinds=np.array([JOINTS.index(f.joint) for f in robot.frames]),
         fixed=np.array(robot.fixed_transforms),
@@ -128,18 +125,22 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
     Returns:
         The ends of the tracks, and their progress.
     """
-    from assembly.kinematics.compiled_continuation import follow_all
-
-    tree = _tree(robot)
+    tree, start = _tree(robot), np.array(start, dtype=float)
     count, n = len(target), len(robot.frames)
     held = np.full((count, n), np.nan)
     if target.coordinates is not None:
-        held = np.where(tree.kinds > 0, target.coordinates, np.nan)
-    poses = np.zeros((0, 6)) if target.pose is None else target.pose
-    T, still_open = np.zeros((count, n, 4, 4)), np.zeros((count, len(tree.pairs)))
-    T[..., 3, 3] = 1.0
-    q, progress = follow_all(
-        tree, np.array(start, dtype=float), np.array(poses, dtype=float), held, guess,
-        T, still_open,
+        held = np.where(tree["kinds"] > 0, target.coordinates, np.nan)
+    poses = np.zeros((0, 6)) if target.pose is None else np.array(target.pose, float)
+    track = Track(
+        np.zeros((count, n)), np.zeros((count, n, 4, 4)), np.zeros(count),
+        np.zeros((count, len(tree["pairs"]))),
     )  # fmt: skip
-    return Track(q, T, progress, still_open)
+    track.transforms[..., 3, 3] = 1.0
+    if not follow_side_by_side(tree, start, poses, held, guess, track):
+        from assembly.kinematics.compiled_continuation import Tree, follow_all
+
+        follow_all(
+            Tree(**tree), start, poses, held, guess, track.coordinates, track.progress,
+            track.transforms, track.closure_mismatch,
+        )  # fmt: skip
+    return track

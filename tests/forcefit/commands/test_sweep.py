@@ -290,9 +290,13 @@ def test_ctrl_c_in_compiled_code_is_130_too(kind, run, monkeypatch):
             raise kind("Invalid bounding box") from None
 
     monkeypatch.setattr(command, "app", interrupted)
-    status, _, err = run("study")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # if ignored
+    try:
+        status, _, err = run("study")
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert (status, err) == (130, "forcefit: interrupted\n")
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_the_same_error_without_ctrl_c_is_shown_whole(run, monkeypatch):

@@ -1,0 +1,85 @@
+"""Continuation to several targets side by side, by ``continuation.cpp``.
+
+The same steps and thresholds as :mod:`assembly.kinematics.compiled_continuation`, one
+target in each lane of the processor's vector registers.  No lane depends on another.
+"""
+
+import ctypes
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.solvers.native import load_library
+
+if TYPE_CHECKING:
+    from assembly.kinematics.nominal import Track
+
+SOURCE = "kinematics/continuation.cpp"
+_ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
+
+
+class _Tree(ctypes.Structure):
+    """``Tree`` of continuation.cpp."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("n", "closures", "platform")),
+        ("size", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+    )
+
+
+class _Targets(ctypes.Structure):
+    """``Targets`` of continuation.cpp."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("start", "poses", "held")),
+        ("guess", ctypes.c_int64),
+    )
+
+
+def follow_side_by_side(
+    tree: dict[str, Any], start: NDArray, poses: NDArray, held: NDArray, guess: bool,
+    track: "Track",
+) -> bool:  # fmt: skip
+    """Follow every target along its straight line.
+
+    Args:
+        tree: fields of :class:`assembly.kinematics.compiled_continuation.Tree`.
+        start: (n,) coordinates at home.
+        poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
+        held: (k, n) coordinates, NaN where free.
+        guess: the start is one, and does not close: one step, of any length.
+        track: to fill.
+
+    Returns:
+        Whether it did; not where there is no compiler.
+    """
+    library = load_library(SOURCE)
+    if library is None:
+        return False
+    robot = _Tree(
+        len(tree["parents"]), len(tree["pairs"]), tree["platform"], tree["size"],
+        *(tree[name].ctypes.data for name in _ARRAYS),
+    )  # fmt: skip
+    out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
+    asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
+    left = np.arange(len(held))
+    while left.size:
+        # those of a call ask for the same entries
+        same = (asked[left] == asked[left[0]]).all(axis=1)
+        rows, left = left[same], left[~same]
+        filled = [array[rows] for array in out]
+        given = [
+            np.ascontiguousarray(a)
+            for a in (start, poses[rows[: len(poses)]], held[rows])
+        ]
+        targets = _Targets(
+            len(rows), *(a.ctypes.data if a.size else None for a in given), guess
+        )
+        tracks = (ctypes.c_void_p * len(out))(*(array.ctypes.data for array in filled))
+        library.follow_all(ctypes.byref(robot), ctypes.byref(targets), tracks)
+        for array, part in zip(out, filled, strict=True):
+            array[rows] = part
+    return True
