@@ -16,7 +16,7 @@ import pytest
 import typer
 from hypothesis import settings
 
-from assembly.solvers.compiled import folder_of_compiled
+from assembly.solvers.native import folder_of_compiled
 from forcefit.commands import app as command
 from forcefit.commands.warm_up import warm_up
 from forcefit.inputs.locking import locked_file

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from assembly.linear.compiled_energy import small_answer
 from assembly.linear.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
-from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
+from assembly.solvers.layouts import Indices, Matrix, Vector
 from assembly.solvers.vectors import copy, fill, inner, matrix, vector
 
 SOLVED, UNCERTIFIED = range(2)

@@ -12,16 +12,9 @@ from assembly.kinematics.compiled_rotations import (
     rotation_exp,
     rotation_log,
 )
-from assembly.solvers.compiled import (
-    IndexRows,
-    Indices,
-    Matrices,
-    Matrix,
-    Vector,
-    kernel,
-    part,
-)
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.layers import FAST
+from assembly.solvers.layouts import IndexRows, Indices, Matrices, Matrix, Vector
 from assembly.solvers.vectors import copy, indices, matrices, matrix, vector
 
 _SOLVED = 1e-10  # scaled residual at which a configuration counts as solved

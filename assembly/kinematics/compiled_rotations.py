@@ -2,7 +2,8 @@
 
 import math
 
-from assembly.solvers.compiled import Matrices, Matrix, Vector, part
+from assembly.solvers.compiled import part
+from assembly.solvers.layouts import Matrices, Matrix, Vector
 from assembly.solvers.vectors import matrices, matrix, vector
 
 

@@ -75,7 +75,8 @@ private:
     const double longest;
     std::vector<int> joints, columns;  // solved for; -1 for the others
     std::vector<double> unit;
-    std::vector<char> coupled;  // entries of the normal matrix that are not zero
+    std::vector<std::vector<int>> coupled;  // later columns that a row of N enters
+    std::vector<bool> straight;             // frames that are not turned in their parents
     bool asked[6], all_turns, turns;
     double home_pose[6];
     Lane lanes[LANES];
@@ -111,6 +112,12 @@ Follower::Follower(const Tree &tree, const Targets &targets)
     all_turns = asked[3] && asked[4] && asked[5];
     turns = asked[3] || asked[4] || asked[5];
     couple();
+    for (int i = 0; i < n; ++i) {
+        bool identity = true;
+        for (int k = 0; k < 9; ++k)
+            identity = identity && tree.fixed[16 * i + k / 3 * 4 + k % 3] == (k % 4 == 0);
+        straight.push_back(identity);
+    }
     for (int j = 0; j < n; ++j) q[j] = real(targets.start[j]);
     forward();
     double home[9];
@@ -123,18 +130,21 @@ Follower::Follower(const Tree &tree, const Targets &targets)
 // Joints that move the same closure, and those that elimination couples.
 void Follower::couple() {
     const int m = joints.size();
-    coupled.assign(size_t(m) * m, 0);
+    std::vector<std::vector<char>> entered(m, std::vector<char>(m, 0));
     for (int g = 0; g < closures + posed; ++g)
         for (int e = tree.groups[g]; e < tree.groups[g + 1]; ++e)
-            for (int k = tree.groups[g]; k <= e; ++k) {
-                const int i = columns[tree.moves[2 * e]], j = columns[tree.moves[2 * k]];
-                if (i >= 0 && j >= 0) coupled[size_t(j) * m + i] = 1;
+            for (int f = tree.groups[g]; f <= e; ++f) {
+                const int i = columns[tree.moves[2 * e]], j = columns[tree.moves[2 * f]];
+                if (i >= 0 && j >= 0) entered[j][i] = 1;
             }
-    for (int i = 0; i < m; ++i)
+    coupled.resize(m);
+    for (int i = 0; i < m; ++i) {
         for (int k = i + 1; k < m; ++k)
-            if (coupled[size_t(i) * m + k])
-                for (int j = k; j < m; ++j)
-                    coupled[size_t(k) * m + j] |= coupled[size_t(i) * m + j];
+            if (entered[i][k]) coupled[i].push_back(k);
+        for (int k : coupled[i])
+            for (int j : coupled[i])
+                if (j >= k) entered[k][j] = 1;
+    }
 }
 
 void Follower::start(int l, int64_t target) {
@@ -215,27 +225,30 @@ void Follower::forward() {
             for (int k = 0; k < 9; ++k) own[k] = real(fixed[k / 3 * 4 + k % 3]);
             for (int k = 0; k < 3; ++k) at[k] = real(fixed[4 * k + 3]);
         } else {
-            const Real *A = &after_R[9 * tree.parents[i]];
-            const Real *o = &after_p[3 * tree.parents[i]];
+            const int64_t parent = tree.parents[i];
+            const bool turns_on = tree.kinds[parent] == 1, slides_on = tree.kinds[parent] == 2;
+            const Real *A = turns_on ? &after_R[9 * parent] : &R[9 * parent];
+            const Real *o = slides_on ? &after_p[3 * parent] : &p[3 * parent];
             for (int k = 0; k < 3; ++k) {
                 const Real a = A[3 * k], b = A[3 * k + 1], c = A[3 * k + 2];
-                for (int l = 0; l < 3; ++l)
-                    own[3 * k + l] = a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
                 at[k] = o[k] + a * fixed[3] + b * fixed[7] + c * fixed[11];
+                if (straight[i])
+                    own[3 * k] = a, own[3 * k + 1] = b, own[3 * k + 2] = c;
+                else
+                    for (int l = 0; l < 3; ++l)
+                        own[3 * k + l] = a * fixed[l] + b * fixed[4 + l] + c * fixed[8 + l];
             }
         }
-        Real *A = &after_R[9 * i], *o = &after_p[3 * i];
-        for (int k = 0; k < 9; ++k) A[k] = own[k];
-        for (int k = 0; k < 3; ++k) o[k] = at[k];
         if (tree.kinds[i] == 1) {
-            Real s, c;
+            Real s, c, *A = &after_R[9 * i];
             sine_cosine(q[i], &s, &c);
             for (int k = 0; k < 3; ++k) {
                 const Real a = own[3 * k], b = own[3 * k + 1];
                 A[3 * k] = c * a + s * b, A[3 * k + 1] = c * b - s * a;
+                A[3 * k + 2] = own[3 * k + 2];
             }
         } else if (tree.kinds[i] == 2) {
-            for (int k = 0; k < 3; ++k) o[k] += q[i] * own[3 * k + 2];
+            for (int k = 0; k < 3; ++k) after_p[3 * i + k] = at[k] + q[i] * own[3 * k + 2];
         }
     }
 }
@@ -332,28 +345,25 @@ Whole Follower::least_step(Real damped) {
     Real damping = real(1e-30);
     for (int i = 0; i < m; ++i) damping += damped * N[i][i];
     Whole determined = whole(-1);
-    for (int i = 0; i < m; ++i) {
+    for (int i = 0; i < m; ++i) {  // U^T D U
         Real *row = N[i];
         const Real pivot = row[i] + damping;
         determined &= pivot > CLEAR * damping;
-        const Real inverse = 1.0 / root(larger(pivot, 0.1 * damping));
-        for (int j = i + 1; j < m; ++j) row[j] *= inverse;
-        x[i] *= inverse;
-        row[i] = inverse;
-        const char *pattern = &coupled[size_t(i) * m];
-        for (int k = i + 1; k < m; ++k) {
-            if (!pattern[k]) continue;
-            const Real factor = once(row[k]);
+        const Real inverse = 1.0 / larger(pivot, 0.1 * damping);
+        const std::vector<int> &entered = coupled[i];
+        const int count = entered.size();
+        for (int a = 0; a < count; ++a) {
+            const int k = entered[a];
+            const Real factor = once(row[k] * inverse);
             Real *to = N[k];
-            for (int j = k; j < m; ++j) to[j] -= factor * row[j];
+            for (int b = a; b < count; ++b) to[entered[b]] -= factor * row[entered[b]];
             x[k] -= factor * x[i];
+            row[k] = factor;
         }
+        x[i] *= inverse;
     }
-    for (int i = m - 1; i >= 0; --i) {
-        Real total = x[i];
-        for (int j = i + 1; j < m; ++j) total -= N[i][j] * x[j];
-        x[i] = total * N[i][i];
-    }
+    for (int i = m - 1; i >= 0; --i)
+        for (int j : coupled[i]) x[i] -= N[i][j] * x[j];
     return determined;
 }
 

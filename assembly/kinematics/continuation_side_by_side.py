@@ -70,16 +70,16 @@ def follow_side_by_side(
         # those of a call ask for the same entries
         same = (asked[left] == asked[left[0]]).all(axis=1)
         rows, left = left[same], left[~same]
-        filled = [array[rows] for array in out]
-        given = [
-            np.ascontiguousarray(a)
-            for a in (start, poses[rows[: len(poses)]], held[rows])
-        ]
+        whole = len(rows) == len(held)
+        filled = out if whole else tuple(array[rows] for array in out)
+        given = (start, poses[rows[: len(poses)]], held[rows])
+        arrays = [np.ascontiguousarray(array) for array in given]
         targets = _Targets(
-            len(rows), *(a.ctypes.data if a.size else None for a in given), guess
+            len(rows), *(a.ctypes.data if a.size else None for a in arrays), guess
         )
         tracks = (ctypes.c_void_p * len(out))(*(array.ctypes.data for array in filled))
         library.follow_all(ctypes.byref(robot), ctypes.byref(targets), tracks)
-        for array, part in zip(out, filled, strict=True):
-            array[rows] = part
+        if not whole:
+            for array, part in zip(out, filled, strict=True):
+                array[rows] = part
     return True

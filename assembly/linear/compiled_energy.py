@@ -5,8 +5,6 @@ counts as solved only if its certificate, computed from the wrenches on the prob
 before any elimination, proves the gap asked for.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,20 +17,16 @@ from assembly.linear.compiled_reduction import (
     rigid_rows,
     small_problem,
 )
-from assembly.linear.compiled_structure import Structure, own_springs, paths_of
+from assembly.linear.compiled_structure import own_springs, paths_of
+from assembly.linear.robot_structure import Structure
+from assembly.linear.solutions import Solutions
 from assembly.linear.thresholds import MISMATCH_FACTOR, OPEN, RANK
-from assembly.solvers.compiled import (
-    Indices,
-    Matrices,
-    Matrix,
-    Vector,
-    kernel,
-    part,
-)
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.dual_newton import Dual, dual_newton
 from assembly.solvers.householder import turn
 from assembly.solvers.interior import Programme, interior_point
+from assembly.solvers.layouts import Indices, Matrices, Matrix, Vector
 from assembly.solvers.vectors import (
     copy,
     divide,
@@ -50,41 +44,12 @@ _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _FIRST_SIGMA = 1e6  # after the interior-point method, see dual_newton
 
 
-class Solutions(NamedTuple):
-    """Rows of arrays filled by :func:`assemble_all`, one row a point.
-
-    Attributes:
-        outcome: (k,) NEWTON or INTERIOR, or the reason for the fallback.
-        energy: (k,) [J].
-        bound: (k,) [J] certified lower bound of it.
-        without_clearance: (k,) [J] energy if every clearance stayed at zero.
-        platform_screw: (k, 6) [rad, m].
-        clearances: (k, nu) in units of their cones.
-        motions: (k, nq) [rad, m].
-        multipliers: (k, 6 closures) of the scaled closures.
-        residual: (k,) [rad, reference lengths] largest of the closures.
-        elastic: (k, ny) [sqrt(2 J)] scaled deformation of the springs; no rows where
-            nobody asks.
-    """
-
-    outcome: Indices
-    energy: Vector
-    bound: Vector
-    without_clearance: Vector
-    platform_screw: Matrix
-    clearances: Matrix
-    motions: Matrix
-    multipliers: Matrix
-    residual: Vector
-    elastic: Matrix
-
-
 @kernel
 def assemble_all(
     s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: Solutions,
 ) -> None:  # fmt: skip
-    """Solve every point; see :class:`Solutions`.
+    """Solve every point; see :class:`~assembly.linear.solutions.Solutions`.
 
     Args:
         s: the robot.

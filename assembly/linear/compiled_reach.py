@@ -17,26 +17,20 @@ from assembly.linear.compiled_reduction import (
     orthogonal_rows,
     small_problem,
 )
-from assembly.linear.compiled_structure import Structure, free_columns, paths_of
+from assembly.linear.compiled_structure import free_columns, paths_of
 from assembly.linear.compiled_zone import largest_clearance, orthonormal_rows
+from assembly.linear.robot_structure import Structure
+from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.linear.thresholds import MISMATCH_FACTOR, RANK, UNBOUNDED
-from assembly.solvers.compiled import (
-    Indices,
-    Mask,
-    Matrices,
-    Matrix,
-    Vector,
-    kernel,
-    part,
-)
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.farthest import DONE, advance, begin
 from assembly.solvers.householder import CLEAR, triangulate, turn_all
 from assembly.solvers.layers import LANES
+from assembly.solvers.layouts import Indices, Mask, Matrices, Matrix, Vector
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import ConvexBody
 from assembly.solvers.vectors import copy, indices, into_cones, matrix, vector
 
-SOLVED, FALLBACK = range(2)
 _APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
 
 

@@ -24,15 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_structure import (
-    Structure,
     free_columns,
     grouped_springs,
     largest_spring,
 )
+from assembly.linear.robot_structure import Structure
 from assembly.linear.thresholds import NOISE
-from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.householder import CLEAR, triangulate, turn, turn_all, turn_back
 from assembly.solvers.layers import LANES
+from assembly.solvers.layouts import Indices, Matrices, Matrix, Vector
 from assembly.solvers.vectors import (
     copy,
     divide,

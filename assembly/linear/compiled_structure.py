@@ -1,13 +1,13 @@
-"""A robot's paths, free motions and springs as arrays, compiled.
+"""A robot's paths, free motions and springs at a posture, compiled.
 
 ``P`` (n, 6, 6): row ``axis`` is the unit screw of frame j along it, read at the
 platform in base axes, translations by the reference length.
 """
 
-from typing import NamedTuple
-
-from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, part
+from assembly.linear.robot_structure import Structure
+from assembly.solvers.compiled import part
 from assembly.solvers.householder import triangulate, turn
+from assembly.solvers.layouts import Matrices, Matrix, Vector
 from assembly.solvers.vectors import (
     fill,
     indices,
@@ -15,50 +15,6 @@ from assembly.solvers.vectors import (
     matrix,
     vector,
 )
-
-
-class Structure(NamedTuple):
-    """Data that a robot's postures share; n frames, closures, np patterns of closures.
-
-    Attributes:
-        size: [m] reference length.
-        platform: row of its frame.
-        on_path: (n,) 1 on the way to the platform.
-        patterns: (np, closures) signs with which frames enter the closures.
-        pattern_of: (n,) row of ``patterns``.
-        springs: (ny, 6) spring columns in their frame's axes, sorted by group.
-        spring_frame: (ny,) whose they are.
-        spring_order: (ny,) their places among the virtual joints' columns.
-        groups: (ng + 1,) first spring of each group, and ny.
-        group_pattern: (ng,) row of ``patterns``.
-        group_on_path: (ng,) 1 on the way to the platform.
-        cone_frame: (nu,) whose a clearance is.
-        cone_axis: (nu,) component of its screw.
-        cone_size: (nu,) [rad or m].
-        starts: (cones + 1,) first clearance of each cone, and nu.
-        free_frame: (nq,) whose a free motion is.
-        free_axis: (nq,) component of its screw.
-        free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
-    """
-
-    size: float
-    platform: int
-    on_path: Vector
-    patterns: Matrix
-    pattern_of: Indices
-    springs: Matrix
-    spring_frame: Indices
-    spring_order: Indices
-    groups: Indices
-    group_pattern: Indices
-    group_on_path: Vector
-    cone_frame: Indices
-    cone_axis: Indices
-    cone_size: Vector
-    starts: Indices
-    free_frame: Indices
-    free_axis: Indices
-    free_bound: Vector
 
 
 @part

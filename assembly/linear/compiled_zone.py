@@ -18,7 +18,9 @@ from assembly.linear.compiled_reduction import (
     orthogonal_rows,
     small_problem,
 )
-from assembly.linear.compiled_structure import Structure, free_columns, paths_of
+from assembly.linear.compiled_structure import free_columns, paths_of
+from assembly.linear.robot_structure import Structure
+from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.linear.thresholds import (
     INFEASIBLE,
     MARGIN_GAP,
@@ -27,12 +29,12 @@ from assembly.linear.thresholds import (
     RANK,
     ROWS_RANK,
 )
-from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.householder import triangulate, turn
 from assembly.solvers.interior import Programme, interior_point
+from assembly.solvers.layouts import Indices, Matrices, Matrix, Vector
 from assembly.solvers.vectors import divide, indices, inner, matrices, matrix, vector
 
-SOLVED, FALLBACK = range(2)
 _STOP = 1e-9  # of the margin: gap at which the solver stops
 
 

@@ -8,7 +8,7 @@ this does not cover, or where its certificate falls short, is solved by
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,20 +31,17 @@ from assembly.linear.fallback import (
 )
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads
-from assembly.linear.robot_structure import structure_of
+from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
     drop_zeros,
     stiffness_spread,
 )
+from assembly.linear.solutions import Solutions
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-
-if TYPE_CHECKING:
-    from assembly.linear.compiled_energy import Solutions
-    from assembly.linear.compiled_structure import Structure
 
 __all__ = [
     "Assemblies", "Assembly", "CannotAssemble", "minimise_energies", "solve_assembly",
@@ -170,10 +167,8 @@ def _compiled_assembly(posture: Posture) -> Assembly | None:
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
     springs: int,
-) -> "Solutions":  # fmt: skip
+) -> Solutions:  # fmt: skip
     """Rows of k points, and of the deformations of so many springs."""
-    from assembly.linear.compiled_energy import Solutions, assemble_all
-
     joints, structure = structure_of(robot, compliant)
     count = len(T)
     out = Solutions(
@@ -194,20 +189,22 @@ def _solve_compiled(
         if assemble_side_by_side(structure, T, errors, mismatch, out):
             _solve_left(structure, T, errors, mismatch, out)
         else:
+            from assembly.linear.compiled_energy import assemble_all
+
             assemble_all(structure, T, errors, mismatch, out)
     return out
 
 
 def _solve_left(
-    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: "Solutions",
+    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: Solutions,
 ) -> None:  # fmt: skip
     """By numba what side by side was not certified; rounding there is another."""
-    from assembly.linear.compiled_energy import Solutions, assemble_all
-
     left = np.flatnonzero(out.outcome >= COMPILED)
     if not len(left):
         return
+    from assembly.linear.compiled_energy import assemble_all
+
     again = Solutions._make(rows[left] if len(rows) else rows for rows in out)
     own = errors[left] if len(errors) > 1 else errors
     assemble_all(structure, T[left], own, mismatch[left], again)

@@ -7,15 +7,12 @@ solved alone, in a batch or in another order has the same answer to the last bit
 """
 
 import ctypes
-from typing import TYPE_CHECKING
 
 from numpy.typing import NDArray
 
+from assembly.linear.robot_structure import Structure
+from assembly.linear.solutions import Solutions
 from assembly.solvers.native import load_library
-
-if TYPE_CHECKING:
-    from assembly.linear.compiled_energy import Solutions
-    from assembly.linear.compiled_structure import Structure
 
 SOURCE = "linear/lanes.cpp"
 _ARRAYS = (
@@ -25,7 +22,7 @@ _ARRAYS = (
 )  # fmt: skip
 _COUNTS = ("n", "closures", "np", "ny", "ng", "nu", "cones", "nq")
 _KEPT = 64  # robots whose arrays' addresses are known
-_known: dict[int, tuple["Structure", "_Robot"]] = {}
+_known: dict[int, tuple[Structure, "_Robot"]] = {}
 
 
 class _Robot(ctypes.Structure):
@@ -49,10 +46,10 @@ class _Points(ctypes.Structure):
 
 
 def assemble_side_by_side(
-    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: "Solutions",
+    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: Solutions,
 ) -> bool:  # fmt: skip
-    """Solve every point; see :class:`~assembly.linear.compiled_energy.Solutions`.
+    """Solve every point; see :class:`~assembly.linear.solutions.Solutions`.
 
     Args:
         structure: the robot.
@@ -68,7 +65,7 @@ def assemble_side_by_side(
 
 
 def margins_side_by_side(
-    structure: "Structure", T: NDArray, errors: NDArray, mismatch: NDArray,
+    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray],
 ) -> bool:  # fmt: skip
     """Margins of all points, with their lower bounds.
@@ -88,7 +85,7 @@ def margins_side_by_side(
 
 
 def _side_by_side(
-    name: str, structure: "Structure", points: tuple[NDArray, NDArray, NDArray],
+    name: str, structure: Structure, points: tuple[NDArray, NDArray, NDArray],
     out: tuple[NDArray, ...],
 ) -> bool:  # fmt: skip
     """Call a function of the library on every point; whether it did."""
@@ -106,7 +103,7 @@ def _side_by_side(
     return bool(function(*map(ctypes.byref, (robot, given, filled))))
 
 
-def _robot(structure: "Structure") -> _Robot:
+def _robot(structure: Structure) -> _Robot:
     """A structure's addresses; it is kept as long as they are."""
     known = _known.get(id(structure))
     if known is None:

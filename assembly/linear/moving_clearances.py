@@ -10,13 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.linear.assemblies import Assemblies
 from assembly.linear.energy import minimise_energies
 from assembly.linear.reach import READINGS
-from assembly.linear.robot_structure import structure_of
+from assembly.linear.robot_structure import Structure, structure_of
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 
 if TYPE_CHECKING:
     from assembly.linear.compiled_reach import Bounds
-    from assembly.linear.compiled_structure import Structure
 
 
 @dataclass(frozen=True)
@@ -124,8 +123,8 @@ class _Places(NamedTuple):
         motions: their places in (22).
     """
 
-    moving: "Structure"
-    loaded: "Structure"
+    moving: Structure
+    loaded: Structure
     columns: NDArray
     cone_of: NDArray
     bounded: NDArray

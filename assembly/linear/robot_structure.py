@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,57 @@ from assembly.kinematics.nominal import size_of
 from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.model.robot import Robot
+from assembly.solvers.layouts import Indices, Matrix, Vector
 
-if TYPE_CHECKING:
-    from assembly.linear.compiled_structure import Structure
+
+class Structure(NamedTuple):
+    """Data that a robot's postures share; n frames, closures, np patterns of closures.
+
+    Attributes:
+        size: [m] reference length.
+        platform: row of its frame.
+        on_path: (n,) 1 on the way to the platform.
+        patterns: (np, closures) signs with which frames enter the closures.
+        pattern_of: (n,) row of ``patterns``.
+        springs: (ny, 6) spring columns in their frame's axes, sorted by group.
+        spring_frame: (ny,) whose they are.
+        spring_order: (ny,) their places among the virtual joints' columns.
+        groups: (ng + 1,) first spring of each group, and ny.
+        group_pattern: (ng,) row of ``patterns``.
+        group_on_path: (ng,) 1 on the way to the platform.
+        cone_frame: (nu,) whose a clearance is.
+        cone_axis: (nu,) component of its screw.
+        cone_size: (nu,) [rad or m].
+        starts: (cones + 1,) first clearance of each cone, and nu.
+        free_frame: (nq,) whose a free motion is.
+        free_axis: (nq,) component of its screw.
+        free_bound: (nq,) [rad or m] bound that was left out, inf where there is none.
+    """
+
+    size: float
+    platform: int
+    on_path: Vector
+    patterns: Matrix
+    pattern_of: Indices
+    springs: Matrix
+    spring_frame: Indices
+    spring_order: Indices
+    groups: Indices
+    group_pattern: Indices
+    group_on_path: Vector
+    cone_frame: Indices
+    cone_axis: Indices
+    cone_size: Vector
+    starts: Indices
+    free_frame: Indices
+    free_axis: Indices
+    free_bound: Vector
 
 
 @lru_cache(maxsize=32)
 def structure_of(
     robot: Robot, compliant: Compliant = "elastic"
-) -> tuple[VirtualJoints, "Structure"]:
+) -> tuple[VirtualJoints, Structure]:
     """What may move, as columns and as arrays.
 
     Args:
@@ -45,10 +87,8 @@ class _Tree:
 
 
 @lru_cache(maxsize=32)
-def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> "Structure":
+def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Structure:
     """The arrays, once for all robots that differ in their errors alone."""
-    from assembly.linear.compiled_structure import Structure
-
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)

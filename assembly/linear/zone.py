@@ -10,7 +10,7 @@ literal reading); ``"free"`` lets them turn about their own axis, as a hinge doe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, overload
+from typing import ClassVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +19,13 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import checked_size
 from assembly.linear.fallback import reference_margin
 from assembly.linear.lanes import margins_side_by_side
-from assembly.linear.robot_structure import structure_of
+from assembly.linear.robot_structure import Structure, structure_of
+from assembly.linear.solutions import FALLBACK
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
-
-if TYPE_CHECKING:
-    from assembly.linear.compiled_structure import Structure
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins
@@ -201,8 +199,6 @@ def _compiled(
     errors: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
     """(k,) margins, their bounds, and whether each is left to the fallback."""
-    from assembly.linear.compiled_zone import FALLBACK
-
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     own = robot.errors if errors is None else errors
@@ -223,17 +219,15 @@ def _compiled(
 
 
 def _solve_all(
-    structure: "Structure", points: tuple[NDArray, NDArray, NDArray],
+    structure: Structure, points: tuple[NDArray, NDArray, NDArray],
     out: tuple[NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
     """Side by side, and by numba what that leaves: rounding there is another."""
-    from assembly.linear.compiled_zone import all_margins
-
-    if not margins_side_by_side(structure, *points, out):
-        all_margins(structure, *points, *out)
-        return
+    margins_side_by_side(structure, *points, out)
     left = np.flatnonzero(out[2])
     if len(left):
+        from assembly.linear.compiled_zone import all_margins
+
         T, errors, mismatch = points
         again = tuple(rows[left] for rows in out)
         own = errors[left] if len(errors) > 1 else errors

@@ -13,7 +13,8 @@ problem (22) is, and as exact: no compliances are added before anything is elimi
 from numpy.typing import NDArray
 
 from assembly.linear.compiled_reduction import Triangle, eliminate
-from assembly.linear.compiled_structure import Structure, paths_of
+from assembly.linear.compiled_structure import paths_of
+from assembly.linear.robot_structure import Structure
 from assembly.linear.thresholds import MISMATCH_FACTOR, RANK
 from assembly.solvers.compiled import kernel
 from assembly.solvers.householder import turn, turn_back

@@ -15,17 +15,13 @@ The first compilation is announced, once, on stderr.
 
 import gc
 import inspect
-import multiprocessing
-import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import cache, partial
-from pathlib import Path
 from pickle import UnpicklingError
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-import numpy as np
-from llvmlite.binding import add_symbol, get_host_cpu_features, get_host_cpu_name
+from llvmlite.binding import add_symbol
 from numba import config, njit, types
 from numba.core import event, funcdesc
 from numba.core.codegen import CPUCodeLibrary
@@ -33,19 +29,9 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.typing import Signature
 from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.extending import lower_builtin, type_callable
-from numpy.typing import NDArray
 
-# what parts are given: writable arrays in C order
-Vector = Annotated[NDArray[np.float64], types.float64[::1]]
-Matrix = Annotated[NDArray[np.float64], types.float64[:, ::1]]
-Matrices = Annotated[NDArray[np.float64], types.float64[:, :, ::1]]
-Indices = Annotated[NDArray[np.int64], types.int64[::1]]
-IndexRows = Annotated[NDArray[np.int64], types.int64[:, ::1]]
-GivenVector = Annotated[NDArray[np.float64], types.Array(types.float64, 1, "C", True)]
-GivenMatrix = Annotated[NDArray[np.float64], types.Array(types.float64, 2, "C", True)]
-GivenMatrices = Annotated[NDArray[np.float64], types.Array(types.float64, 3, "C", True)]
-GivenIndices = Annotated[NDArray[np.int64], types.Array(types.int64, 1, "C", True)]
-Mask = Annotated[NDArray[np.bool_], types.boolean[::1]]
+from assembly.solvers.layouts import Layout
+from assembly.solvers.native import announce
 
 _OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True}
 _parts: dict[Callable, "_Part"] = {}
@@ -203,32 +189,13 @@ def _numba_type(hint: Any) -> types.Type:
     if hint in simple:
         return simple[hint]
     if get_origin(hint) is Annotated:
-        return get_args(hint)[1]
+        layout: Layout = get_args(hint)[1]
+        number = getattr(types, layout.kind)
+        return types.Array(number, layout.dimensions, "C", not layout.writable)
     if get_origin(hint) is tuple:
         return types.BaseTuple.from_types(tuple(map(_numba_type, get_args(hint))))
     fields = get_type_hints(hint, include_extras=True)
     return types.BaseTuple.from_types(tuple(map(_numba_type, fields.values())), hint)
-
-
-def folder_of_compiled() -> Path:
-    """Where compiled code is kept on disk, by numba and by others."""
-    return Path(njit(cache=True)(_keep_functions)._cache.cache_path)
-
-
-def processor() -> str:
-    """Which processor code is compiled for, with its features."""
-    return f"{get_host_cpu_name()} {get_host_cpu_features().flatten()}"
-
-
-@cache
-def announce() -> None:
-    """Say once that this is the first compilation on this machine."""
-    if multiprocessing.parent_process() is None:
-        print(
-            "forcefit: compiling its solvers, once on this machine "
-            "(`forcefit warm-up` does it beforehand)",
-            file=sys.stderr,
-        )
 
 
 class _Announcement(event.Listener):

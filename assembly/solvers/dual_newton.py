@@ -22,8 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.solvers.compiled import Indices, Matrix, Vector, part
+from assembly.solvers.compiled import part
 from assembly.solvers.layers import LANES, add, dot, layers_of
+from assembly.solvers.layouts import Indices, Matrix, Vector
 from assembly.solvers.vectors import matrix, vector
 
 FAST = {"contract", "reassoc"}

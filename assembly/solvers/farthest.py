@@ -22,14 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.solvers.compiled import (
-    GivenVector,
-    Indices,
-    Matrix,
-    Vector,
-    kernel,
-    part,
-)
+from assembly.solvers.compiled import kernel, part
+from assembly.solvers.layouts import GivenVector, Indices, Matrix, Vector
 from assembly.solvers.majorant import eigenvectors, majorant_bound
 from assembly.solvers.polytope import (
     Polytope,

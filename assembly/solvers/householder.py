@@ -10,8 +10,9 @@ Sources:
 
 import numpy as np
 
-from assembly.solvers.compiled import Indices, Matrix, Vector, part
+from assembly.solvers.compiled import part
 from assembly.solvers.layers import LANES
+from assembly.solvers.layouts import Indices, Matrix, Vector
 from assembly.solvers.vectors import matrix, vector
 
 CLEAR = 10.0  # within this factor of the threshold the rank is ambiguous

@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.layers import FAST, LANES, add, cone_sums, dot, layers_of
+from assembly.solvers.layouts import Indices, Matrix, Vector
 from assembly.solvers.nesterov_todd import (
     Point,
     Scaling,

@@ -7,7 +7,8 @@ layer, several cones at once in the processor's vector registers.
 
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import GivenIndices, Indices, kernel, part
+from assembly.solvers.compiled import kernel, part
+from assembly.solvers.layouts import GivenIndices, Indices
 from assembly.solvers.vectors import indices
 
 LANES = 16  # rows are padded with zeros to a multiple of it

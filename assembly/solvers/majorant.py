@@ -19,7 +19,8 @@ Sources:
 
 import numpy as np
 
-from assembly.solvers.compiled import GivenVector, Indices, Matrix, Vector, part
+from assembly.solvers.compiled import part
+from assembly.solvers.layouts import GivenVector, Indices, Matrix, Vector
 from assembly.solvers.vectors import matrix, vector
 
 _LEAST_SIZE = 1e-9  # of a cone with zero gradient, relative to the largest

@@ -8,12 +8,15 @@ Where no compiler stands, or it fails, there is no library, and callers use numb
 
 import ctypes
 import hashlib
+import multiprocessing
 import os
+import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
@@ -28,6 +31,8 @@ _OPTIONS = (
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
 _LONGEST = 120  # [s] a compiler may take
+# what /proc/cpuinfo says of processors of one kind
+_NAMED = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
 
 
 _refused: ContextVar[bool] = ContextVar("refused", default=False)
@@ -59,8 +64,6 @@ def load_library(source: str) -> ctypes.CDLL | None:
 @cache
 def _library(source: str) -> ctypes.CDLL | None:
     """The library, or None, found out once."""
-    from assembly.solvers.compiled import folder_of_compiled
-
     digest = _digest(source)
     path = folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
     library = _loaded(path, digest)
@@ -81,11 +84,40 @@ def _library(source: str) -> ctypes.CDLL | None:
     return library
 
 
+def folder_of_compiled() -> Path:
+    """Where compiled code is kept: beside this file, or in the user's cache."""
+    if folder := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(folder)
+    beside = Path(__file__).with_name("__pycache__")
+    if os.access(beside if beside.exists() else beside.parent, os.W_OK):
+        return beside
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "forcefit"
+
+
+@cache
+def announce() -> None:
+    """Say once that this is the first compilation on this machine."""
+    if multiprocessing.parent_process() is None:
+        print(
+            "forcefit: compiling its solvers, once on this machine "
+            "(`forcefit warm-up` does it beforehand)",
+            file=sys.stderr,
+        )
+
+
+def _processor() -> str:
+    """Which processor this is, with all that it can do, as far as the system says."""
+    said = [platform.machine()]
+    with suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0]
+        lines = (line.partition(":") for line in first.splitlines())
+        said += [text for name, _, text in lines if name.strip() in _NAMED]
+    return " ".join(said)
+
+
 def _digest(source: str) -> str:
     """Of all that the machine code depends on."""
-    from assembly.solvers.compiled import processor
-
-    parts = [" ".join(_OPTIONS), processor()]
+    parts = [" ".join(_OPTIONS), _processor()]
     for file in (_PACKAGE / source, *sorted((_PACKAGE / "solvers/cpp").glob("*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
@@ -103,8 +135,6 @@ def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
 
 def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     """Write the library, whole or not at all; where that fails, a note that it did."""
-    from assembly.solvers.compiled import announce
-
     announce()
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
@@ -114,6 +144,7 @@ def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     ]  # fmt: skip
     try:
         subprocess.run(command, capture_output=True, timeout=_LONGEST, check=True)
+        os.chmod(unfinished, 0o755)  # temporary files are their maker's alone
         os.replace(unfinished, path)
     except subprocess.SubprocessError:  # it refused, or took too long
         path.with_suffix(".failed").touch()

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.solvers.compiled import Indices, Matrix, Vector, part
+from assembly.solvers.compiled import part
 from assembly.solvers.layers import FAST, cone_sums
+from assembly.solvers.layouts import Indices, Matrix, Vector
 
 
 class Point(NamedTuple):

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.solvers.compiled import IndexRows, Indices, Matrix, Vector, part
+from assembly.solvers.compiled import part
+from assembly.solvers.layouts import IndexRows, Indices, Matrix, Vector
 from assembly.solvers.vectors import indices, matrix, vector
 
 _MOST = 4096  # corners; 400 planes make 800

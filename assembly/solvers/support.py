@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from assembly.solvers.compiled import Indices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
 from assembly.solvers.interior import Programme, interior_point
+from assembly.solvers.layouts import Indices, Matrix, Vector
 from assembly.solvers.vectors import divide, inner, matrix, vector
 
 _SYMMETRIC = 1e-14  # H start counts as zero

@@ -7,7 +7,8 @@ and its error messages into every kernel that calls it: ten times the code to co
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.compiled import Indices, Matrices, Matrix, Vector, kernel, part
+from assembly.solvers.compiled import kernel, part
+from assembly.solvers.layouts import Indices, Matrices, Matrix, Vector
 
 
 @part

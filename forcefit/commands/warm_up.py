@@ -42,6 +42,7 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
         *(
             partial(_by_each_method, compute)
             for compute in (
+                lambda: place_robot(robot, {"tx": posture.pose()["tx"]}),
                 lambda: minimise_energies(robot, T),
                 lambda: zone_margins(robot, T),
                 lambda: prepared.solve(errors[None]),
