@@ -60,6 +60,11 @@ struct Lane {
     std::vector<double> q;  // where it stands
 };
 
+// A joint that is solved for and moves a closure: its row of J, and its column of N.
+struct Mover {
+    int row, column;
+};
+
 class Follower {
 public:
     Follower(const Tree &tree, const Targets &targets);
@@ -76,6 +81,7 @@ private:
     std::vector<int> joints, columns;  // solved for; -1 for the others
     std::vector<double> unit;
     std::vector<std::vector<int>> coupled;  // later columns that a row of N enters
+    std::vector<std::vector<Mover>> movers;  // of each closure, then of the platform
     std::vector<bool> straight;             // frames that are not turned in their parents
     bool asked[6], all_turns, turns;
     double home_pose[6];
@@ -131,19 +137,20 @@ Follower::Follower(const Tree &tree, const Targets &targets)
 void Follower::couple() {
     const int m = joints.size();
     std::vector<std::vector<char>> entered(m, std::vector<char>(m, 0));
-    for (int g = 0; g < closures + posed; ++g)
+    for (int g = 0; g < closures + posed; ++g) {
+        movers.emplace_back();
         for (int e = tree.groups[g]; e < tree.groups[g + 1]; ++e)
-            for (int f = tree.groups[g]; f <= e; ++f) {
-                const int i = columns[tree.moves[2 * e]], j = columns[tree.moves[2 * f]];
-                if (i >= 0 && j >= 0) entered[j][i] = 1;
-            }
+            if (columns[tree.moves[2 * e]] >= 0)
+                movers[g].push_back({e, columns[tree.moves[2 * e]]});
+        for (const Mover &a : movers[g])
+            for (const Mover &b : movers[g]) entered[a.column][b.column] = 1;
+    }
     coupled.resize(m);
     for (int i = 0; i < m; ++i) {
         for (int k = i + 1; k < m; ++k)
             if (entered[i][k]) coupled[i].push_back(k);
         for (int k : coupled[i])
-            for (int j : coupled[i])
-                if (j >= k) entered[k][j] = 1;
+            for (int j : coupled[i]) entered[k][j] = 1;
     }
 }
 
@@ -324,24 +331,28 @@ void Follower::platform_turn(int first, int last, Real *out) {
 Whole Follower::least_step(Real damped) {
     const int m = joints.size();
     for (int i = 0; i < m; ++i) {
-        x[i] = Real{};
-        for (int j = i; j < m; ++j) N[i][j] = Real{};
+        x[i] = N[i][i] = Real{};
+        for (int j : coupled[i]) N[i][j] = Real{};
     }
-    for (int g = 0; g < closures + posed; ++g)
-        for (int e = tree.groups[g]; e < tree.groups[g + 1]; ++e) {
-            const int i = columns[tree.moves[2 * e]];
-            if (i < 0) continue;
-            const Real *own = &J[6 * e];
-            for (int k = 0; k < 6; ++k) x[i] += own[k] * r[6 * g + k];
-            for (int f = tree.groups[g]; f <= e; ++f) {
-                const int j = columns[tree.moves[2 * f]];
-                if (j < 0) continue;
-                const Real *other = &J[6 * f];
-                Real total = own[0] * other[0];
-                for (int k = 1; k < 6; ++k) total += own[k] * other[k];
-                N[j][i] += total;
+    for (int g = 0; g < closures + posed; ++g) {
+        const Real *open = &r[6 * g];
+        for (size_t a = 0; a < movers[g].size(); ++a) {
+            const Real *own = &J[6 * movers[g][a].row];
+            const int i = movers[g][a].column;
+            Real number[6];
+            for (int k = 0; k < 6; ++k) {
+                number[k] = once(own[k]);
+                x[i] += number[k] * open[k];
+            }
+            for (size_t b = 0; b <= a; ++b) {
+                const Real *other = &J[6 * movers[g][b].row];
+                Real even = number[0] * other[0], odd = number[1] * other[1];
+                even += number[2] * other[2], odd += number[3] * other[3];
+                even += number[4] * other[4], odd += number[5] * other[5];
+                N[movers[g][b].column][i] += even + odd;
             }
         }
+    }
     Real damping = real(1e-30);
     for (int i = 0; i < m; ++i) damping += damped * N[i][i];
     Whole determined = whole(-1);
@@ -393,9 +404,13 @@ Next Follower::iterate(int l, double worst, double largest, bool determined) {
 }
 
 void Follower::follow(Tracks &out) {
-    int64_t waiting = 0;
-    for (int l = 0; l < LANES && waiting < targets.count; ++l) start(l, waiting++);
-    bool running = waiting > 0;
+    if (!targets.count) return;
+    int64_t waiting = std::min<int64_t>(LANES, targets.count);
+    for (int l = 0; l < LANES; ++l) {
+        start(l, std::min<int64_t>(l, waiting - 1));
+        if (l >= waiting) lanes[l].target = -1;  // rests
+    }
+    bool running = true;
     while (running) {
         forward();
         equations();

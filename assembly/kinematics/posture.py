@@ -341,4 +341,5 @@ def _posture(robot: Robot, track: Track, i: int) -> Posture:
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)
-    return Posture(robot, q, T, float(track.mismatch[i]))
+    mismatch = track.closure_mismatch[i].max(initial=0.0)
+    return Posture(robot, q, T, float(mismatch))
