@@ -1,6 +1,6 @@
-// Problems (22), without loads, and (21), several postures side by side, from the
-// frames' poses to the certified answer: compiled_reduction.py, compiled_energy.py and
-// compiled_zone.py in lanes.
+// Problems (22), without loads, and (21), and the classical compliance, several postures
+// side by side, from the frames' poses to the certified answer: compiled_reduction.py,
+// compiled_energy.py, compiled_zone.py and compiled_compliance.py in lanes.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning
@@ -70,6 +70,15 @@ struct Margins {
     int64_t *outcome;
 };
 
+// Deformation of every spring under six unit wrenches on the platform, (k, 6, ny), and
+// whether a point has one: platform_stiffness/compiled_compliance.py.
+struct Compliances {
+    double *springs;
+    int64_t *status;
+};
+enum { COMPLIANT, LOOSE, UNCLEAR };
+constexpr double STILL = 1e-9;
+
 namespace {
 
 // The rank in the first of these lanes.
@@ -104,6 +113,7 @@ public:
     bool covers() const { return cones.known; }
     Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
     Whole margins(const Points &points, const Block &block, Whole asked, Margins &out);
+    Whole comply(const Points &points, const Block &block, Whole asked, Compliances &out);
 
 private:
     const Robot &s;
@@ -151,6 +161,7 @@ private:
     Row spring_strains(int r);
     struct Proof { Real gain, cost; };
     Proof complementary(const Row &motions, const Row &multipliers);
+    Whole hold_free_motions(int rank, int row, Row &closing);
     void first_along(int count, Real *w, Real size);
     void farthest(int count, Whole asked, Real &reach, Real &most);
 };
@@ -647,6 +658,84 @@ Whole Assembler::solve(
     return all & ~settled;
 }
 
+// The closures' least wrenches with which a unit wrench moves nothing free; returns the
+// lanes that have none.
+Whole Assembler::hold_free_motions(int rank, int row, Row &closing) {
+    Whole loose = {};
+    std::fill(closing.begin(), closing.end(), Real{});
+    for (int i = 0; i < nq; ++i) {
+        Real left;
+        for (int l = 0; l < LANES; ++l) {
+            const int c = int(free.order[i][l]);
+            left[l] = -s.on_path[s.free_frame[c]] * motion[c][row][l];
+        }
+        for (int l = 0; l < std::min(i, rank); ++l) left -= free.F[i][l] * closing[l];
+        if (i < rank)
+            closing[i] = left / free.diagonal[i];
+        else
+            loose |= magnitude(left) > STILL;
+    }
+    Real *own = closing.data();
+    turn_all(free, rank, m, &own, 1);
+    return loose;
+}
+
+// The classical compliance of the lanes asked for that have the ranks of the first of
+// them; returns the others.  Of the springs y = B e + Y^T mu under a unit wrench e, the
+// closures' wrenches mu make |y| least.
+Whole Assembler::comply(
+    const Points &points, const Block &block, Whole asked, Compliances &out) {
+    const auto settle = [&](Whole where, int64_t status) {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) out.status[block.point[l]] = status;
+        return ~where;
+    };
+    Whole others = asked;
+    read(points, block);
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Whole free_rank = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
+    others &= settle(asked & (free_rank < 0), UNCLEAR);
+    if (!any(asked &= free_rank >= 0)) return others;
+    const int rank = rank_of_first(free_rank, asked), count = m - rank;
+    asked &= free_rank == rank;
+    grouped_springs();
+    orthogonal_rows(rank, count);
+    spring_rows(count);
+    const Whole spring_rank = triangulate(
+        springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
+    others &= settle(asked & (spring_rank < 0), UNCLEAR);
+    if (!any(asked &= spring_rank >= 0)) return others;
+    const int r = rank_of_first(spring_rank, asked);
+    asked &= spring_rank == r;
+    eliminate_springs(r, count);
+    Row closing(m), bent(6 * ng), on(6 * np);
+    for (int row = 0; row < 6; ++row) {
+        const Whole loose = hold_free_motions(rank, row, closing);
+        others &= settle(asked & loose, LOOSE);
+        if (!any(asked &= ~loose)) return others;
+        for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+        for (int g = 0; g < ng; ++g)
+            for (int b = 0; b < 6; ++b) {
+                Real total = s.group_on_path[g] * L[6 * g + row][b];
+                for (int a = 0; a < 6; ++a)
+                    total += L[6 * g + a][b] * on[6 * s.group_pattern[g] + a];
+                bent[6 * g + b] = total;
+            }
+        turn_back(springs, r, 6 * ng, bent.data());
+        for (int i = 0; i < r; ++i) bent[i] = -bent[i];
+        combine(Z.data(), r, bent.data(), m, closing.data());
+        for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+        for (int c = 0; c < s.ny; ++c) {
+            const int64_t j = s.spring_frame[c];
+            Real total = s.on_path[j] * elastic[c][row];
+            for (int a = 0; a < 6; ++a)
+                total += elastic[c][a] * on[6 * s.pattern_of[j] + a];
+            block.write(out.springs, 6 * s.ny, row * s.ny + c, total, asked);
+        }
+    }
+    return others & settle(asked, COMPLIANT);
+}
+
 // Margins of the lanes asked for that have the ranks of the first of them; returns the
 // others.  With every link and joint rigid, B u = w must hold: the least factor t on the
 // clearances is |w| over the most that g.u can be with |u_k| <= 1 and the rest of B u
@@ -785,6 +874,15 @@ EXPORTED int all_margins(
     if (robot->ng || !assembler.covers()) return 0;
     in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return assembler.margins(*points, block, pending, *out);
+    });
+    return 1;
+}
+
+// Compliances of every point, as compiled_compliance.py's comply_all.
+EXPORTED int comply_all(const Robot *robot, const Points *points, Compliances *out) {
+    Assembler assembler(*robot, *points);
+    in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
+        return assembler.comply(*points, block, pending, *out);
     });
     return 1;
 }

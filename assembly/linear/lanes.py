@@ -1,13 +1,15 @@
-"""Problems (22) and (21) of several postures side by side, by ``lanes.cpp``.
+"""Problems (22) and (21), and K_C, of several postures side by side, by ``lanes.cpp``.
 
-The same equations and thresholds as :mod:`assembly.linear.compiled_energy` and
-:mod:`assembly.linear.compiled_zone`, one posture in each lane of the processor's vector
-registers.  No lane depends on another: a point
-solved alone, in a batch or in another order has the same answer to the last bit.
+The same equations and thresholds as :mod:`assembly.linear.compiled_energy`,
+:mod:`assembly.linear.compiled_zone` and
+:mod:`assembly.platform_stiffness.compiled_compliance`, one posture in each lane of the
+processor's vector registers.  No lane depends on another: a point solved alone, in a
+batch or in another order has the same answer to the last bit.
 """
 
 import ctypes
 
+import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
@@ -82,6 +84,31 @@ def margins_side_by_side(
         Whether it did, as above.
     """
     return _side_by_side("all_margins", structure, (T, errors, mismatch), out)
+
+
+def compliances_side_by_side(
+    structure: Structure, T: NDArray, mismatch: NDArray, springs: NDArray,
+    status: NDArray,
+) -> bool:  # fmt: skip
+    """Deformations of all springs under unit wrenches on the platform, at all points.
+
+    Args:
+        structure: the robot.
+        T: (k, n, 4, 4) frames.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        springs: (k, 6, ny) to fill, as
+            :func:`assembly.platform_stiffness.compiled_compliance.comply_all` does.
+        status: (k,) to fill.
+
+    Returns:
+        Whether it did, as above; not where there are no closures.
+    """
+    if not structure.patterns.size:
+        return False
+    none = np.zeros((1, T.shape[1], 6))
+    return _side_by_side(
+        "comply_all", structure, (T, none, mismatch), (springs, status)
+    )
 
 
 def _side_by_side(

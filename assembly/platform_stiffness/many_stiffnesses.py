@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.energy import structure_of
+from assembly.linear.lanes import compliances_side_by_side
+from assembly.linear.robot_structure import structure_of
+from assembly.linear.solutions import SOLVED
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
@@ -141,14 +143,15 @@ def platform_stiffnesses(
         Compliances and shares in the order given; those that the compiled one does
         not cover are found one by one.
     """
-    from assembly.platform_stiffness.compiled_compliance import SOLVED, comply_all
-
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     joints, structure = structure_of(robot)
     inner = np.zeros((len(T), 6, len(structure.springs)))
     status = np.zeros(len(T), dtype=np.int64)
-    comply_all(structure, T, off, inner, status)
+    if not compliances_side_by_side(structure, T, off, inner, status):
+        from assembly.platform_stiffness.compiled_compliance import comply_all
+
+        comply_all(structure, T, off, inner, status)
     size = size_of(robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths

@@ -46,9 +46,9 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
                 lambda: minimise_energies(robot, T),
                 lambda: zone_margins(robot, T),
                 lambda: prepared.solve(errors[None]),
+                lambda: platform_stiffnesses(robot, T),
             )
         ),
-        lambda: platform_stiffnesses(robot, T),
         lambda: bound_pose_errors(robot, T),
         lambda: prepare_margins(posture).solve(errors[None]),
         lambda: position_clearances(prepared, perfect, "uniform", rngs),

@@ -1,5 +1,7 @@
 """K_C of many postures at once is that of one at a time."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,11 @@ from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import BUILT_IN, load_robot
+from assembly.solvers.native import by_numba
 from tests.robots_for_tests import random_robot
 
 UNIT = np.eye(6)
+METHODS = {"side by side": nullcontext, "by numba": by_numba}
 
 
 def assert_same(many, row, one):
@@ -36,12 +40,30 @@ def assert_same(many, row, one):
             assert shares[part][row] == pytest.approx(share, abs=1e-9)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_at_home_it_is_that_of_one_posture(name):
+def test_at_home_it_is_that_of_one_posture(name, method):
     posture = home_posture(load_robot(name))
-    many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    with METHODS[method]():
+        many = platform_stiffnesses(posture.robot, posture.transforms[None])
     assert not many.fallback.any()
     assert_same(many, 0, without_clearance(posture))
+
+
+def test_a_posture_does_not_depend_on_its_neighbours(rng):
+    """To the last bit: alone, or in another order."""
+    robot = load_robot("irsbot2")
+    poses = np.full((19, 6), np.nan)
+    poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 19), -0.45
+    T = np.array([p.transforms for p in place_many(robot, poses)[0]])
+    together = platform_stiffnesses(robot, T).compliance
+    order = rng.permutation(len(T))
+    shuffled = platform_stiffnesses(robot, T[order]).compliance
+    assert np.array_equal(shuffled, together[order])
+    for i in (0, 7, 18):
+        assert np.array_equal(
+            platform_stiffnesses(robot, T[i : i + 1]).compliance[0], together[i]
+        )
 
 
 def test_over_a_workspace_it_is_that_of_each_posture():
@@ -54,14 +76,16 @@ def test_over_a_workspace_it_is_that_of_each_posture():
         assert_same(many, row, without_clearance(posture))
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(30))
-def test_of_random_robots_it_is_the_same(seed):
+def test_of_random_robots_it_is_the_same(seed, method):
     """Some have free motions, some rigid directions; ranks are told alike."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
-    many = platform_stiffnesses(
-        posture.robot, posture.transforms[None], posture.mismatch
-    )
+    with METHODS[method]():
+        many = platform_stiffnesses(
+            posture.robot, posture.transforms[None], posture.mismatch
+        )
     assert_same(many, 0, without_clearance(posture))
 
 
