@@ -308,7 +308,8 @@ def _refit(
             moved[seen] = x
             return moved
 
-        before = np.inf
+        first = left_at(scaled.tobytes())
+        before = float(first @ first)
         while len(seen):
             fitted = least_squares(
                 lambda x: left_at(with_seen(x).tobytes()), scaled[seen],

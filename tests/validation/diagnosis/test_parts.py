@@ -1,5 +1,7 @@
 """Registration, refit and the next measurement, on a bar whose answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -135,6 +137,22 @@ def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
     assert value == pytest.approx(k, rel=1e-4)  # arcs are chords to first order
     J = 8 * ((M / SIGMA[2]) ** 2 + (M * LENGTH / SIGMA[3]) ** 2)
     assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
+
+
+def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
+    """Only x is read: L (cos(q + e) - cos q), of slope -L sin(q + e), e = 0.4 rad."""
+    e, plain = 0.4, bar()
+    q = plain.coordinates[:, 0]
+    seen = np.full((8, 6), np.nan)
+    seen[:, 3] = LENGTH * (np.cos(q + e) - np.cos(q))
+    campaign = bar(measured=seen)
+    here = replace(conditions_of(campaign), exact=True)
+    fit = refit(campaign, here, [TURNED], np.zeros(1))
+    ((_, value, std),) = fit.parameters(0)
+    assert value == pytest.approx(e, rel=1e-6)
+    slope = LENGTH * np.sin(q + e) / SIGMA[3]
+    assert np.abs(fit.slopes[:, 0]) == pytest.approx(np.abs(slope), rel=1e-3)
+    assert std == pytest.approx(1 / np.linalg.norm(slope), rel=1e-3)
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
