@@ -103,13 +103,14 @@ SOFTER = hypothesis(
 )
 
 
-def test_a_length_is_the_mean_of_the_readings_along_the_bar():
+@pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
+def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
     """And its standard deviation sigma / sqrt(R): rotations have no say."""
     plain = bar(link=BEAM)
     noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
     seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
     campaign = bar(link=BEAM, measured=seen)
-    fit = refit(campaign, conditions_of(campaign), [LONGER], np.zeros(1))
+    fit = refit(campaign, conditions_of(campaign), [LONGER], np.array([start]))
     ((name, value, std),) = fit.parameters(0)
     assert name == "tip"
     mean = np.einsum("ri,ri->r", seen[:, 3:], along(plain)).mean()
