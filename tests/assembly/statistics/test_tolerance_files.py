@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.kinematics.posture import home_posture
 from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
 from assembly.statistics import verification
@@ -112,6 +113,8 @@ def test_the_plans_of_the_example_are_read(name):
         (('frames = ["leg1.tip"]', 'frames = ["link_a"]\nname = "b"'), None),
         (('["RX", "RY"]', '["TX"]\nname = "length"'), "share a name"),
         (('"logarithm"', '"log"'), 'cost: found "log"'),
+        (("yield", "draws = 10.5\nyield"), "expected whole numbers as draws and seed"),
+        (("yield", "seed = 0.5\nyield"), "expected whole numbers as draws and seed"),
     ],
 )
 def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
@@ -122,6 +125,17 @@ def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
     with pytest.raises(BadInput) as error:
         read_plan(path, load_robot("irsbot2"))
     assert message in str(error.value)
+
+
+def test_errors_that_need_no_clearance_have_no_share_of_it():
+    """Of an open chain, which closes whatever its errors: any factor will do."""
+    arm = load_robot("arm6")
+    robot = arm.with_errors(np.full((len(arm.frames), 6), 1e-4))
+    found = present_errors([home_posture(robot)])
+    assert (found["largest_margin"], found["factor_on_errors"]) == (0.0, np.inf)
+    assert found["assemblable_share"] == 1.0
+    assert len(found["slopes"]) == 6 * len(arm.frames)
+    assert {one["share_of_margin"] for one in found["slopes"]} == {0.0}
 
 
 def test_present_errors_times_their_factor_just_fit():

@@ -19,7 +19,7 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import register
-from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
 LENGTH = 0.8
@@ -82,6 +82,63 @@ def test_a_device_that_cannot_be_located_is_said():
     campaign = bar(measured=seen, rows=2)
     with pytest.raises(BadInput, match="registration is unknown, and there are no"):
         register(campaign, conditions_of(campaign))
+
+
+def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
+    """Five places of a slide half a metre beside the base, no rotation read."""
+    robot = Robot("slide", "tip", (
+        Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
+        Frame("slide", "rail", joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.1, 0, 0]),
+    ))  # fmt: skip
+    placed = [place_robot(robot, joints={"slide": 0.1 * k}) for k in range(5)]
+    seen = np.zeros((5, 6))
+    seen[:, :3] = np.nan
+    campaign = replace(
+        bar(rows=5, measured=seen), robot=robot,
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="measured points off one line"):
+        register(campaign, conditions_of(campaign))
+
+
+# tangents
+
+
+@pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
+def test_a_length_has_the_same_tangent_about_any_value(x):
+    """1 / sigma along the bar, and nothing at zero; another length beside it too."""
+    campaign = bar(link=BEAM)
+    tangents = Tangents(campaign, conditions_of(campaign))
+    expected = whiten(campaign, fit_of(campaign, 1.0))
+    beside = {"encoder_offset": {"drive": 1e-9}}
+    for found in (
+        tangents.at_start(LONGER),
+        tangents.about(LONGER, np.array([x]), {}),
+        tangents.about(LONGER, np.array([x]), beside),
+    ):
+        assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
+        assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)
+
+
+def test_a_tangent_about_an_upper_bound_is_taken_below_it():
+    """Of an expansion: the bar's length times 5 K, and never more than allowed."""
+    heat = {"temperature": np.full(8, 5.0)}
+    campaign = bar(link=BEAM, **heat)
+    tangents = Tangents(campaign, conditions_of(campaign))
+    model, tried = tangents.model, []
+
+    def watched(effects):
+        tried.append(effects["thermal_expansion"]["tip"])
+        return model(effects)
+
+    tangents.model = watched
+    most = WARMER.slots[0].unknown.upper
+    found = tangents.about(WARMER, np.array([most]), {})
+    assert max(tried) == most
+    expected = 5.0 * whiten(campaign, fit_of(campaign, LENGTH))
+    assert found.columns[:, 0] == pytest.approx(expected, rel=1e-6, abs=1e-3)
 
 
 # refit
