@@ -62,6 +62,22 @@ def test_looking_several_times_is_wrong_no_more_often_than_said(monkeypatch):
     assert check["confidence_of_a_look"] == pytest.approx(1 - 0.05 / 4)
 
 
+def test_the_tolerances_returned_are_those_last_looked_at(monkeypatch):
+    """Every look contradicts them, and halves them, but for the last."""
+    looked = []
+
+    def contradicted(requirement, t, *given):
+        looked.append(float(t[0]))
+        return {"verdict": "contradicted"}
+
+    monkeypatch.setattr(verification, "verify_yield", contradicted)
+    monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2] / 2)
+    t, last = verification.verify(Coin(0.5, 1), np.ones(1), 10, lambda *_: None)
+    assert looked == [0.5**k for k in range(last["most_looks"])]
+    assert t == looked[-1]
+    assert last["look"] == last["most_looks"] == len(looked) > 1
+
+
 FILE = """
 yield = 0.95
 cost = "logarithm"

@@ -111,6 +111,20 @@ def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
     assert abs(value - 3e5) < 3 * std
 
 
+def test_noise_that_repeats_show_to_be_larger_is_believed(tmp_path):
+    """Three times what is stated, of rotations alone; 36 of them are repeats and more."""
+    exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
+    larger = np.repeat([3.0, 1.0], 3)
+    noise = larger * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
+    found = diagnose(replace(exact, measured=exact.measured + noise))
+    assert found.verdict == "none_needed"
+    assert found.noise_factor == pytest.approx(larger, rel=3 / np.sqrt(2 * 3 * 36))
+    assert np.array_equal(found.noise_factor[3:], np.ones(3))
+    assert np.allclose(found.campaign.sigma, found.noise_factor * SIGMA, rtol=1e-12)
+    assert found.after.normalised == pytest.approx(1.0, abs=0.25)
+    assert found.lack.rms == pytest.approx(1.0, abs=0.2)
+
+
 def test_a_sound_model_is_left_alone(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())

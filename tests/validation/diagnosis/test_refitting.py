@@ -62,6 +62,20 @@ def test_the_best_set_its_parts_and_what_is_near_it_are_fitted():
     assert [s.members for s in sets].count((0, 1)) == 1
 
 
+@pytest.mark.parametrize(("behind", "fitted"), [(5.9, True), (6.1, False)])
+def test_of_two_ways_to_act_the_second_is_fitted_if_it_is_near(behind, fitted):
+    """An effect at one of two places: less likely by e^-6, it is not looked at."""
+    screen = screen_of(8.0, np.sqrt(64.0 - 2 * behind), effects="aa")
+    sets, found = round_of(screen)
+    assert [s.members for s in sets] == [(0,), (1,), ()]
+    assert ((1,) in found) == fitted
+
+
+def test_of_many_ways_to_act_three_are_fitted():
+    _, found = round_of(screen_of(8.0, 7.9, 7.8, 7.7, effects="aaaa"))
+    assert found == {(), (0,), (1,), (2,)}
+
+
 def test_what_is_far_from_the_best_is_not_fitted():
     """Nothing shows: the empty set is best; one effect is 3.5 worse, two are 8.3."""
     sets, fitted = round_of(screen_of())
