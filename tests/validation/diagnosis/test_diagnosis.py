@@ -112,7 +112,7 @@ def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
 
 
 def test_noise_that_repeats_show_to_be_larger_is_believed(tmp_path):
-    """Three times what is stated, of rotations alone; 36 of them are repeats and more."""
+    """Three times what is stated, of rotations alone; of some 36 repeats."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     larger = np.repeat([3.0, 1.0], 3)
     noise = larger * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
