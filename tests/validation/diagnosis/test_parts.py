@@ -18,7 +18,7 @@ from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
-from validation.diagnosis.registration import register
+from validation.diagnosis.registration import coarse_frame, register
 from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
@@ -70,6 +70,9 @@ def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
     if cells == "one rotation":
         seen[1:, :3] = np.nan
     campaign = bar(measured=seen)
+    # without errors of the model a first guess is right already
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
     found = register(campaign, conditions_of(campaign))
     assert found.base[:3] == pytest.approx(turn, abs=1e-9)
     assert found.base[3:] == pytest.approx(t, abs=1e-9)
