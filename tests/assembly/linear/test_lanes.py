@@ -220,6 +220,22 @@ def test_what_is_not_solved_side_by_side_is_solved_with_its_own_errors(
     assert not found.fallback.any()
 
 
+@pytest.mark.parametrize("each", [True, False])
+def test_what_no_loop_solves_is_solved_with_its_own_errors(grid, each, monkeypatch):
+    """Errors of all points in one array, or each point's own."""
+    robot, postures = grid
+    T, mismatch = stack(postures[:3])
+    errors = robot.errors * np.arange(1.0, 4.0)[:, None, None]
+    errors = errors if each else errors[1]
+    with by_numba():
+        expected = zone_margins(robot, T, "free", mismatch, errors)
+    monkeypatch.setattr(zone, "_solve_all", lambda *given: None)
+    found = zone_margins(robot, T, "free", mismatch, errors)
+    assert found.fallback.all()
+    assert found.margin == pytest.approx(expected.margin, rel=1e-7)
+    assert np.all(found.bound <= found.margin)
+
+
 @needs_compiler
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_of_any_robot_are_numbas(compliant, rng):

@@ -29,3 +29,21 @@ def test_rows_are_numpys(rng):
     assert np.array_equal(to, a)
     to[0] = 7.0
     assert a[0] != 7.0
+
+
+def test_multipliers_that_are_not_unique_are_the_least_ones(rng):
+    """Z'y without its part along rows of Z that nothing feels, however long these."""
+    from assembly.linear.compiled_energy import _least_multipliers
+
+    Z, y, rank = (
+        rng.normal(size=(5, 9)) * [[1], [2], [0.5], [3], [0.1]],
+        rng.normal(size=3),
+        3,
+    )
+    unfelt = Z[rank:].copy()
+    found = np.full(9, np.nan)
+    _least_multipliers(Z.copy(), rank, y, found)
+    whole = Z[:rank].T @ y
+    expected = whole - unfelt.T @ np.linalg.lstsq(unfelt.T, whole)[0]
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert unfelt @ found == pytest.approx(np.zeros(2), abs=1e-13)

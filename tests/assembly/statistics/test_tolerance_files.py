@@ -106,6 +106,20 @@ def test_a_tolerance_file_is_read(write_file):
     assert (plan.asked_yield, plan.cost) == (0.95, "logarithm")
 
 
+@pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
+def test_a_price_by_its_law(cost, write_file):
+    """Parts of prices 2 and 1 made e times, or twice, as rough, together and alone."""
+    plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
+    t = np.array([3e-4, 2e-2])
+    if cost == "reciprocal":
+        assert plan.price(2 * t) == pytest.approx(plan.price(t) / 2)
+        assert plan.price(np.array([3e-4, np.inf])) == pytest.approx(2.0 / 3e-4)
+        return
+    assert plan.price(np.ones(2)) == 0.0
+    assert plan.price(t) - plan.price(np.e * t) == pytest.approx(3.0)
+    assert plan.price(t) - plan.price(t * [np.e, 1]) == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
 def test_the_plans_of_the_example_are_read(name):
     folder = Path(__file__).parents[3] / "examples" / "tolerance_allocation"

@@ -125,6 +125,23 @@ def test_noise_that_repeats_show_to_be_larger_is_believed(tmp_path):
     assert found.lack.rms == pytest.approx(1.0, abs=0.2)
 
 
+@pytest.mark.parametrize("name", ["none", "one", "pair"])
+def test_steps_that_nothing_asks_for_repeat_the_one_before(name, diagnosed):
+    """And the last one is where the model leads."""
+    found = diagnosed(name)
+    declared, geometry, springs, library = found.ladder
+    assert [r.term for r in found.ladder] == [
+        "declared", "geometry", "springs", "library effects"
+    ]  # fmt: skip
+    assert declared.error.normalised == pytest.approx(found.before.normalised)
+    assert declared.unknowns == 0
+    for step in (geometry, springs):
+        assert (step.error, step.unknowns) == (declared.error, 0)
+    assert library.unknowns == found.best.rank == len(found.fit.values)
+    end = found.after if found.claimed else declared.error
+    assert library.error.normalised == pytest.approx(end.normalised, rel=1e-9)
+
+
 def test_a_sound_model_is_left_alone(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())
