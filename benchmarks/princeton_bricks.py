@@ -25,10 +25,8 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import home_posture
 from assembly.model.links import link_compliance
-from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.model.robot import BeamLink, Frame, MatrixLink
 from benchmarks.princeton_solids import (
     ANGLES,
     HEIGHT,
@@ -37,6 +35,7 @@ from benchmarks.princeton_solids import (
     PUBLISHED,
     WIDTH,
     E,
+    in_pieces,
     off,
     root_link,
 )
@@ -235,7 +234,7 @@ def bent_rows(angle: float) -> dict[float, NDArray]:
 
 
 def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
-    """7 pieces of the bar and its root, stiffer along the height, across, in twist."""
+    """The bar and its root, stiffer along the height, across, in twist."""
     section = declared_section({"width": WIDTH, "height": HEIGHT}, NU)
     along, across, twist = factors
     strong, weak = max(section.I_y, section.I_z), min(section.I_y, section.I_z)
@@ -243,26 +242,14 @@ def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
         name: {strong: along, weak: across}[getattr(section, name)]
         * getattr(section, name) for name in ("I_y", "I_z")
     })  # fmt: skip
-    link = BeamLink(asdict(changed), E, NU, up=(0, 1, 0), pieces=7)
+    link = BeamLink(asdict(changed), E, NU, up=(0, 1, 0))
     plain = BeamLink(asdict(section), E, NU, up=(0, 1, 0))
     stiff, soft = (
         link_compliance(Frame("tip", translation=[LENGTH / 8, 0, 0], link=one))
-        for one in (replace(link, pieces=1), plain)
+        for one in (link, plain)
     )
     root = np.linalg.inv(root_link().stiffness)
     return link, MatrixLink(np.linalg.inv(stiff - (soft - root)))
-
-
-def beam_rows(link: BeamLink, root: MatrixLink, size: float, angle: float) -> NDArray:
-    """(2,) [m] along the height and across."""
-    piece = LENGTH / 8
-    frames = (
-        Frame("root", translation=[piece, 0, 0], link=root),
-        Frame("tip", "root", [LENGTH - piece, 0, 0], link=link),
-    )
-    load = [0, 0, 0, 0, size * np.cos(angle), size * np.sin(angle)]
-    posture = home_posture(Robot("cantilever", "tip", frames))
-    return solve_exact(posture, load).platform_screw[4:]
 
 
 def main() -> None:
@@ -280,7 +267,7 @@ def main() -> None:
         for size, rows in PUBLISHED.items() for k, degrees in enumerate(ANGLES)
     }  # fmt: skip
     for (size, degrees), row in published.items():
-        ours = beam_rows(link, root, size, np.radians(degrees))
+        ours = in_pieces(size, np.radians(degrees), root, link)
         print(f"{size:7.3f}{degrees:4d}{off(row, ours)}", flush=True)
     for degrees in map(int, sys.argv[1:]):
         for size, rows in bent_rows(np.radians(degrees)).items():

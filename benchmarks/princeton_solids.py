@@ -14,7 +14,7 @@ Sources:
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial
@@ -32,6 +32,7 @@ from validation.assumptions.solid_links import solid_link
 
 LENGTH, HEIGHT, WIDTH = 0.508, 12.3777e-3, 3.2024e-3  # [m]
 E, NU = 71.7e9, 0.31
+BAR = BeamLink({"width": WIDTH, "height": HEIGHT}, E, NU, up=(0, 1, 0))
 ANGLES = (0, 15, 30, 45, 60, 75, 90)  # [deg] of the force from the height
 # [m] along the height and across: (beams, solids)
 PUBLISHED = {
@@ -209,9 +210,8 @@ def root_link() -> MatrixLink:
     A solid whose ends are both held so is stiffer than the beam, by half of it at each
     end: to moments and tension, what does not depend on where the end is.
     """
-    section, piece = {"width": WIDTH, "height": HEIGHT}, LENGTH / 8
-    link = BeamLink(section, E, NU, up=(0, 1, 0))
-    frame = Frame("tip", translation=[piece, 0, 0], link=link)
+    piece = LENGTH / 8
+    frame = Frame("tip", translation=[piece, 0, 0], link=BAR)
     beam, solid = link_compliance(frame), solid_link(frame)
     assert solid is not None
     held = np.diag(beam - np.linalg.inv(solid.condensed)) / 2 * [1, 1, 1, 1, 0, 0]
@@ -220,17 +220,19 @@ def root_link() -> MatrixLink:
     return MatrixLink(np.linalg.inv(stiffer))
 
 
-def in_pieces(size: float, angle: float, root: MatrixLink | None = None) -> NDArray:
-    """(2,) [m] the same of one beam link in 8 pieces, the first another link."""
-    section, up, piece = {"width": WIDTH, "height": HEIGHT}, (0, 1, 0), LENGTH / 8
+def in_pieces(
+    size: float, angle: float, root: MatrixLink | None = None, link: BeamLink = BAR
+) -> NDArray:
+    """(2,) [m] the same of a beam link in 8 pieces, the first perhaps another link."""
+    piece = LENGTH / 8
     if root is None:
-        link = BeamLink(section, E, NU, up=up, pieces=8)
-        frames = (Frame("tip", translation=[LENGTH, 0, 0], link=link),)
+        whole = replace(link, pieces=8)
+        frames = (Frame("tip", translation=[LENGTH, 0, 0], link=whole),)
     else:
-        link = BeamLink(section, E, NU, up=up, pieces=7)
+        rest = replace(link, pieces=7)
         frames = (
             Frame("root", translation=[piece, 0, 0], link=root),
-            Frame("tip", "root", [LENGTH - piece, 0, 0], link=link),
+            Frame("tip", "root", [LENGTH - piece, 0, 0], link=rest),
         )
     load = [0, 0, 0, 0, size * np.cos(angle), size * np.sin(angle)]
     posture = home_posture(Robot("cantilever", "tip", frames))

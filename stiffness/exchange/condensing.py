@@ -14,7 +14,8 @@ from scipy.sparse import triu
 
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_text
-from stiffness.exchange.matrix_file import FileMatrix, bulk_fields, real
+from stiffness.exchange.matrix_file import FileMatrix, bulk_fields
+from stiffness.exchange.real_numbers import real
 from stiffness.surface.interface import Interface, parse_interface
 
 _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)

@@ -3,7 +3,8 @@
 =================  ===============================================================
 file               written by
 =================  ===============================================================
-Matrix Market      Ansys (``*EXPORT,..,MMF``), SciPy, Exudyn scripts: ``.mtx``
+Matrix Market      Ansys (``*EXPORT,..,MMF``), SciPy, Exudyn scripts: ``.mtx``;
+                   see :mod:`stiffness.exchange.matrix_market`
 Harwell-Boeing     Ansys (``HBMAT``): ``.matrix``; see
                    :mod:`stiffness.exchange.ansys_files` for its ``.mapping``
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
@@ -15,8 +16,8 @@ NumPy              ``.npy``, SciPy's sparse ``.npz``
 =================  ===============================================================
 
 Sources:
-    NIST Matrix Market exchange formats; CalculiX 2.21 manual, SUBSTRUCTURE MATRIX
-    OUTPUT; Nastran Quick Reference Guide, DMIG (form 6 gives one half).
+    CalculiX 2.21 manual, SUBSTRUCTURE MATRIX OUTPUT; Nastran Quick Reference Guide,
+    DMIG (form 6 gives one half).
 """
 
 import re
@@ -26,29 +27,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, tril, triu
+from scipy.sparse import coo_array, csr_array
 
 from forcefit.inputs.errors import BadInput, describe, one_line
 from forcefit.inputs.table import read_text
-from stiffness.exchange.ansys_files import (
-    LARGEST,
-    both_halves,
-    harwell_boeing,
-    read_mapping,
-)
+from stiffness.exchange.ansys_files import LARGEST, harwell_boeing, read_mapping
+from stiffness.exchange.matrix_market import matrix_market
+from stiffness.exchange.real_numbers import real
 
 Freedom = tuple[int, int]
-_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 _ENDINGS = (
     ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz",
     ".mmf", ".matrix",
 )  # fmt: skip
 _HARWELL_BOEING = re.compile(r"[^\n]*\n[\d ]+\n[RCP][A-Z]{2}\s", re.I)
-_MARKET = (
-    {"matrix"}, {"coordinate", "array"}, {"real", "integer", "double"},
-    {"general", "symmetric"},
-)  # fmt: skip
 _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
 _INITIALS = {"stiffness": "K", "mass": "M"}  # of a DMIG's name
 
@@ -105,7 +97,7 @@ def read_matrix(
     else:
         text = read_text(path)
         if text.startswith("%%MatrixMarket"):
-            matrix, freedoms = _matrix_market(path, text), None
+            matrix, freedoms = matrix_market(path, text), None
         elif _HARWELL_BOEING.match(text):
             matrix, freedoms = harwell_boeing(path, text), None
         elif re.search(r"^\s*\*USER ELEMENT", text, re.M | re.I):
@@ -202,63 +194,6 @@ def _numpy(path: Path) -> csr_array:
         raise BadInput(
             f"{path}: no matrix of NumPy or SciPy: {one_line(str(error), 100)}"
         ) from None
-
-
-def _matrix_market(path: Path, text: str) -> csr_array:
-    """``%%MatrixMarket matrix ...``; on a damaged one SciPy's reader may crash."""
-    head, *lines = text.split("\n")
-    words = tuple(head.lower().split()[1:])
-    if len(words) != 4 or any(w not in k for w, k in zip(words, _MARKET, strict=True)):
-        raise BadInput(
-            f"{path}: no Matrix Market file: found {describe(head)}, expected a "
-            "matrix, coordinate or array, real or integer, general or symmetric"
-        )
-    numbers = _numbers(path, [line for line in lines if not line.startswith("%")])
-    sizes, rest = np.split(numbers, [3 if words[1] == "coordinate" else 2])
-    n = _size(path, sizes)
-    if words[1] == "coordinate":
-        if len(sizes) < 3 or len(rest) != 3 * sizes[2]:
-            raise BadInput(
-                f"{path}: found {len(rest) / 3:g} entries, not as many as said"
-            )
-        places = rest.reshape(-1, 3)[:, :2]
-        if np.any((places != places.round()) | (places < 1) | (places > n)):
-            raise BadInput(f"{path}: found a place beyond {n} by {n}")
-        i, j = places.astype(int).T - 1
-        matrix = csr_array(coo_array((rest[2::3], (i, j)), shape=(n, n)))
-    else:
-        whole = words[3] == "general"
-        expected = n * n if whole else n * (n + 1) // 2
-        if len(rest) != expected:
-            raise BadInput(f"{path}: found {len(rest)} numbers, expected {expected}")
-        j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # by columns
-        matrix = csr_array(coo_array((rest, (i.ravel(), j.ravel())), shape=(n, n)))
-    # Ansys writes one half, whatever its head says
-    half = not triu(matrix, 1).nnz or not tril(matrix, -1).nnz
-    by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
-    return (
-        both_halves(matrix) if words[3] == "symmetric" or (by_ansys and half)
-        else matrix
-    )  # fmt: skip
-
-
-def _numbers(path: Path, lines: list[str]) -> NDArray:
-    """All numbers of some lines."""
-    words = [word for line in lines for word in line.split()]
-    try:
-        return np.array(words, dtype=float)
-    except ValueError:
-        return np.array([real(path, word) for word in words])
-
-
-def _size(path: Path, sizes: NDArray) -> int:
-    """Rows of a square, from the first numbers of a file."""
-    rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
-    if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
-        raise BadInput(
-            f"{path}: found {rows:g} by {columns:g} numbers, expected a square"
-        )
-    return int(rows)
 
 
 def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
@@ -444,12 +379,3 @@ def _whole(path: Path, word: str) -> int:
         raise BadInput(
             f"{path}: found {describe(word.strip())}, expected a whole number"
         ) from None
-
-
-def real(path: Path | str, word: str) -> float:
-    """A number, its exponent perhaps without a letter or with a D (Fortran)."""
-    match = _REAL.fullmatch(word.strip())
-    if not match:
-        raise BadInput(f"{path}: found {describe(word.strip())}, expected a number")
-    mantissa, exponent = match.groups()
-    return float(f"{mantissa}e{exponent or 0}")

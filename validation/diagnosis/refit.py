@@ -29,6 +29,7 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
 _TINY = 1e-300
+_FAINT = 0.01  # [sigma] over all readings, of unknowns that may as well be zero
 _CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
@@ -308,7 +309,12 @@ def _refit(
             moved[seen] = x
             return moved
 
-        before = np.inf
+        # the first step is as long as the way from zero to where a fit begins: one that
+        # begins there but for rounding would end there
+        if np.linalg.norm(J[:, seen] * scaled[seen]) < _FAINT:
+            scaled[seen] = np.clip(0.0, *bounds)
+        first = left_at(scaled.tobytes())
+        before = float(first @ first)
         while len(seen):
             fitted = least_squares(
                 lambda x: left_at(with_seen(x).tobytes()), scaled[seen],

@@ -1,9 +1,11 @@
 """Robots placed by pose and by joints, against closed forms."""
 
 import math
+import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import (
@@ -149,6 +151,35 @@ def test_a_pose_out_of_reach_is_refused_with_the_distance():
     # the track halves its step until 1e-5 of its length, 0.6 m, is left
     assert short == pytest.approx(0.3, abs=1e-4)
     assert "expected a configuration in which every closure holds" in text
+
+
+def test_the_angle_that_is_missing_is_that_between_two_rotations():
+    """A hinge about z asked to tilt: SciPy's angle from where it stops to the goal."""
+    robot = Robot("hinge", "hand", (
+        frame("a", **driven(0.3)), frame("hand", "a", (0.4, 0, 0), (0.2, -0.1, 0.3)),
+    ))  # fmt: skip
+    goal = [0.5, -0.4, 1.1]
+    asked = dict(zip(("rx", "ry", "rz"), goal, strict=True))
+    with pytest.raises(BadInput, match="cannot be reached") as caught:
+        place_robot(robot, pose=asked)
+    text = str(caught.value)
+    stopped = re.search(r"stops at rx=(\S+), ry=(\S+), rz=(\S+), ", text).groups()
+    (short,) = re.findall(r"(\S+) rad short", text)
+    between = (
+        Rotation.from_rotvec(goal) * Rotation.from_rotvec(np.float64(stopped)).inv()
+    )
+    assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
+
+
+@pytest.mark.parametrize("guess", [True, False])
+def test_progress_is_one_where_a_target_is_reached(guess):
+    robot = four_bar()
+    start = home_posture(robot).coordinates
+    near = np.full(len(start), np.nan)
+    near[robot.index("crank")] = 0.6
+    track = follow(robot, start, Target(coordinates=near[None]), guess)
+    assert track.progress.tolist() == [1.0]
+    assert track.reached.tolist() == [True]
 
 
 def test_a_pose_outside_the_arms_plane_is_refused():

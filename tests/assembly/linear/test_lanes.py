@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
+from assembly.linear import zone
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
@@ -190,10 +191,49 @@ def test_margins_are_numbas_and_proved(grid, compliant):
         lanes = zone_margins(*given)
         with by_numba():
             numba = zone_margins(*given)
-        assert not lanes.fallback.any()
+        assert not (lanes.fallback | numba.fallback).any()
         assert lanes.margin == pytest.approx(numba.margin, rel=2e-8)
         assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
         assert np.all(lanes.bound <= numba.margin * (1 + 1e-11))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("each", [True, False])
+def test_what_is_not_solved_side_by_side_is_solved_with_its_own_errors(
+    grid, count, each, monkeypatch
+):
+    """The last point is left out; errors are each point's own, or those of all."""
+    robot, postures = grid
+    T, mismatch = stack(postures[:count])
+    errors = robot.errors * np.arange(1.0, 1 + (count if each else 1))[:, None, None]
+    with by_numba():
+        expected = zone_margins(robot, T, "free", mismatch, errors)
+
+    def all_but_the_last(structure, T, errors, mismatch, out):
+        out[0][:-1], out[1][:-1] = expected.margin[:-1], expected.bound[:-1]
+        out[2][:-1] = 0
+        return True
+
+    monkeypatch.setattr(zone, "margins_side_by_side", all_but_the_last)
+    found = zone_margins(robot, T, "free", mismatch, errors)
+    assert np.array_equal(found.margin, expected.margin)
+    assert not found.fallback.any()
+
+
+@pytest.mark.parametrize("each", [True, False])
+def test_what_no_loop_solves_is_solved_with_its_own_errors(grid, each, monkeypatch):
+    """Errors of all points in one array, or each point's own."""
+    robot, postures = grid
+    T, mismatch = stack(postures[:3])
+    errors = robot.errors * np.arange(1.0, 4.0)[:, None, None]
+    errors = errors if each else errors[1]
+    with by_numba():
+        expected = zone_margins(robot, T, "free", mismatch, errors)
+    monkeypatch.setattr(zone, "_solve_all", lambda *given: None)
+    found = zone_margins(robot, T, "free", mismatch, errors)
+    assert found.fallback.all()
+    assert found.margin == pytest.approx(expected.margin, rel=1e-7)
+    assert np.all(found.bound <= found.margin)
 
 
 @needs_compiler

@@ -109,3 +109,15 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     status, out, err = run(*words, "linear")
     assert status == 2
     assert '--stiffness: found "linear"' in err
+
+
+def test_what_resists_a_little_is_not_free():
+    """0.01 N m/rad is a spring; zero is none, and NaN no answer."""
+    stiffnesses = np.full((6, 6), 2.0)
+    stiffnesses[:, 2] = 0.01, 0.02, 0.03, 0.0, 0.0, np.nan
+    said = stiffness_report(stiffnesses, np.full((6, 6, 6), np.nan), "contact", 0.9)
+    about_z = said["axes"]["mz"]
+    assert about_z["draws"] == 5
+    assert about_z["free"]["probability"] == pytest.approx(0.4)
+    assert about_z["mean"]["value"] == pytest.approx(0.02)
+    assert about_z["quantiles"]["0.5"]["value"] == pytest.approx(0.02)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.kinematics.posture import home_posture
 from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
 from assembly.statistics import verification
@@ -61,6 +62,22 @@ def test_looking_several_times_is_wrong_no_more_often_than_said(monkeypatch):
     assert check["confidence_of_a_look"] == pytest.approx(1 - 0.05 / 4)
 
 
+def test_the_tolerances_returned_are_those_last_looked_at(monkeypatch):
+    """Every look contradicts them, and halves them, but for the last."""
+    looked = []
+
+    def contradicted(requirement, t, *given):
+        looked.append(float(t[0]))
+        return {"verdict": "contradicted"}
+
+    monkeypatch.setattr(verification, "verify_yield", contradicted)
+    monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2] / 2)
+    t, last = verification.verify(Coin(0.5, 1), np.ones(1), 10, lambda *_: None)
+    assert looked == [0.5**k for k in range(last["most_looks"])]
+    assert t == looked[-1]
+    assert last["look"] == last["most_looks"] == len(looked) > 1
+
+
 FILE = """
 yield = 0.95
 cost = "logarithm"
@@ -89,6 +106,20 @@ def test_a_tolerance_file_is_read(write_file):
     assert (plan.asked_yield, plan.cost) == (0.95, "logarithm")
 
 
+@pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
+def test_a_price_by_its_law(cost, write_file):
+    """Parts of prices 2 and 1 made e times, or twice, as rough, together and alone."""
+    plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
+    t = np.array([3e-4, 2e-2])
+    if cost == "reciprocal":
+        assert plan.price(2 * t) == pytest.approx(plan.price(t) / 2)
+        assert plan.price(np.array([3e-4, np.inf])) == pytest.approx(2.0 / 3e-4)
+        return
+    assert plan.price(np.ones(2)) == 0.0
+    assert plan.price(t) - plan.price(np.e * t) == pytest.approx(3.0)
+    assert plan.price(t) - plan.price(t * [np.e, 1]) == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
 def test_the_plans_of_the_example_are_read(name):
     folder = Path(__file__).parents[3] / "examples" / "tolerance_allocation"
@@ -112,6 +143,8 @@ def test_the_plans_of_the_example_are_read(name):
         (('frames = ["leg1.tip"]', 'frames = ["link_a"]\nname = "b"'), None),
         (('["RX", "RY"]', '["TX"]\nname = "length"'), "share a name"),
         (('"logarithm"', '"log"'), 'cost: found "log"'),
+        (("yield", "draws = 10.5\nyield"), "expected whole numbers as draws and seed"),
+        (("yield", "seed = 0.5\nyield"), "expected whole numbers as draws and seed"),
     ],
 )
 def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
@@ -122,6 +155,17 @@ def test_a_mistake_in_a_tolerance_file_is_named(change, message, write_file):
     with pytest.raises(BadInput) as error:
         read_plan(path, load_robot("irsbot2"))
     assert message in str(error.value)
+
+
+def test_errors_that_need_no_clearance_have_no_share_of_it():
+    """Of an open chain, which closes whatever its errors: any factor will do."""
+    arm = load_robot("arm6")
+    robot = arm.with_errors(np.full((len(arm.frames), 6), 1e-4))
+    found = present_errors([home_posture(robot)])
+    assert (found["largest_margin"], found["factor_on_errors"]) == (0.0, np.inf)
+    assert found["assemblable_share"] == 1.0
+    assert len(found["slopes"]) == 6 * len(arm.frames)
+    assert {one["share_of_margin"] for one in found["slopes"]} == {0.0}
 
 
 def test_present_errors_times_their_factor_just_fit():

@@ -125,6 +125,19 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
+def test_of_draws_none_of_which_assemble_nothing_is_said():
+    """Rigid, without play: no error but zero can be closed."""
+    frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))
+    robot = Robot("rigid", "one", frames, (("one", "two"),))
+    sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
+    said = summarise(run_draws(Experiment(home_posture(robot), sources), 20))
+    lines = summary_text(said).splitlines()
+    (last,) = [line for line in lines if "draws that assemble" in line]
+    assert last == "of the 0 of 20 draws that assemble: nothing to say"
+    assert sum("nothing to say" in line for line in lines) == 1
+    assert said["assembles"]["forced"]["probability"] == 0.0
+
+
 def test_draws_between_the_bounds_are_counted_as_undecided():
     """Rough bounds: each draw is surely within, surely not, or said to be open."""
     robot = chain()

@@ -4,9 +4,10 @@ import struct
 
 import numpy as np
 import pytest
+from scipy import constants
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.surface import check_surface, read_surface
+from stiffness.surface.surface import UNITS, check_surface, read_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, cylinder
 
 
@@ -138,3 +139,10 @@ def test_an_edge_of_four_triangles_is_refused():
     with pytest.raises(BadInput, match="1 edges are shared by more than two") as no:
         check_surface(points, triangles, "cubes")
     assert "near (0.1, 0.1, 0.05)" in str(no.value)
+
+
+def test_units_of_length_are_scipys():
+    expected = {"m": 1.0, "dm": constants.deci, "cm": constants.centi,
+                "mm": constants.milli, "um": constants.micro, "in": constants.inch,
+                "inch": constants.inch, "ft": constants.foot}  # fmt: skip
+    assert pytest.approx(expected, rel=1e-15) == UNITS

@@ -76,6 +76,39 @@ def test_whitening_and_posterior_are_those_of_the_normal_distribution(drawn, rng
     assert np.allclose(behind.left(W @ z), z - J @ values, atol=1e-7)
 
 
+def test_the_most_probable_unknowns_lose_least_and_that_is_the_residuals_square(
+    drawn, rng
+):
+    """Squares of r - J g and of g / S at g = S J' C^-1 r: r' C^-1 r; more elsewhere."""
+    terms, z, _, behind = drawn
+    values = behind.values(behind.whitened(z))
+    least = behind.lost(z, values)
+    assert least == pytest.approx(z @ np.linalg.solve(covariance(behind), z), rel=1e-9)
+    assert behind.lost(z, [0 * x for x in values]) == pytest.approx(z @ z, rel=1e-12)
+    J, size = terms[0].columns, behind.size
+    for _ in range(5):
+        step = size * rng.normal(size=len(size))
+        further = np.sum((J @ step) ** 2) + np.sum((step / size) ** 2)
+        assert behind.lost(z, [values[0] + step]) == pytest.approx(
+            least + further, rel=1e-9
+        )
+
+
+def test_an_unknown_of_no_size_costs_nothing_and_stays_zero(drawn):
+    terms, z, prior, _ = drawn
+    rotations = replace(prior, scales={GEOMETRY: (prior.scales[GEOMETRY][0], 0.0)})
+    behind = background(terms, rotations)
+    (values,) = behind.values(behind.whitened(z))
+    exact = terms[0].axis >= 3
+    assert not values[exact].any()
+    assert behind.lost(z, [values]) == pytest.approx(
+        z @ np.linalg.solve(covariance(behind), z), rel=1e-9
+    )
+    assert behind.identified()[0][exact].max() < 1e-12
+    assert not behind.deviations()[0][exact].any()
+    assert behind.unknowns == pytest.approx(behind.identified()[0].sum(), rel=1e-9)
+
+
 def test_springs_stiffer_than_declared_are_left_out(rng):
     springs = term(rng, SPRINGS, 12, lower=0.0)
     truth = np.where(np.arange(12) % 2, 1.0, -1.0) * np.where(

@@ -1,5 +1,7 @@
 """Registration, refit and the next measurement, on a bar whose answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -16,8 +18,8 @@ from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
-from validation.diagnosis.registration import register
-from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.registration import coarse_frame, register
+from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
 LENGTH = 0.8
@@ -68,6 +70,9 @@ def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
     if cells == "one rotation":
         seen[1:, :3] = np.nan
     campaign = bar(measured=seen)
+    # without errors of the model a first guess is right already
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
     found = register(campaign, conditions_of(campaign))
     assert found.base[:3] == pytest.approx(turn, abs=1e-9)
     assert found.base[3:] == pytest.approx(t, abs=1e-9)
@@ -80,6 +85,63 @@ def test_a_device_that_cannot_be_located_is_said():
     campaign = bar(measured=seen, rows=2)
     with pytest.raises(BadInput, match="registration is unknown, and there are no"):
         register(campaign, conditions_of(campaign))
+
+
+def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
+    """Five places of a slide half a metre beside the base, no rotation read."""
+    robot = Robot("slide", "tip", (
+        Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
+        Frame("slide", "rail", joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.1, 0, 0]),
+    ))  # fmt: skip
+    placed = [place_robot(robot, joints={"slide": 0.1 * k}) for k in range(5)]
+    seen = np.zeros((5, 6))
+    seen[:, :3] = np.nan
+    campaign = replace(
+        bar(rows=5, measured=seen), robot=robot,
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="measured points off one line"):
+        register(campaign, conditions_of(campaign))
+
+
+# tangents
+
+
+@pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
+def test_a_length_has_the_same_tangent_about_any_value(x):
+    """1 / sigma along the bar, and nothing at zero; another length beside it too."""
+    campaign = bar(link=BEAM)
+    tangents = Tangents(campaign, conditions_of(campaign))
+    expected = whiten(campaign, fit_of(campaign, 1.0))
+    beside = {"encoder_offset": {"drive": 1e-9}}
+    for found in (
+        tangents.at_start(LONGER),
+        tangents.about(LONGER, np.array([x]), {}),
+        tangents.about(LONGER, np.array([x]), beside),
+    ):
+        assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
+        assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)
+
+
+def test_a_tangent_about_an_upper_bound_is_taken_below_it():
+    """Of an expansion: the bar's length times 5 K, and never more than allowed."""
+    heat = {"temperature": np.full(8, 5.0)}
+    campaign = bar(link=BEAM, **heat)
+    tangents = Tangents(campaign, conditions_of(campaign))
+    model, tried = tangents.model, []
+
+    def watched(effects):
+        tried.append(effects["thermal_expansion"]["tip"])
+        return model(effects)
+
+    tangents.model = watched
+    most = WARMER.slots[0].unknown.upper
+    found = tangents.about(WARMER, np.array([most]), {})
+    assert max(tried) == most
+    expected = 5.0 * whiten(campaign, fit_of(campaign, LENGTH))
+    assert found.columns[:, 0] == pytest.approx(expected, rel=1e-6, abs=1e-3)
 
 
 # refit
@@ -101,13 +163,14 @@ SOFTER = hypothesis(
 )
 
 
-def test_a_length_is_the_mean_of_the_readings_along_the_bar():
+@pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
+def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
     """And its standard deviation sigma / sqrt(R): rotations have no say."""
     plain = bar(link=BEAM)
     noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
     seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
     campaign = bar(link=BEAM, measured=seen)
-    fit = refit(campaign, conditions_of(campaign), [LONGER], np.zeros(1))
+    fit = refit(campaign, conditions_of(campaign), [LONGER], np.array([start]))
     ((name, value, std),) = fit.parameters(0)
     assert name == "tip"
     mean = np.einsum("ri,ri->r", seen[:, 3:], along(plain)).mean()
@@ -135,6 +198,22 @@ def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
     assert value == pytest.approx(k, rel=1e-4)  # arcs are chords to first order
     J = 8 * ((M / SIGMA[2]) ** 2 + (M * LENGTH / SIGMA[3]) ** 2)
     assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
+
+
+def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
+    """Only x is read: L (cos(q + e) - cos q), of slope -L sin(q + e), e = 0.4 rad."""
+    e, plain = 0.4, bar()
+    q = plain.coordinates[:, 0]
+    seen = np.full((8, 6), np.nan)
+    seen[:, 3] = LENGTH * (np.cos(q + e) - np.cos(q))
+    campaign = bar(measured=seen)
+    here = replace(conditions_of(campaign), exact=True)
+    fit = refit(campaign, here, [TURNED], np.zeros(1))
+    ((_, value, std),) = fit.parameters(0)
+    assert value == pytest.approx(e, rel=1e-6)
+    slope = LENGTH * np.sin(q + e) / SIGMA[3]
+    assert np.abs(fit.slopes[:, 0]) == pytest.approx(np.abs(slope), rel=1e-3)
+    assert std == pytest.approx(1 / np.linalg.norm(slope), rel=1e-3)
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

@@ -10,6 +10,7 @@ from validation.diagnosis import structure
 from validation.diagnosis.holdout import split
 from validation.diagnosis.lack_of_fit import (
     SIGNIFICANT,
+    LackOfFit,
     believed_noise,
     lack_of_fit,
     outlying,
@@ -107,6 +108,47 @@ def test_repeats_that_are_equal_leave_no_noise_to_blame():
     assert lack_of_fit(campaign, np.zeros(4), 1).against_repeats == 1.0
 
 
+def test_without_repeats_nothing_is_said_of_them():
+    campaign = campaign_of(np.ones((5, 6)), repeat=np.arange(5))
+    found = lack_of_fit(campaign, np.ones(30), 3)
+    assert np.isnan(found.repeats)
+    assert (found.repeats_freedom, found.against_repeats) == (0, 1.0)
+    assert not found.sigma_too_small
+    assert (found.freedom, found.rms) == (27, pytest.approx(np.sqrt(30 / 27)))
+    assert lack_of_fit(campaign, np.ones(30), 40).freedom == 1
+
+
+@pytest.mark.parametrize(("repeats", "surely"), [(1.6, False), (1.8, True)])
+def test_repeats_speak_against_sigma_beyond_one_in_ten_thousand(repeats, surely):
+    """20 degrees of freedom: 52.4 are exceeded that often; 51.2 and 64.8 are there."""
+    judged = LackOfFit(1.0, 90, 0.5, repeats, 20, 0.5)
+    assert judged.sigma_too_small == surely
+
+
+@pytest.mark.parametrize("cell", range(6))
+def test_a_cell_that_scatters_tells_of_its_own_kind_alone(cell):
+    """-10, 0 and 10 sigma at each of nine commands, all else rests: by hand."""
+    z = np.zeros((27, 6))
+    z[:, cell] = np.repeat([-10.0, 0.0, 10.0], 9)
+    campaign = campaign_of(z, repeat=np.arange(27) % 9)
+    factors = np.repeat([1.0, 1.0], 3)
+    # 200 about the mean of a command, two degrees of freedom in each of three cells
+    factors[3 * (cell // 3) : 3 * (cell // 3) + 3] = np.sqrt(200 / 6)
+    assert believed_noise(campaign, z.ravel()) == pytest.approx(factors)
+
+
+def test_rows_are_alike_by_what_they_differ_and_not_by_where_zero_is():
+    """Half a degree apart and half a degree in all; 0.01 of it is no difference."""
+    for from_zero in (-40.0, 0.0, 300.0):
+        warm = from_zero + np.array([0.0, 0.005, 0.49, 0.5])
+        seen = np.full((4, 6), np.nan)
+        seen[:, 4] = [1.0, 3.0, 50.0, 52.0]
+        campaign = campaign_of(seen, repeat=np.zeros(4, int), temperature=warm)
+        found = lack_of_fit(campaign, whiten(campaign, seen), 0)
+        assert found.repeats_freedom in {1, 2}
+        assert found.repeats == pytest.approx(np.sqrt(2))
+
+
 def test_the_same_command_on_a_warmer_day_is_no_repeat():
     """Within a thirtieth of the range it is; time is no difference."""
     seen = np.full((4, 6), np.nan)
@@ -144,6 +186,23 @@ def test_a_row_far_off_is_named_and_at_most_one_in_twenty(rng):
     assert np.flatnonzero(outlying(campaign, z[campaign.cells])).tolist() == [7]
     z[[3, 20], 0] += 60
     assert np.flatnonzero(outlying(campaign_of(z), z.ravel())).tolist() == [3, 20]
+
+
+@pytest.mark.parametrize(
+    ("rest", "odd", "far"),
+    [(1.0, 6.0, True), (1.0, 5.0, False), (0.1, 6.0, True), (0.1, 5.0, False),
+     (3.0, 15.0, False), (3.0, 18.0, True)],
+)  # fmt: skip
+@pytest.mark.parametrize("cells", [1, 6])
+def test_a_row_is_far_off_by_its_rms_whatever_the_number_of_its_cells(
+    rest, odd, far, cells
+):
+    """5.5 times that of most rows, or of noise as stated where these rest."""
+    z = np.full((40, 6), rest)
+    z[7] = np.where(np.arange(6) < cells, odd, np.nan)
+    campaign = campaign_of(z)
+    expected = [7] if far else []
+    assert np.flatnonzero(outlying(campaign, z[campaign.cells])).tolist() == expected
 
 
 def test_noise_has_no_outliers(rng):

@@ -9,9 +9,9 @@ from scipy.optimize import nnls
 
 from assembly.effects.effect import Unknown
 from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.scoring import Scored, Screen, inclusion, posterior
+from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, posterior
 from validation.diagnosis.signatures import Signature
-from validation.diagnosis.verdict import by_names, calibrate, verdict
+from validation.diagnosis.verdict import by_names, calibrate, linear_or_finite, verdict
 
 
 def signature(effect, columns, lower=-np.inf, upper=np.inf, offset=0.0):
@@ -144,6 +144,37 @@ def test_effects_that_do_the_same_share_the_probability(rng):
     assert (said, claimed) == ("ambiguous", ())
 
 
+def test_ways_of_an_effect_add_up_and_what_is_unlikely_is_not_listed():
+    """Two places where a may act, b, and nothing: of weights 3, 2, 4 and 0.1."""
+    screen = Screen(np.zeros(3), [signature(e, np.eye(3)[0]) for e in "aab"])
+    weights = {(0,): 3.0, (1,): 2.0, (2,): 4.0, (): 0.1}
+    sets = [Scored(m, np.zeros(0), 0.0, 0, log(w)) for m, w in weights.items()]
+    (first, p), (second, q) = by_names(screen, sets)
+    assert (first, second) == (("a",), ("b",))
+    assert (p, q) == pytest.approx((5.0 / 9.1, 4.0 / 9.1))
+
+
+@pytest.mark.parametrize("gain", [-3.0, 0.0, 8.0, 1e5])
+def test_what_second_order_explains_is_shared_by_the_odds_of_finite_motions(gain):
+    """exp(gain / 2) to the number of effects, each as likely as finite motions."""
+    given = ((), 0.5), (("a",), 0.3), ((FINITE,), 0.2)
+    probability = {"a": 0.3, FINITE: 0.2, "b": 0.0, "c": 0.0}
+    sets, after = linear_or_finite(given, probability, gain)
+    finite = 0.5 / (1 + 4 * np.exp(-gain / 2))
+    expected = {(): 0.5 - finite, ("a",): 0.3, (FINITE,): 0.2 + finite}
+    listed = {names: p for names, p in expected.items() if p >= 0.02}
+    assert dict(sets) == pytest.approx(listed)
+    shown = [p for _, p in sets]
+    assert shown == sorted(shown, reverse=True)
+    assert after == pytest.approx(probability | {FINITE: 0.2 + finite})
+
+
+def test_finite_motions_that_no_set_had_become_one():
+    sets, after = linear_or_finite((((), 1.0),), {}, 2 * log(3.0))
+    assert dict(sets) == pytest.approx({(): 0.25, (FINITE,): 0.75})
+    assert after == pytest.approx({FINITE: 0.75})
+
+
 VERDICTS = [
     ([((), 0.6), (("a",), 0.4)], {"a": 0.4}, False, "none_needed", ()),
     ([(("a",), 0.95), ((), 0.05)], {"a": 0.95}, False, "explained", ("a",)),
@@ -178,6 +209,17 @@ def test_a_calibration_counts_what_it_simulates(rng):
     assert tally.right == 1.0
     assert tally.without["none_needed"] >= 9
     assert tally.false_claims <= 1 / 20
+
+
+def test_every_claim_of_a_calibration_is_right_or_false(rng):
+    """An effect so faint that it is seen about every other time."""
+    signatures = made_up_effects(rng)
+    signal = signatures[2].columns @ [0.3, 0.25]
+    screen = Screen(signal + rng.normal(size=150), signatures)
+    tally = calibrate(screen, screen.fit((2,)), 20, lambda *done: None)
+    claims = tally.with_found["explained"] + tally.without.get("explained", 0)
+    assert tally.right * 20 + tally.false_claims * 40 == pytest.approx(claims)
+    assert 0.0 < tally.right < 1.0
 
 
 def test_a_calibration_without_effects_has_none_to_be_right_about(rng):

@@ -1,0 +1,227 @@
+"""Tests run in forks of one process, traced: which test passes which line."""
+
+import json
+import os
+import re
+import resource
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy, which numba imports
+
+import numba
+import pytest
+from coverage import Coverage, CoverageData
+
+from benchmarks.faults import CHAPTERS, ROOT, Fault
+
+PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
+BESIDE = ("tests/test_answers.py",)  # asked besides the chapters' own tests
+# of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
+UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
+UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
+MEMORY = 8 * 2**30  # [byte]
+PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
+
+
+class Run:
+    """Some tests in a fork of this process, on a tree."""
+
+    def __init__(self, tree: Path, uncompiled: bool, seconds: float) -> None:
+        self.tree, self.uncompiled, self.seconds = tree, uncompiled, seconds
+
+    def __call__(self, tests: list[str], plugins: tuple[Any, ...] = ()) -> str | None:
+        """The first test that fails, "" where none can be named; None if all pass."""
+        printed = self.tree.parent / "printed.txt"
+        child = os.fork()
+        if not child:
+            try:
+                os._exit(self._tested(tests, printed, plugins))
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(NONE_COLLECTED + 1)
+        _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status):
+            code = os.WEXITSTATUS(status)
+            if code in {PASSED, NONE_COLLECTED}:
+                return None
+            broken = "ImportError while loading conftest" in printed.read_text()
+            if code not in {FAILED, INTERRUPTED} and not broken:
+                raise RuntimeError(printed.read_text()[-2000:])
+        first = re.search(r"^(?:FAILED|ERROR) (\S+)", printed.read_text(), re.MULTILINE)
+        return first[1] if first else ""
+
+    def _tested(self, tests: list[str], printed: Path, plugins: tuple) -> int:
+        with printed.open("w") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        seconds = int(self.seconds)
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        os.chdir(self.tree)
+        os.environ |= {"PYTHONPATH": str(self.tree), "PYTHONDONTWRITEBYTECODE": "1"}
+        sys.dont_write_bytecode = True
+        sys.path.insert(0, str(self.tree))
+        words = ["-q", "-rfE", "-m", "not slow", "-p", "no:cacheprovider", "--tb=no"]
+        words += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+        if not plugins:
+            words.append("-x")
+        if self.uncompiled:
+            os.environ["NUMBA_DISABLE_JIT"] = "1"
+            numba.config.DISABLE_JIT = True
+            # loops divide by zero where they then look at what came out
+            words += ["-W", "ignore::RuntimeWarning"]
+        for plugin in plugins:
+            plugin.start()
+        code = pytest.main([*words, *tests], plugins=list(plugins))
+        for plugin in plugins:
+            plugin.stop()
+        return int(code)
+
+
+class Tracer:
+    """A plugin: lines that each test passes, and how long each test takes."""
+
+    def __init__(self, data: Path, limit: float | None) -> None:
+        self.data, self.limit = data, limit
+        self.seconds: dict[str, float] = {}
+
+    def start(self) -> None:
+        """Trace from here on."""
+        self.coverage = Coverage(str(self.data), source=list(PACKAGES))
+        self.coverage.start()
+
+    def stop(self) -> None:
+        """Write lines and seconds."""
+        self.coverage.stop()
+        self.coverage.save()
+        self.data.with_suffix(".json").write_text(json.dumps(self.seconds))
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+        """A context of its own for each test, fixtures included."""
+        self.coverage.switch_context(item.nodeid)
+        return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Any:
+        """The test ends where it takes too long."""
+
+        def end(*_: Any) -> None:
+            raise TimeoutError
+
+        if self.limit:
+            signal.signal(signal.SIGVTALRM, end)
+            signal.setitimer(signal.ITIMER_VIRTUAL, self.limit)
+        try:
+            return (yield)
+        finally:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Only a test that passes can see a fault."""
+        if report.when == "call" and report.passed:
+            self.seconds[report.nodeid] = report.duration
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Which tests pass a line, and seconds that each test takes."""
+
+    lines: CoverageData
+    seconds: dict[str, float]
+
+    def of(self, path: Path, rows: range | set[int]) -> set[str]:
+        """Tests that pass one of these rows of a file."""
+        # traced in one copy of the tree or another
+        files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
+        tests = {
+            test.partition("|")[0]
+            for passing in map(self.lines.contexts_by_lineno, files)
+            for row in rows
+            for test in passing.get(row, [])
+        }
+        return tests & self.seconds.keys()
+
+    def nearest(self, fault: Fault) -> list[str]:
+        """Tests that pass a fault, the nearest and shortest first."""
+        tests = self.of(fault.path, fault.rows)
+        if fault.name:
+            named = re.compile(rf"\b{fault.name}\b")
+            for path in (fault.path, *importers(fault.path)):
+                lines = (ROOT / path).read_text("utf-8").splitlines()
+                rows = {i for i, line in enumerate(lines, 1) if named.search(line)}
+                tests |= self.of(path, rows)
+        return sorted(tests, key=self.cost(fault))
+
+    def cost(self, fault: Fault) -> Callable[[str], float]:
+        """A test's seconds, less where it is nearer to a fault."""
+        near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
+
+        def cost(test: str) -> float:
+            seconds = self.seconds[test] + 0.01
+            if test.startswith(near):
+                return seconds / 10
+            if test.startswith(BESIDE):  # compare the most numbers
+                return seconds / 3
+            return (
+                seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
+            )
+
+        return cost
+
+
+def sources() -> Iterator[Path]:
+    """Files of the packages."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            yield path.relative_to(ROOT)
+
+
+def importers(path: Path) -> list[Path]:
+    """Files of the packages that import a file's names."""
+    module = ".".join(path.with_suffix("").parts)
+    text = re.compile(rf"^from {re.escape(module)} import", re.MULTILINE)
+    return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
+
+
+def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
+    """The default tests of each folder, traced, or what an earlier call left of them.
+
+    A folder of which a test has changed since is traced anew.
+    """
+    lines = CoverageData(no_disk=True)
+    seconds: dict[str, float] = {}
+    for folder in UNCOMPILED if uncompiled else places_of_tests():
+        name = "uncompiled" if uncompiled else "compiled"
+        data = kept / f"{name}.{folder.replace('/', '.')}.coverage"
+        times = data.with_suffix(".json")
+        changed = max((path.stat().st_mtime for path in tests_in(folder)), default=0.0)
+        if not times.exists() or times.stat().st_mtime < changed:
+            data.unlink(missing_ok=True)
+            tracer = Tracer(data, UNCOMPILED_SECONDS if uncompiled else None)
+            Run(tree, uncompiled, 7200)([folder], (tracer,))
+            print(f"traced {folder}, {name}", flush=True)
+        part = CoverageData(str(data))
+        part.read()
+        lines.update(part)
+        seconds |= json.loads(times.read_text())
+    return Trace(lines, seconds)
+
+
+def places_of_tests() -> list[str]:
+    """Folders of the tests that mirror a chapter, and what else is asked."""
+    mirrors = [f"tests/{chapter}" for chapter in CHAPTERS]
+    return [m for m in mirrors if any((ROOT / m).glob("test_*.py"))] + list(BESIDE)
+
+
+def tests_in(place: str) -> list[Path]:
+    """Python files of a folder of tests; of one file, those beside it."""
+    path = ROOT / place
+    return sorted(path.parent.glob("*.py") if path.is_file() else path.rglob("*.py"))

@@ -1,0 +1,28 @@
+"""Numbers as Fortran writes them: exponents without a letter, or with a D."""
+
+import re
+from pathlib import Path
+
+from forcefit.inputs.errors import BadInput, describe
+
+_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
+
+
+def real(path: Path | str, word: str) -> float:
+    """A number of a file.
+
+    Args:
+        path: for messages.
+        word: the number, with blanks around it or none.
+
+    Returns:
+        Its value.
+
+    Raises:
+        BadInput: it is no number.
+    """
+    match = _REAL.fullmatch(word.strip())
+    if not match:
+        raise BadInput(f"{path}: found {describe(word.strip())}, expected a number")
+    mantissa, exponent = match.groups()
+    return float(f"{mantissa}e{exponent or 0}")

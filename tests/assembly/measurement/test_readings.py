@@ -1,0 +1,112 @@
+"""What a device reads of a moved platform, by homogeneous transforms of SciPy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from assembly.kinematics.posture import Posture, place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict, read
+from assembly.model.robot import Frame, Robot
+
+ROWS = 5
+POINT = np.array([0.3, -0.4, 0.2])  # [m] platform axes
+
+
+@pytest.fixture
+def rows():
+    """An arm without springs at five configurations, far from its base."""
+    turning = {"joint": "revolute", "actuated": True}
+    robot = Robot("arm", "tool", (
+        Frame("one", translation=[0.5, -0.3, 0.4], rotation=[0.2, 0.3, 0], **turning),
+        Frame("two", "one", [0.6, 0.1, 0], [1.1, 0, 0.4], **turning),
+        Frame("tool", "two", [0.4, 0, 0.1], [0, 0.5, 0]),
+    ))  # fmt: skip
+    placed = [
+        place_robot(robot, joints={"one": 0.3 * k, "two": 1 - 0.5 * k})
+        for k in range(ROWS)
+    ]
+    return Posture(
+        robot, np.array([p.coordinates for p in placed]),
+        np.array([p.transforms for p in placed]), 0.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("own_targets", [False, True])
+@pytest.mark.parametrize("by_row", [False, True])
+def test_a_reading_is_that_of_rigid_bodies(rows, own_targets, by_row, rng):
+    """A device turned by 1 rad reads where a point of a turned platform is."""
+    count = (ROWS,) if by_row else ()
+    base, tool = rng.normal(size=(*count, 6)), rng.normal(size=(*count, 3))
+    target = rng.normal(size=(ROWS, 3)) if own_targets else None
+    here = replace(
+        as_declared(rows, point=POINT, target=target), base=base, tool=tool,
+        reading=rng.normal(size=(ROWS, 6)),
+    )  # fmt: skip
+    screws = 0.3 * rng.normal(size=(ROWS, 6))
+    seen = read(here, screws)
+    for k, T in enumerate(rows.platform):
+        at = POINT if target is None else target[k]
+        own, longer = (v[k] if by_row else v for v in (base, tool))
+        turn, device = (Rotation.from_rotvec(v[:3]) for v in (screws[k], own))
+        nominal = T[:3, 3] + T[:3, :3] @ at
+        moved = T[:3, 3] + screws[k, 3:] + turn.apply(T[:3, :3] @ (at + longer))
+        expected = np.concatenate([
+            (device * turn).as_rotvec(), device.apply(moved) + own[3:] - nominal
+        ])  # fmt: skip
+        assert seen[k] - here.reading[k] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_reading_of_any_of_three_kinds_is_not_the_pose_error(rows):
+    """Whatever of a device's frame, its tool and its own reading there is."""
+    here = as_declared(rows)
+    assert not here.reads_otherwise
+    for part in ("base", "tool", "reading"):
+        shape = {"base": 6, "tool": 3, "reading": (ROWS, 6)}[part]
+        some = np.zeros(shape)
+        some.flat[-1] = 1e-6
+        assert replace(here, **{part: some}).reads_otherwise, part
+
+
+def test_what_finite_motions_add_is_added_to_the_linear_model_alone(rows, rng):
+    added = 1e-3 * rng.normal(size=(ROWS, 6))
+    here = as_declared(rows)
+    linear = replace(here, second_order=added)
+    assert predict(linear).deviation == pytest.approx(added, abs=1e-12)
+    exact = predict(replace(linear, exact=True)).deviation
+    assert exact == pytest.approx(np.zeros((ROWS, 6)), abs=1e-12)
+
+
+def test_rows_taken_keep_what_is_theirs_and_what_all_share(rows, rng):
+    """Each array of rows by number and by mask; a base and a tool of all rows stay."""
+    some, mask = [3, 0], np.isin(np.arange(ROWS), [1, 4])
+    whole = as_declared(
+        rows, rng.normal(size=(ROWS, 6)), gravity=rng.normal(size=(ROWS, 3)),
+        target=rng.normal(size=(ROWS, 3)),
+        covariates={"temperature": rng.normal(size=ROWS), "dust": rng.normal(size=ROWS),
+                    "session": list("abcde")},
+    )  # fmt: skip
+    own = replace(whole, base=rng.normal(size=(ROWS, 6)), tool=rng.normal(size=3))
+    for chosen in (some, mask):
+        part = own.take(chosen)
+        numbers = np.arange(ROWS)[chosen]
+        for name in ("load", "gravity", "target", "temperature", "base", "transforms"):
+            expected = getattr(own, name)[numbers]
+            assert np.array_equal(getattr(part, name), expected), name
+        assert np.array_equal(part.covariates["dust"], own.covariates["dust"][numbers])
+        assert part.session.tolist() == [list("abcde")[k] for k in numbers]
+        assert np.array_equal(part.tool, own.tool)
+    assert np.array_equal(replace(whole, base=np.ones(6)).take(some).base, np.ones(6))
+
+
+def test_a_load_does_the_same_work_wherever_it_is_read(rows, rng):
+    """M . theta + F . t at the reference point and at the platform's origin."""
+    load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)
+    here = as_declared(rows, load, point=POINT)
+    moved = here.load_at_origin()
+    for k, T in enumerate(rows.platform):
+        at_point = screw.copy()
+        at_point[3:] += np.cross(screw[:3], T[:3, :3] @ POINT)
+        assert moved[k] @ screw == pytest.approx(load[k] @ at_point, rel=1e-12)
