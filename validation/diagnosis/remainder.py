@@ -36,7 +36,7 @@ from scipy.linalg.blas import dtrsm
 
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.blocks import Block, Blocks
-from validation.diagnosis.candidates import Candidate, CandidatePart, Sensitivities
+from validation.diagnosis.candidates import Candidate, Sensitivities
 from validation.diagnosis.evidence import Evidence, Prior, sizes_in_use
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
@@ -62,7 +62,7 @@ class Unexplained:
     effects: NDArray
 
     def scaled(self, prior: Prior, cells: NDArray, *further: NDArray) -> NDArray:
-        """(n, k) small columns in use, by a prior's sizes, in n cells, and further ones."""
+        """(n, k) small columns in use, by a prior's sizes, in n cells; and others."""
         size = sizes_in_use(self.terms, prior)
         width = len(size) + sum(columns.shape[1] for columns in further)
         scaled = np.empty((len(cells), width), order="F")
@@ -124,16 +124,9 @@ class Remainder:
         Returns:
             (len(candidates),) logarithms; -inf of what the readings do not see.
         """
-        alike: dict[tuple[str, tuple[CandidatePart, ...]], list[int]] = {}
-        for i, one in enumerate(candidates):
-            alike.setdefault((one.kind, one.parts), []).append(i)
         worths = np.empty(len(candidates))
-        # place by place: what a place does to the readings is made once
-        for kind, parts in sorted(alike, key=lambda at: (at[0], at[1][0].where)):
-            own = alike[kind, parts]
-            shapes = [candidates[i].shape for i in own]
-            blocks = self._blocks.at(kind, parts, shapes)
-            worths[own] = [self._worth(block) for block in blocks]
+        for i, block in self._blocks.of(candidates):
+            worths[i] = self._worth(block)
         return worths
 
     def _worth(self, block: Block) -> float:
@@ -175,9 +168,10 @@ class Remainder:
         return gain > _PROVEN * error
 
     def _beside(self, one: Candidate, order: NDArray) -> tuple[NDArray, int]:
-        """(N, k) columns of unknowns of size one, and how many are not the candidate's.
+        """Columns (N, k) of unknowns of size one, cells in some order.
 
-        Cells are in the order given.
+        Returns:
+            The columns, a candidate's last, and how many are not the candidate's.
         """
         B = in_cells(self.sensitivities, one, self.campaign)
         B = B[order] * self._likeliest(one, B)
@@ -191,7 +185,7 @@ class Remainder:
     def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:
         """(m,) likeliest sizes of a candidate's unknowns."""
         axis = self.sensitivities.axes(one)
-        (block,) = self._blocks.at(one.kind, one.parts, [one.shape])
+        ((_, block),) = self._blocks.of([one])
         gram = block.gram / self._noise**2
         evidence = Evidence([function_term("", axis, B)], self.count, gram)
         prior = evidence.best_of(block.along, self._squares)
@@ -236,7 +230,7 @@ def function_term(name: str, axis: NDArray, columns: NDArray) -> SmallTerm:
 
 
 def _foretold(X: NDArray, z: NDArray, ends: NDArray, known: int) -> NDArray:
-    """Squared errors of cells, fold by fold left out of a fit with unknowns of size one.
+    """Squared errors of cells by fits to other folds, with unknowns of size one.
 
     Args:
         X: (N, k) columns, fold after fold.

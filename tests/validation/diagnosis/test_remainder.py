@@ -74,6 +74,11 @@ def remainder(rng, noise=1.0, signal=0.0):
     return here, z, E, (J * size) @ (J * size).T
 
 
+def worth(here, B):
+    """Of columns B (N, m)."""
+    return here.worths([here.sensitivities.candidate(B)])[0]
+
+
 def test_worth_is_the_ratio_of_two_normal_densities():
     """Effects with a nearly flat prior; of the sizes tried, the best."""
     rng = np.random.default_rng(1)
@@ -88,7 +93,7 @@ def test_worth_is_the_ratio_of_two_normal_densities():
     expected = with_it - multivariate_normal.logpdf(z, cov=flat)
     assert expected > 3
     # what is left is less than sigma says, so that the noise is sigma
-    assert here.worths([here.sensitivities.candidate(B)])[0] == pytest.approx(expected, rel=1e-4)
+    assert worth(here, B) == pytest.approx(expected, rel=1e-4)
 
 
 def test_worths_do_not_hang_on_company():
@@ -108,18 +113,18 @@ def test_nothing_known_can_be_worth_anything():
     """What effects or small unknowns of any size do is no news."""
     rng = np.random.default_rng(3)
     here, _, E, _ = remainder(rng)
-    assert here.worths([here.sensitivities.candidate(E)])[0] == pytest.approx(0.0, abs=1e-4)
+    assert worth(here, E) == pytest.approx(0.0, abs=1e-4)
 
 
 def test_noise_beyond_sigma_makes_a_candidate_worth_less():
     """The same readings in a sigma three times as large: a ninth of the squares."""
-    worth = []
+    worths = []
     for noise in (1.0, 3.0):
         rng = np.random.default_rng(4)
         B = rng.normal(size=(CELLS, 2))
         here = remainder(rng, noise, signal=B @ [1.0, -1.0])[0]
-        worth.append(here.worths([here.sensitivities.candidate(B)])[0])
-    assert 0 < worth[1] < worth[0] / 2
+        worths.append(worth(here, B))
+    assert 0 < worths[1] < worths[0] / 2
 
 
 def test_what_acts_foretells_other_rows_and_noise_does_not():
