@@ -23,6 +23,7 @@ Sources:
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -249,14 +250,15 @@ class Evidence:
         asked = np.unique(group[group >= 0])
         shows = self._shows(mask)
 
-        def sizes(logs: NDArray) -> NDArray:
-            return np.where(group < 0, given, (shows * np.exp(logs))[group])
+        @lru_cache(maxsize=2)  # what a search ends with is asked for once more
+        def solved(some: bytes) -> tuple[NDArray, NDArray, float, NDArray]:
+            logs = np.zeros(len(shows))
+            logs[asked] = np.frombuffer(some)
+            s = np.where(group < 0, given, (shows * np.exp(logs))[group])
+            return s, *equations.solved(s)
 
         def against(some: NDArray) -> tuple[float, NDArray]:
-            logs = np.zeros(len(shows))
-            logs[asked] = some
-            s = sizes(logs)
-            x, log, inverse = equations.solved(s)
+            s, x, log, inverse = solved(some.tobytes())
             slope = x**2 - (1 - inverse)
             value = 0.5 * (squares - float(x @ (s * b))) + log
             return value, -np.array([slope[group == g].sum() for g in asked])
@@ -273,8 +275,7 @@ class Evidence:
                 against, begin, jac=True, method="L-BFGS-B", bounds=bounds,
                 options=options,
             ).x  # fmt: skip
-        s = sizes(logs)
-        x, cost, _ = equations.solved(s)
+        s, x, cost, _ = solved(logs[asked].tobytes())
         values = np.zeros(len(mask))
         values[mask] = s * x
         evidence = -0.5 * (squares - float(x @ (s * b)))

@@ -243,22 +243,22 @@ def _foretold(X: NDArray, z: NDArray, ends: NDArray, known: int) -> NDArray:
     """
     folds = [slice(begin, end) for begin, end in pairwise(ends.tolist())]
     grams = [X[fold].T @ X[fold] for fold in folds]
-    everywhere = X.T @ z
+    gram, everywhere = sum(grams[1:], start=grams[0]), X.T @ z
     squares = np.zeros((2, len(z)))
-    for k, fold in enumerate(folds):
-        A = np.sum(grams[:k] + grams[k + 1 :], axis=0)
+    for fold, own in zip(folds, grams, strict=True):
+        A = gram - own
         A[np.diag_indices(len(A))] += 1.0
         L = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
         wanted = everywhere - X[fold].T @ z[fold]
         x = np.zeros((2, len(A)))
-        for own, count in zip(x, (known, len(A)), strict=True):
-            own[:count] = _by_factor(L[:count, :count], wanted[:count])
+        for count, part in zip((known, len(A)), x, strict=True):
+            part[:count] = _by_factor(L[:count, :count], wanted[:count])
         # a second time: products of columns lose what nearly equal ones tell
         left = z - x @ X.T
         left[:, fold] = 0.0
         wanted = left @ X - x
-        for own, more, count in zip(x, wanted, (known, len(A)), strict=True):
-            own[:count] += _by_factor(L[:count, :count], more[:count])
+        for count, part, more in zip((known, len(A)), x, wanted, strict=True):
+            part[:count] += _by_factor(L[:count, :count], more[:count])
         squares[:, fold] = (z[fold] - x @ X[fold].T) ** 2
     return squares
 
