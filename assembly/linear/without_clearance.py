@@ -209,6 +209,10 @@ def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
         if len(names) * most > _PADDING * len(own):
             return np.einsum("rij,rj->ri", matrices[posture], vectors)
         used = matrices if len(names) == len(matrices) else matrices[names]
+        if most == 1:
+            products = np.empty((len(own), matrices.shape[1]))
+            products[order] = (used @ vectors[order][:, :, None])[..., 0]
+            return products
         together = np.zeros((len(names), most, vectors.shape[1]))
         together[own, place] = vectors
         return (together @ np.swapaxes(used, 1, 2))[own, place]

@@ -61,7 +61,8 @@ class Background:
         if not len(self.gains):
             return columns
         shrink = 1 - 1 / np.sqrt(1 + self.gains)
-        return columns - self.axes @ (shrink * (self.axes.T @ columns).T).T
+        away = self.axes @ (shrink * (self.axes.T @ columns).T).T
+        return np.subtract(columns, away, out=away)
 
     def raw(self, whitened: NDArray) -> NDArray:
         """A residual r (N,) from W r."""

@@ -113,7 +113,8 @@ class _School:
 
     def without_effects(self, columns: NDArray) -> NDArray:
         """Columns without what effects can do."""
-        return columns - self._Q @ (self._Q.T @ columns)
+        shown = self._Q @ (self._Q.T @ columns)
+        return np.subtract(columns, shown, out=shown)
 
     def _add(self, term: SmallTerm) -> None:
         """One small term more."""
