@@ -74,14 +74,16 @@ class Posture:
     @cached_property
     def paths(self) -> NDArray:
         """(..., n, 6, 6) maps from screws at each frame to the platform, base axes."""
-        offsets = self.transforms[..., :3, 3] - self.platform[..., None, :3, 3]
-        return screw_map(offsets, self.transforms[..., :3, :3])
+        platform = self.robot.index(self.robot.platform)
+        if self.transforms.ndim > 3:
+            return _paths(Unchanged(self.transforms), platform)
+        return _maps_to(self.transforms, platform)
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
         """Of R postures the c distinct ones, and (R,) which of them each is."""
         coordinates, transforms, which = _distinct(
-            _Array(self.coordinates), _Array(self.transforms)
+            Unchanged(self.coordinates), Unchanged(self.transforms)
         )
         distinct = replace(self, coordinates=coordinates, transforms=transforms)
         return distinct, which
@@ -92,21 +94,35 @@ class Posture:
 
 
 @dataclass(frozen=True)
-class _Array:
+class Unchanged:
     """An array that nobody changes, so that what is made of it is made once."""
 
     numbers: NDArray
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Array) and other.numbers is self.numbers
+        return isinstance(other, Unchanged) and other.numbers is self.numbers
 
     def __hash__(self) -> int:
         return id(self.numbers)
 
 
+def _maps_to(transforms: NDArray, platform: int) -> NDArray:
+    """(..., n, 6, 6) maps from screws at each frame to one of them, base axes."""
+    offsets = transforms[..., :3, 3] - transforms[..., platform, None, :3, 3]
+    return screw_map(offsets, transforms[..., :3, :3])
+
+
+@lru_cache(maxsize=2)
+def _paths(transforms: Unchanged, platform: int) -> NDArray:
+    """The same of many postures, once for all robots that stand there."""
+    paths = _maps_to(transforms.numbers, platform)
+    paths.flags.writeable = False
+    return paths
+
+
 @lru_cache(maxsize=8)
 def _distinct(
-    coordinates: _Array, transforms: _Array
+    coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Rows with distinct coordinates of both, and which of them each row has."""
     q = coordinates.numbers
@@ -115,7 +131,7 @@ def _distinct(
 
 
 @lru_cache(maxsize=8)
-def _digest(array: _Array) -> bytes:
+def _digest(array: Unchanged) -> bytes:
     """Of an array's numbers."""
     return blake2b(np.ascontiguousarray(array.numbers).tobytes()).digest()
 
@@ -145,7 +161,7 @@ def content_of(
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
         digest.update(np.ascontiguousarray(array).tobytes())
-    digest.update(_digest(_Array(postures.transforms)))
+    digest.update(_digest(Unchanged(postures.transforms)))
     return Content(digest.digest(), postures, arrays)
 
 

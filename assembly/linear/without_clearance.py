@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
-from assembly.kinematics.posture import Content, Posture, content_of
+from assembly.kinematics.posture import Content, Posture, Unchanged, content_of
 from assembly.linear.closure import closure_signs, virtual_joints
 from assembly.linear.load import FrameLoads
 from assembly.linear.thresholds import RANK
@@ -87,10 +87,8 @@ class Flexibility:
         Returns:
             The assemblies; rows where :attr:`FlexibleAssembly.solved` is false are not.
         """
-        unclosed = errors
-        if loads:
-            unclosed = errors + _each(self.body_compliances, loads.body)
-            unclosed += _each(self.joint_compliances, loads.joint)
+        under_load = _under_load(self, loads)
+        unclosed = errors if under_load is None else errors + under_load
         J, size, times = self.rows, self.softness, at_postures(posture)
         if not self.system.size:  # an open chain
             return FlexibleAssembly(
@@ -172,6 +170,17 @@ class FlexibleAssembly:
     solved: NDArray
 
 
+@lru_cache(maxsize=4)
+def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
+    """(R, 6n) screws of bodies and joints under loads alone, nothing closed."""
+    # the same for all conditions that differ in errors alone
+    if not loads:
+        return None
+    screws = _each(flexible.body_compliances, loads.body)
+    screws += _each(flexible.joint_compliances, loads.joint)
+    return screws
+
+
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     """Product of the matrices of postures with vectors of rows at these postures.
 
@@ -183,6 +192,13 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     Returns:
         A function of matrices (c, a, b) and vectors (R, b) that gives (R, a).
     """
+    return _at_postures(Unchanged(posture))
+
+
+@lru_cache(maxsize=8)
+def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
+    """The same, once for the same rows."""
+    posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
     place = np.empty_like(order)  # of a row among those of its posture
@@ -193,6 +209,10 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
         if len(names) * most > _PADDING * len(own):
             return np.einsum("rij,rj->ri", matrices[posture], vectors)
         used = matrices if len(names) == len(matrices) else matrices[names]
+        if most == 1:
+            products = np.empty((len(own), matrices.shape[1]))
+            products[order] = (used @ vectors[order][:, :, None])[..., 0]
+            return products
         together = np.zeros((len(names), most, vectors.shape[1]))
         together[own, place] = vectors
         return (together @ np.swapaxes(used, 1, 2))[own, place]

@@ -161,13 +161,16 @@ class Conditions:
     def measured_arms(self) -> NDArray:
         """(R, 3) [m] from the platform's nominal origin to the points measured."""
         at = self.point if self.target is None else self.target
+        if not at.any():
+            return np.zeros((len(self), 3))
         return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
 
     def load_at_origin(self) -> NDArray:
         """(R, 6) [N m, N] the load read at the platform's origin, base axes."""
-        arm = self.postures.platform[:, :3, :3] @ self.point
         moved = self.load.copy()
-        moved[:, :3] += np.cross(arm, self.load[:, 3:])
+        if self.point.any():
+            arm = self.postures.platform[:, :3, :3] @ self.point
+            moved[:, :3] += np.cross(arm, self.load[:, 3:])
         return moved
 
     def take(self, rows: ArrayLike) -> "Conditions":

@@ -89,7 +89,9 @@ def predict(conditions: Conditions) -> Prediction:
         screws = screws + conditions.second_order
     known = np.isfinite(screws).all(axis=1)
     deviation = np.full_like(screws, np.nan)
-    if known.any():
+    if known.all():
+        deviation = read(conditions, screws)
+    elif known.any():
         deviation[known] = read(conditions.take(known), screws[known])
     return Prediction(deviation, reason, undetermined)
 
@@ -246,7 +248,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     R, p = platform[:, :3, :3], platform[:, :3, 3]
     turn = rotation_matrix(screws[:, :3])
     arm = conditions.measured_arms
-    tool = _turned(R, conditions.tool)
+    tool = _turned(R, conditions.tool) if conditions.tool.any() else 0.0
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
@@ -260,7 +262,9 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
     """(R, 3) vectors turned by one matrix, or each by its own."""
-    return (R @ vectors[..., None])[..., 0]
+    if R.ndim == 2:
+        return vectors @ R.T
+    return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
 
 
 def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:

@@ -61,7 +61,8 @@ class Background:
         if not len(self.gains):
             return columns
         shrink = 1 - 1 / np.sqrt(1 + self.gains)
-        return columns - self.axes @ (shrink * (self.axes.T @ columns).T).T
+        away = self.axes @ (shrink * (self.axes.T @ columns).T).T
+        return np.subtract(columns, away, out=away)
 
     def raw(self, whitened: NDArray) -> NDArray:
         """A residual r (N,) from W r."""
@@ -150,8 +151,12 @@ def background(terms: Sequence[SmallTerm], prior: Prior) -> Background:
     if not kept:
         return NOTHING
     size = np.concatenate([sizes_of(term, prior.scales[term.name]) for term in kept])
-    scaled = np.hstack([term.columns for term in kept])
-    scaled *= size
+    scaled = np.empty((len(kept[0].columns), len(size)), order="F")
+    ends = np.cumsum([len(term) for term in kept])[:-1]
+    for part, own, term in zip(
+        np.split(scaled, ends, axis=1), np.split(size, ends), kept, strict=True
+    ):
+        np.multiply(term.columns, own, out=part)
     gains, turn = np.linalg.eigh(scaled.T @ scaled)
     shown = gains > _FAINT
     gains, turn = gains[shown], turn[:, shown]

@@ -13,6 +13,9 @@ b       ``along``        (k,)    J'z
 M                        (k, k)  I + S G S; z' C^-1 z = z'z - b'S M^-1 S b
 ======  ===============  ======  =====================================================
 
+Unknowns of one size may be any orthonormal combinations of those asked for: their part
+of G may be made diagonal beforehand, and is then eliminated at little cost.
+
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
 """
@@ -20,13 +23,14 @@ Sources:
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotrs, dtrtri
 from scipy.optimize import minimize
 
+from validation.diagnosis.equations import Equations
 from validation.diagnosis.small_terms import SmallTerm
 
 _PASSES = 6  # of leaving out springs that would be stiffer than declared
@@ -85,6 +89,7 @@ class Evidence:
         self._most = np.array([size for t in terms for size in t.most])
         self._given = np.concatenate([np.zeros(0), *(t.given for t in terms)])
         self._gram = gram_of([t.columns for t in terms]) if gram is None else gram
+        self._apart = _largest_diagonal(self._gram, self._group)
 
     def best(self, residual: NDArray) -> Prior:
         """The terms that a residual asks for, with their likeliest sizes.
@@ -136,15 +141,15 @@ class Evidence:
     ) -> float:
         """About the evidence of a choice, at the sizes of another one near to it."""
         mask = np.concatenate([np.zeros(0, bool), *self._of(chosen, near)])
-        G, b = self._gram[np.ix_(mask, mask)], along[mask]
         group, given = self._group[mask], self._given[mask]
-        known, shows = self._scales(near), self._shows(G, group)
+        known, shows = self._scales(near), self._shows(mask)
+        equations, b = self._equations(mask, along), along[mask]
         evidence = -np.inf
         for log in _GLANCES:
             new = np.minimum(shows * np.exp(log), self._most)
             scales = np.where(np.isfinite(known), known, new)
             s = np.where(group < 0, given, scales[group])
-            x, cost, _ = _solved(G, s, b)
+            x, cost, _ = equations.solved(s)
             evidence = max(evidence, -0.5 * (squares - float(x @ (s * b))) - cost)
         return evidence
 
@@ -162,13 +167,18 @@ class Evidence:
             s for t in self.terms for s in prior.scales.get(t.name, unknown)
         ])
 
-    def _shows(self, G: NDArray, group: NDArray) -> NDArray:
-        """Sizes that show as much as noise does, by group of unknowns."""
-        shows = np.ones(2 * len(self.terms))
-        for g in np.unique(group[group >= 0]):
-            shown = float(np.mean(np.diag(G)[group == g]))
+    def _shows(self, mask: NDArray) -> NDArray:
+        """Sizes that show as much as noise does, by group of the unknowns in use."""
+        shows, squares = np.ones(2 * len(self.terms)), np.diag(self._gram)
+        for g in np.unique(self._group[mask & (self._group >= 0)]):
+            shown = float(np.mean(squares[mask & (self._group == g)]))
             shows[g] = 1 / np.sqrt(shown) if shown else 1.0
         return shows
+
+    def _equations(self, mask: NDArray, along: NDArray) -> Equations:
+        """Of the unknowns in use."""
+        G, apart = self._gram, self._apart[mask]
+        return Equations(G[np.ix_(mask, mask)], along[mask], apart)
 
     @property
     def always(self) -> bool:
@@ -195,7 +205,7 @@ class Evidence:
         values = np.zeros(len(mask))
         if not len(size):
             return values, 0.0
-        x, _, inverse = _solved(self._gram[np.ix_(mask, mask)], size, along[mask])
+        x, _, inverse = self._equations(mask, along).solved(size)
         values[mask] = size * x
         return values, float(len(size) - inverse.sum())
 
@@ -235,19 +245,20 @@ class Evidence:
             The prior, (k,) values of all unknowns, and all sizes.
         """
         mask = np.concatenate([np.zeros(0, bool), *used])
-        G, b = self._gram[np.ix_(mask, mask)], along[mask]
+        equations, b = self._equations(mask, along), along[mask]
         group, given = self._group[mask], self._given[mask]
         asked = np.unique(group[group >= 0])
-        shows = self._shows(G, group)
+        shows = self._shows(mask)
 
-        def sizes(logs: NDArray) -> NDArray:
-            return np.where(group < 0, given, (shows * np.exp(logs))[group])
+        @lru_cache(maxsize=2)  # what a search ends with is asked for once more
+        def solved(some: bytes) -> tuple[NDArray, NDArray, float, NDArray]:
+            logs = np.zeros(len(shows))
+            logs[asked] = np.frombuffer(some)
+            s = np.where(group < 0, given, (shows * np.exp(logs))[group])
+            return s, *equations.solved(s)
 
         def against(some: NDArray) -> tuple[float, NDArray]:
-            logs = np.zeros(len(shows))
-            logs[asked] = some
-            s = sizes(logs)
-            x, log, inverse = _solved(G, s, b)
+            s, x, log, inverse = solved(some.tobytes())
             slope = x**2 - (1 - inverse)
             value = 0.5 * (squares - float(x @ (s * b))) + log
             return value, -np.array([slope[group == g].sum() for g in asked])
@@ -264,8 +275,7 @@ class Evidence:
                 against, begin, jac=True, method="L-BFGS-B", bounds=bounds,
                 options=options,
             ).x  # fmt: skip
-        s = sizes(logs)
-        x, cost, _ = _solved(G, s, b)
+        s, x, cost, _ = solved(logs[asked].tobytes())
         values = np.zeros(len(mask))
         values[mask] = s * x
         evidence = -0.5 * (squares - float(x @ (s * b)))
@@ -301,20 +311,14 @@ def gram_of(blocks: Sequence[NDArray]) -> NDArray:
     return gram
 
 
-def _solved(
-    G: NDArray, size: NDArray, along: NDArray
-) -> tuple[NDArray, float, NDArray]:
-    """M^-1 S b (k,), ln det M / 2, and the diagonal of M^-1 (k,)."""
-    if not len(G):
-        return np.zeros(0), 0.0, np.zeros(0)
-    M = G * np.outer(size, size)
-    M[np.diag_indices(len(M))] += 1.0
-    # M is symmetric, so that its transpose is in the order that the routines take
-    factor, failed = dpotrf(M.T, lower=True, overwrite_a=True)
-    if failed:
-        raise np.linalg.LinAlgError("sizes beyond what rounding allows")
-    log = float(np.log(np.diag(factor)).sum())
-    x, _ = dpotrs(factor, size * along, lower=True)
-    # M^-1 = L^-T L^-1: its diagonal takes half of the work of the whole of it
-    inverse, _ = dtrtri(factor, lower=True, overwrite_c=True)
-    return x, log, np.einsum("ij,ij->j", inverse, inverse)
+def _largest_diagonal(gram: NDArray, group: NDArray) -> NDArray:
+    """(k,) bool, the largest group of unknowns whose products are diagonal, if any."""
+    largest = np.zeros(len(group), dtype=bool)
+    for g in np.unique(group[group >= 0]):
+        own = np.flatnonzero(group == g)
+        if len(own) > max(1, int(largest.sum())):
+            block = gram[np.ix_(own, own)]
+            if np.count_nonzero(block) == np.count_nonzero(np.diag(block)):
+                largest[:] = False
+                largest[own] = True
+    return largest

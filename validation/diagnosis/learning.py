@@ -39,6 +39,7 @@ _REFINED = 16  # places and variables for which every form is tried
 _SURE = 3.0  # in score: what a function must be worth
 _SPLINE = 3.0  # in score: by which a form without a name must be better
 _EQUAL = 3.0  # in score: places that do as well
+_LARGE = 100  # unknowns of one size, from which turning them pays
 _NOISE = 0.05  # probability above which what is left is noise
 
 
@@ -100,7 +101,9 @@ class _School:
         self._free = self.without_effects(left.residual)
         self.terms: list[SmallTerm] = []
         self.learned: list[Learned] = []
-        # inner products of all columns without effects, and of the residual with them
+        # inner products of all columns without effects, and of the residual with them;
+        # many unknowns of one size are turned so that their own are diagonal
+        self._turns: list[NDArray | None] = []
         self._gram, self._along = np.zeros((0, 0)), np.zeros(0)
         for term in left.terms:
             self._add(term)
@@ -110,15 +113,24 @@ class _School:
 
     def without_effects(self, columns: NDArray) -> NDArray:
         """Columns without what effects can do."""
-        return columns - self._Q @ (self._Q.T @ columns)
+        shown = self._Q @ (self._Q.T @ columns)
+        return np.subtract(columns, shown, out=shown)
 
     def _add(self, term: SmallTerm) -> None:
         """One small term more."""
         own = self.without_effects(term.columns)
-        across = [other.columns.T @ own for other in self.terms]
+        across = [
+            _turned(turn, other.columns.T @ own)
+            for other, turn in zip(self.terms, self._turns, strict=True)
+        ]
         beside = np.vstack([np.zeros((0, len(term))), *across])
-        self._gram = np.block([[self._gram, beside], [beside.T, own.T @ own]])
-        self._along = np.append(self._along, own.T @ self._free)
+        gram, along, turn = own.T @ own, own.T @ self._free, None
+        if np.isneginf(term.lower) and (term.group >= 0).all():
+            gram, turn = _diagonal(gram, term.group)
+        beside = _turned(turn, beside.T).T
+        self._gram = np.block([[self._gram, beside], [beside.T, gram]])
+        self._along = np.append(self._along, _turned(turn, along))
+        self._turns.append(turn)
         self.terms.append(term)
 
     def update(self) -> None:
@@ -133,8 +145,8 @@ class _School:
             ends = np.cumsum([len(term) for term in self.terms])
             parts = np.split(values, ends[:-1]) if self.terms else []
             shown = np.zeros_like(self._free)
-            for term, x in zip(self.terms, parts, strict=True):
-                shown += term.columns @ x
+            for term, x, turn in zip(self.terms, parts, self._turns, strict=True):
+                shown += term.columns @ (x if turn is None else turn @ x)
             left = self._free - self.without_effects(shown)
             freedom = len(left) - self.effects.shape[1] - self.unknowns
             self.left = float(left @ left)
@@ -174,6 +186,30 @@ class _School:
     def done(self) -> bool:
         """Whether what is left is noise."""
         return float(chi2.sf(self.left, self.freedom)) > _NOISE
+
+
+def _turned(turn: NDArray | None, columns: NDArray) -> NDArray:
+    """Products (k,) or (k, m) with columns that are turned, from those with columns."""
+    return columns if turn is None else turn.T @ columns
+
+
+def _diagonal(gram: NDArray, group: NDArray) -> tuple[NDArray, NDArray | None]:
+    """Products (k, k) of columns turned so that those of large groups are diagonal.
+
+    Returns:
+        Products, and by what (k, k) columns are turned; none where groups are small.
+    """
+    own = [np.flatnonzero(group == g) for g in np.unique(group)]
+    large = [rows for rows in own if len(rows) >= _LARGE]
+    if not large:
+        return gram, None
+    turn = np.eye(len(gram))
+    for rows in large:
+        turn[np.ix_(rows, rows)] = np.linalg.eigh(gram[np.ix_(rows, rows)])[1]
+    turned = turn.T @ gram @ turn
+    for rows in large:
+        turned[np.ix_(rows, rows)] = np.diag(np.diag(turned)[rows])
+    return turned, turn
 
 
 def learn(

@@ -5,7 +5,7 @@ Sources:
     (Broyden's update of slopes).
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -281,21 +281,27 @@ def _refit(
         effects: dict[str, Values] = dict(_public(members, x, conditions.robot))
         return apply_effects(conditions, effects)
 
-    @lru_cache(maxsize=2)  # for the slopes, which are taken where the residual was
-    def left_at(scaled: bytes) -> NDArray:
-        x = np.frombuffer(scaled) * size
-        model = whiten(campaign, predict(there(x)).deviation)
-        return behind.whitened(np.where(np.isfinite(model), measured - model, _LOST))
+    def raw_at(scaled: NDArray) -> NDArray:
+        model = whiten(campaign, predict(there(scaled * size)).deviation)
+        return np.where(np.isfinite(model), measured - model, _LOST)
 
-    def slopes(scaled: NDArray, asked: Iterable[int]) -> NDArray:
-        middle = left_at(scaled.tobytes())
-        columns = [np.zeros((len(middle), 0))]
-        for k in asked:
+    @lru_cache(maxsize=2)  # for the slopes, which are taken where the residual was
+    def both_at(scaled: bytes) -> tuple[NDArray, NDArray]:
+        raw = raw_at(np.frombuffer(scaled))
+        return raw, behind.whitened(raw)
+
+    def left_at(scaled: NDArray) -> NDArray:
+        return both_at(scaled.tobytes())[1]
+
+    def slopes(scaled: NDArray, asked: Sequence[int]) -> NDArray:
+        middle, _ = both_at(scaled.tobytes())
+        columns = np.empty((len(middle), len(asked)))
+        for column, k in zip(columns.T, asked, strict=True):
             moved = scaled.copy()
             step = _STEP if (moved[k] + _STEP) * size[k] <= upper[k] else -_STEP
             moved[k] += step
-            columns.append((left_at(moved.tobytes()) - middle)[:, None] / step)
-        return np.hstack(columns)
+            column[:] = (raw_at(moved) - middle) / step
+        return behind.whitened(columns)  # all at once: it reads many columns
 
     scaled = np.clip(x0 / size, lower / size, upper / size)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -317,8 +323,8 @@ def _refit(
         before = float(first @ first)
         while len(seen):
             fitted = least_squares(
-                lambda x: left_at(with_seen(x).tobytes()), scaled[seen],
-                jac=_Secants(lambda x: left_at(with_seen(x).tobytes()), J[:, seen]),
+                lambda x: left_at(with_seen(x)), scaled[seen],
+                jac=_Secants(lambda x: left_at(with_seen(x)), J[:, seen]),
                 bounds=bounds, max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED,
                 gtol=1e-10, x_scale="jac",
             )  # fmt: skip
@@ -326,11 +332,11 @@ def _refit(
             if before - 2 * fitted.cost <= _CONVERGED * before:
                 break
             before = 2 * fitted.cost
-            J[:, seen] = slopes(scaled, seen)
+            J[:, seen] = slopes(scaled, seen.tolist())
     J /= size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))
     scale[scale == 0] = 1.0
     C = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-12, hermitian=True)
-    x, residual = scaled * size, left_at(scaled.tobytes())
+    x, residual = scaled * size, left_at(scaled)
     C = C / np.outer(scale, scale)
     return Fit(tuple(members), x, C, residual, there(x), -J)

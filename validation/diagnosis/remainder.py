@@ -8,9 +8,9 @@ symbol  code             shape   meaning
 ======  ===============  ======  =====================================================
 Q                        (N, e)  orthonormal basis of what effects can do
 S                        (N, k)  small columns without that, times their sizes
-Y       ``_known``       (N, p)  Q and S L^-T with L L' = I + S'S, so that what counts
+Y                        (N, p)  Q and S L^-T with L L' = I + S'S, so that what counts
                                  of columns B is B'P B with P = I - Y Y'
-b       ``_left``        (N,)    P z
+b       ``held``         (N,)    P z
 ======  ===============  ======  =====================================================
 
 A block of m columns with a prior of one size t is then worth, in logarithms of
@@ -25,8 +25,9 @@ Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.linalg.blas import dtrsm
 
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.blocks import Block, Blocks
 from validation.diagnosis.candidates import Candidate, Sensitivities
 from validation.diagnosis.evidence import Evidence, Prior, sizes_in_use
 from validation.diagnosis.holdout import blocks_of, gain_over_blocks
@@ -43,7 +45,6 @@ _FOLDS = 5
 _PROVEN = 2.0  # standard errors by which a fold's rows must be foretold better
 _FLAT = 1e4  # [sigma] size of unknowns of effects in a fold
 _SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # of a block, where its columns have norm 1
-_AT_ONCE = 500  # columns, so that they are multiplied together and memory stays small
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +61,19 @@ class Unexplained:
     residual: NDArray
     effects: NDArray
 
-    def scaled(self, prior: Prior, cells: NDArray) -> NDArray:
-        """(n, k) small columns in use, by a prior's sizes, in a mask's n cells."""
+    def scaled(self, prior: Prior, cells: NDArray, *further: NDArray) -> NDArray:
+        """(n, k) small columns in use, by a prior's sizes, in n cells; and others."""
         size = sizes_in_use(self.terms, prior)
-        scaled = np.empty((int(cells.sum()), len(size)), order="F")
+        width = len(size) + sum(columns.shape[1] for columns in further)
+        scaled = np.empty((len(cells), width), order="F")
         at = 0
         for term, used in zip(self.terms, prior.used, strict=True):
             for k in np.flatnonzero(used):
-                scaled[:, at] = term.columns[cells, k] * size[at]
+                np.multiply(term.columns[cells, k], size[at], out=scaled[:, at])
                 at += 1
+        for columns in further:
+            scaled[:, at : at + columns.shape[1]] = columns
+            at += columns.shape[1]
         return scaled
 
 
@@ -95,7 +100,7 @@ class Remainder:
         self._prior, self._noise = prior, noise
         Q = np.linalg.qr(left.effects[cells])[0]
 
-        small = left.scaled(prior, cells)
+        small = left.scaled(prior, np.flatnonzero(cells))
         small -= Q @ (Q.T @ small)
         small /= noise
         M = small.T @ small
@@ -104,11 +109,11 @@ class Remainder:
             L = cholesky(M, lower=True, overwrite_a=True, check_finite=False)
             # in place: small columns are most of what there is
             small = dtrsm(1.0, L, small, side=1, lower=1, trans_a=1, overwrite_b=1)
-        self._known = Q, small
         z = left.residual[cells]
         z = z - Q @ (Q.T @ z)
-        self._left = (z - small @ (small.T @ z)) / noise**2
-        self._squares = float(z @ self._left)
+        held = (z - small @ (small.T @ z)) / noise**2
+        self._squares = float(z @ held)
+        self._blocks = Blocks(campaign, sensitivities, (Q, small), held)
 
     def worths(self, candidates: Sequence[Candidate]) -> NDArray:
         """How much likelier each candidate makes the readings.
@@ -119,40 +124,17 @@ class Remainder:
         Returns:
             (len(candidates),) logarithms; -inf of what the readings do not see.
         """
-        worths: list[float] = []
-        for blocks in self._together(candidates):
-            every = self._along(np.hstack(blocks))
-            ends = np.cumsum([block.shape[1] for block in blocks])
-            for block, Y in zip(
-                blocks, np.split(every, ends[:-1], axis=1), strict=True
-            ):
-                worths.append(self._worth(block, block.T @ block - Y.T @ Y))
-        return np.array(worths)
+        worths = np.empty(len(candidates))
+        for i, block in self._blocks.of(candidates):
+            worths[i] = self._worth(block)
+        return worths
 
-    def _along(self, columns: NDArray) -> NDArray:
-        """(p, m) Y' times columns (N, m)."""
-        return np.vstack([known.T @ columns for known in self._known])
-
-    def _together(self, candidates: Sequence[Candidate]) -> Iterator[list[NDArray]]:
-        """Columns of candidates, some hundred at once."""
-        blocks, width = [], 0
-        for one in candidates:
-            block = in_cells(self.sensitivities, one, self.campaign)
-            blocks.append(block)
-            width += block.shape[1]
-            if width > _AT_ONCE:
-                yield blocks
-                blocks, width = [], 0
-        if blocks:
-            yield blocks
-
-    def _worth(self, block: NDArray, gram: NDArray) -> float:
-        """What columns (N, m) with products (m, m) beside what is known are worth."""
-        size = np.sqrt(np.einsum("nm,nm->m", block, block).max(initial=0.0))
-        if size == 0.0:
+    def _worth(self, block: Block) -> float:
+        """What a block of columns is worth beside what is known."""
+        if block.size == 0.0:
             return -np.inf
-        values, vectors = np.linalg.eigh(gram / (size * self._noise) ** 2)
-        along = (vectors.T @ (block.T @ self._left) / size) ** 2
+        values, vectors = np.linalg.eigh(block.gram / (block.size * self._noise) ** 2)
+        along = (vectors.T @ block.along / block.size) ** 2
         t = (_SIZES[:, None] * self._noise) ** 2
         grown = 1 + t * np.maximum(values, 0.0)
         left = self._squares - (along * t / grown).sum(axis=1)
@@ -173,32 +155,40 @@ class Remainder:
         """
         where = blocks_of(self.campaign)[0][np.nonzero(self.campaign.cells)[0]]
         names = np.random.default_rng(1).permutation(np.unique(where))
-        B = in_cells(self.sensitivities, one, self.campaign)
-        size = self._likeliest(one, B)
         if len(names) < 2:
             return False
-        effects = self._all.effects[self._cells]
+        folds = np.array_split(names, min(_FOLDS, len(names)))
+        parts = [np.flatnonzero(np.isin(where, fold)) for fold in folds]
+        order = np.concatenate(parts)  # fold after fold: each is a slice
+        X, known = self._beside(one, order)
+        z = self._all.residual[self._cells][order]
+        ends = np.cumsum([0, *map(len, parts)])
+        without, beside = _foretold(X, z, ends, known) / self._noise**2
+        gain, error = gain_over_blocks(without, beside, where[order])
+        return gain > _PROVEN * error
+
+    def _beside(self, one: Candidate, order: NDArray) -> tuple[NDArray, int]:
+        """Columns (N, k) of unknowns of size one, cells in some order.
+
+        Returns:
+            The columns, a candidate's last, and how many are not the candidate's.
+        """
+        B = in_cells(self.sensitivities, one, self.campaign)
+        B = B[order] * self._likeliest(one, B)
+        cells = np.flatnonzero(self._cells)[order]
+        effects = self._all.effects[cells]
         norm = np.linalg.norm(effects, axis=0)
         flat = effects * (_FLAT / np.where(norm > 0, norm, 1.0))
-        X = np.hstack([flat, self._all.scaled(self._prior, self._cells), B * size])
-        known = X.shape[1] - len(size)
-        z = self._all.residual[self._cells]
-        gram = X.T @ X
-        squares = np.zeros((2, len(where)))
-        for fold in np.array_split(names, min(_FOLDS, len(names))):
-            kept = np.isin(where, fold)
-            squares[:, kept] = _foretold(X, z, gram, kept, known)
-        without, beside = squares / self._noise**2
-        gain, error = gain_over_blocks(without, beside, where)
-        return gain > _PROVEN * error
+        X = self._all.scaled(self._prior, cells, flat, B)
+        return X, X.shape[1] - B.shape[1]
 
     def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:
         """(m,) likeliest sizes of a candidate's unknowns."""
         axis = self.sensitivities.axes(one)
-        Y = self._along(B)
-        gram = (B.T @ B - Y.T @ Y) / self._noise**2
+        ((_, block),) = self._blocks.of([one])
+        gram = block.gram / self._noise**2
         evidence = Evidence([function_term("", axis, B)], self.count, gram)
-        prior = evidence.best_of(B.T @ self._left, self._squares)
+        prior = evidence.best_of(block.along, self._squares)
         return sizes_in_use(evidence.terms, prior)
 
 
@@ -239,26 +229,41 @@ def function_term(name: str, axis: NDArray, columns: NDArray) -> SmallTerm:
     )
 
 
-def _foretold(
-    X: NDArray, z: NDArray, gram: NDArray, kept: NDArray, known: int
-) -> tuple[NDArray, NDArray]:
-    """Squared errors of cells kept out of a fit with unknowns of size one.
+def _foretold(X: NDArray, z: NDArray, ends: NDArray, known: int) -> NDArray:
+    """Squared errors of cells by fits to other folds, with unknowns of size one.
+
+    Args:
+        X: (N, k) columns, fold after fold.
+        z: (N,) readings.
+        ends: (folds + 1,) where folds begin and end.
+        known: how many columns are there anyway.
 
     Returns:
-        By the first ``known`` columns, and by all of them.
+        (2, N) by the first ``known`` columns, and by all of them.
     """
-    aside = X[kept]
-    A = gram - aside.T @ aside
-    A[np.diag_indices(len(A))] += 1.0
-    L = cholesky(A, lower=True, overwrite_a=True)
-    errors = []
-    for count in (known, len(A)):
-        own, x = L[:count, :count], np.zeros(count)
+    folds = [slice(begin, end) for begin, end in pairwise(ends.tolist())]
+    grams = [X[fold].T @ X[fold] for fold in folds]
+    gram, everywhere = sum(grams[1:], start=grams[0]), X.T @ z
+    squares = np.zeros((2, len(z)))
+    for fold, own in zip(folds, grams, strict=True):
+        A = gram - own
+        A[np.diag_indices(len(A))] += 1.0
+        L = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
+        wanted = everywhere - X[fold].T @ z[fold]
+        x = np.zeros((2, len(A)))
+        for count, part in zip((known, len(A)), x, strict=True):
+            part[:count] = _by_factor(L[:count, :count], wanted[:count])
         # a second time: products of columns lose what nearly equal ones tell
-        for _ in range(2):
-            left = np.where(kept, 0.0, z - X[:, :count] @ x)
-            wanted = X[:, :count].T @ left - x
-            y = solve_triangular(own, wanted, lower=True, check_finite=False)
-            x += solve_triangular(own, y, lower=True, trans=1, check_finite=False)
-        errors.append((z[kept] - aside[:, :count] @ x) ** 2)
-    return errors[0], errors[1]
+        left = z - x @ X.T
+        left[:, fold] = 0.0
+        wanted = left @ X - x
+        for count, part, more in zip((known, len(A)), x, wanted, strict=True):
+            part[:count] += _by_factor(L[:count, :count], more[:count])
+        squares[:, fold] = (z[fold] - x @ X[fold].T) ** 2
+    return squares
+
+
+def _by_factor(L: NDArray, b: NDArray) -> NDArray:
+    """(L L')^-1 b."""
+    y = solve_triangular(L, b, lower=True, check_finite=False)
+    return solve_triangular(L, y, lower=True, trans=1, check_finite=False)

@@ -26,19 +26,29 @@ class Screens:
         self._project, self._residual = project, project(residual)
         self._projected = [replace(t, columns=project(t.columns)) for t in terms]
         self.evidence = Evidence(self._projected, len(residual))
+        # the signatures last asked for, nuisances taken out
+        self._signatures: Sequence[Signature] = ()
+        self._columns = np.zeros((len(residual), 0))
 
     def screen(self, signatures: Sequence[Signature], prior: Prior) -> Screen:
         """The screen of signatures with small terms of a prior behind them."""
         behind = background(self._projected, prior)
-
-        def seen(columns: NDArray) -> NDArray:
-            return behind.whitened(self._project(columns))
-
+        if self._signatures is not signatures:
+            every = [
+                part for s in signatures for part in (s.columns, s.offset[:, None])
+            ]
+            nothing = np.zeros((len(self._residual), 0))
+            self._signatures = signatures
+            self._columns = self._project(np.hstack([nothing, *every]))
+        # all together: small terms have many columns to be read
+        seen = behind.whitened(self._columns)
+        ends = np.cumsum([s.columns.shape[1] + 1 for s in signatures])[:-1]
+        parts = np.split(seen, ends, axis=1) if signatures else []
         return Screen(
             behind.whitened(self._residual),
             [
-                Signature(s.hypothesis, seen(s.offset), seen(s.columns))
-                for s in signatures
+                Signature(s.hypothesis, part[:, -1], part[:, :-1])
+                for s, part in zip(signatures, parts, strict=True)
             ],
         )
 

@@ -25,14 +25,33 @@ SCALES = (0.3, 2.0)
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 
 
-class Blocks:
-    """Sensitivities whose candidates are their columns (6 R, m) themselves."""
+class AnyColumns:
+    """Sensitivities whose candidates have any columns, each as a place of its own."""
+
+    rows = np.arange(ROWS)
+
+    def __init__(self):
+        self.columns = []
+
+    def candidate(self, B):
+        """One of columns B (6 R, m)."""
+        begin = len(self.columns)
+        self.columns += list(B.T.reshape(-1, ROWS, 6))
+        names = range(begin, len(self.columns))
+        parts = tuple(CandidatePart(str(k), ("rx",), "nothing") for k in names)
+        return Candidate(parts, "screw", CandidateShape("powers", ("0",)))
+
+    def sensitivity(self, where, component, kind):
+        return self.columns[int(where)]
+
+    def basis(self, variable, shape):
+        return np.ones((ROWS, 1)), np.eye(1)
 
     def changes(self, one):
-        return one.reshape(ROWS, 6, -1)
+        return np.stack([self.columns[int(part.where)] for part in one.parts], axis=-1)
 
     def axes(self, one):
-        return np.zeros(one.shape[1], int)
+        return np.zeros(len(one.parts), int)
 
 
 def remainder(rng, noise=1.0, signal=0.0):
@@ -50,9 +69,14 @@ def remainder(rng, noise=1.0, signal=0.0):
     )  # fmt: skip
     left = Unexplained([term], z, E)
     here = Remainder(
-        campaign, Blocks(), left, np.ones(CELLS, bool), prior, noise
+        campaign, AnyColumns(), left, np.ones(CELLS, bool), prior, noise
     )  # fmt: skip
     return here, z, E, (J * size) @ (J * size).T
+
+
+def worth(here, B):
+    """Of columns B (N, m)."""
+    return here.worths([here.sensitivities.candidate(B)])[0]
 
 
 def test_worth_is_the_ratio_of_two_normal_densities():
@@ -69,7 +93,7 @@ def test_worth_is_the_ratio_of_two_normal_densities():
     expected = with_it - multivariate_normal.logpdf(z, cov=flat)
     assert expected > 3
     # what is left is less than sigma says, so that the noise is sigma
-    assert here.worths([B])[0] == pytest.approx(expected, rel=1e-4)
+    assert worth(here, B) == pytest.approx(expected, rel=1e-4)
 
 
 def test_worths_do_not_hang_on_company():
@@ -78,6 +102,7 @@ def test_worths_do_not_hang_on_company():
     here = remainder(rng)[0]
     every = [rng.normal(size=(CELLS, m)) for m in rng.integers(1, 6, 400)]
     every.append(np.zeros((CELLS, 2)))
+    every = [here.sensitivities.candidate(B) for B in every]
     worths = here.worths(every)
     assert worths[-1] == -np.inf
     for k in (0, 7, 399):
@@ -88,26 +113,27 @@ def test_nothing_known_can_be_worth_anything():
     """What effects or small unknowns of any size do is no news."""
     rng = np.random.default_rng(3)
     here, _, E, _ = remainder(rng)
-    assert here.worths([E])[0] == pytest.approx(0.0, abs=1e-4)
+    assert worth(here, E) == pytest.approx(0.0, abs=1e-4)
 
 
 def test_noise_beyond_sigma_makes_a_candidate_worth_less():
     """The same readings in a sigma three times as large: a ninth of the squares."""
-    worth = []
+    worths = []
     for noise in (1.0, 3.0):
         rng = np.random.default_rng(4)
         B = rng.normal(size=(CELLS, 2))
         here = remainder(rng, noise, signal=B @ [1.0, -1.0])[0]
-        worth.append(here.worths([B])[0])
-    assert 0 < worth[1] < worth[0] / 2
+        worths.append(worth(here, B))
+    assert 0 < worths[1] < worths[0] / 2
 
 
 def test_what_acts_foretells_other_rows_and_noise_does_not():
     rng = np.random.default_rng(5)
     B = rng.normal(size=(CELLS, 2))
     here = remainder(rng, signal=B @ [1.0, -0.8])[0]
-    assert here.foretells(B)
-    assert not here.foretells(rng.normal(size=(CELLS, 2)))
+    assert here.foretells(here.sensitivities.candidate(B))
+    noise = here.sensitivities.candidate(rng.normal(size=(CELLS, 2)))
+    assert not here.foretells(noise)
 
 
 def test_four_functions_are_learned_at_most(monkeypatch):
