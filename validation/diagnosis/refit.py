@@ -319,7 +319,7 @@ def _refit(
         # begins there but for rounding would end there
         if np.linalg.norm(J[:, seen] * scaled[seen]) < _FAINT:
             scaled[seen] = np.clip(0.0, *bounds)
-        first = left_at(scaled.tobytes())
+        first = left_at(scaled)
         before = float(first @ first)
         while len(seen):
             fitted = least_squares(
