@@ -147,6 +147,8 @@ private:
     void orthogonal_rows(int rank, int count);
     void spring_rows(int count);
     void eliminate_springs(int rank, int count);
+    struct Ranks { int free, springs; Whole same, unclear; };
+    Ranks eliminate(Real tolerance, Whole asked);
     void clearance_parts(int count);
     Whole rigid_rows(int rank, int count, Real tolerance);
     Real enters(int c, const Real *part) const;
@@ -353,6 +355,29 @@ void Assembler::eliminate_springs(int rank, int count) {
             for (int a = 0; a < m; ++a) Z[i][a] *= over;
         }
     }
+}
+
+// Free motions, then springs brought to triangles, in the lanes asked for that have the
+// ranks of the first of them.
+Assembler::Ranks Assembler::eliminate(Real tolerance, Whole asked) {
+    Ranks ranks = {};
+    const Whole free_rank = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
+    ranks.unclear = asked & (free_rank < 0);
+    if (!any(asked &= free_rank >= 0)) return ranks;
+    ranks.free = rank_of_first(free_rank, asked);
+    const int count = m - ranks.free;
+    asked &= free_rank == ranks.free;
+    grouped_springs();
+    orthogonal_rows(ranks.free, count);
+    spring_rows(count);
+    const Whole spring_rank = triangulate(
+        springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
+    ranks.unclear |= asked & (spring_rank < 0);
+    if (!any(asked &= spring_rank >= 0)) return ranks;
+    ranks.springs = rank_of_first(spring_rank, asked);
+    ranks.same = asked & (spring_rank == ranks.springs);
+    eliminate_springs(ranks.springs, count);
+    return ranks;
 }
 
 // What a screw of each pattern is in Z's rows.
@@ -588,23 +613,11 @@ Whole Assembler::solve(
     const Whole all = asked;
     read(points, block);
     const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Whole free_rank = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
-    settle(asked & (free_rank < 0), AMBIGUOUS);
-    if (!any(asked &= free_rank >= 0)) return Whole{};
-    const int rank = rank_of_first(free_rank, asked), count = m - rank;
-    asked &= free_rank == rank;
-    grouped_springs();
-    orthogonal_rows(rank, count);
-    spring_rows(count);
-    const Whole spring_rank = triangulate(
-        springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
-    settle(asked & (spring_rank < 0), AMBIGUOUS);
-    Whole settled = (free_rank < 0) | (asked & (spring_rank < 0));
-    if (!any(asked &= spring_rank >= 0)) return all & ~settled;
-    const int r = rank_of_first(spring_rank, asked);
-    asked &= spring_rank == r;
-    settled |= asked;
-    eliminate_springs(r, count);
+    const Ranks ranks = eliminate(tolerance, asked);
+    settle(ranks.unclear, AMBIGUOUS);
+    const Whole settled = ranks.unclear | ranks.same;
+    if (!any(asked = ranks.same)) return all & ~settled;
+    const int rank = ranks.free, count = m - rank, r = ranks.springs;
     clearance_parts(count);
     const Whole rigid = rigid_rows(r, count, tolerance);
     settle(asked & rigid, RIGID);
@@ -693,21 +706,10 @@ Whole Assembler::comply(
     Whole others = asked;
     read(points, block);
     const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Whole free_rank = triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
-    others &= settle(asked & (free_rank < 0), UNCLEAR);
-    if (!any(asked &= free_rank >= 0)) return others;
-    const int rank = rank_of_first(free_rank, asked), count = m - rank;
-    asked &= free_rank == rank;
-    grouped_springs();
-    orthogonal_rows(rank, count);
-    spring_rows(count);
-    const Whole spring_rank = triangulate(
-        springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
-    others &= settle(asked & (spring_rank < 0), UNCLEAR);
-    if (!any(asked &= spring_rank >= 0)) return others;
-    const int r = rank_of_first(spring_rank, asked);
-    asked &= spring_rank == r;
-    eliminate_springs(r, count);
+    const Ranks ranks = eliminate(tolerance, asked);
+    others &= settle(ranks.unclear, UNCLEAR);
+    if (!any(asked = ranks.same)) return others;
+    const int rank = ranks.free, r = ranks.springs;
     Row closing(m), bent(6 * ng), on(6 * np);
     for (int row = 0; row < 6; ++row) {
         const Whole loose = hold_free_motions(rank, row, closing);
