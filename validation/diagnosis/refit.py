@@ -28,6 +28,7 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_MOST_ROUNDS = 8  # each from slopes taken where the last one ended
 _TINY = 1e-300
 _FAINT = 0.01  # [sigma] over all readings, of unknowns that may as well be zero
 _CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
@@ -321,7 +322,7 @@ def _refit(
             scaled[seen] = np.clip(0.0, *bounds)
         first = left_at(scaled)
         before = float(first @ first)
-        while len(seen):
+        for _ in range(_MOST_ROUNDS if len(seen) else 0):
             fitted = least_squares(
                 lambda x: left_at(with_seen(x)), scaled[seen],
                 jac=_Secants(lambda x: left_at(with_seen(x)), J[:, seen]),

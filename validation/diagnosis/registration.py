@@ -94,8 +94,8 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
         device = Rotation.from_rotvec(campaign.measured[turned, :3])
         R = (device * Rotation.from_rotvec(model[turned, :3]).inv()).mean().as_matrix()
     elif _spread(thought):
-        centred = thought - thought.mean(axis=0), seen - seen.mean(axis=0)
-        R = Rotation.align_vectors(centred[1], centred[0])[0].as_matrix()
+        # of two sets of points it is enough to centre one
+        R = Rotation.align_vectors(seen, thought - thought.mean(axis=0))[0].as_matrix()
     else:
         raise BadInput(
             f"{campaign.name}: registration is unknown, and there are no rotations "
