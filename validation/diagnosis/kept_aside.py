@@ -211,5 +211,7 @@ def ladder(
 def _with_terms(behind: Background, names: Sequence[str]) -> Background:
     """A background with some of its terms alone, their sizes kept."""
     kept = [term for term in behind.terms if term.name in names]
+    if len(kept) == len(behind.terms):
+        return behind
     everything = tuple(np.ones(len(term), dtype=bool) for term in kept)
     return background(kept, Prior(everything, behind.scales, 0.0, 0.0))
