@@ -11,7 +11,7 @@ a       ``answer``       (R, 6)     whitened change of the readings per unit of 
                                     component at a place
 P       ``numbers``      (R, q)     columns of forms of a variable
 B                        (N, q)     of the candidate, B_(rc)q = a_rc P_rq
-Y       ``known``        (N, p)     orthonormal basis of what is taken out
+Y       ``known``        (N, p)     of what is taken out, by P = 1 - Y Y'
 ======  ===============  =========  ==================================================
 
     Y'B = (sum over c of Y_(rc) a_rc)' P,    B'B = P' diag(sum over c of a_rc^2) P.
@@ -103,7 +103,7 @@ class Blocks:
         Args:
             campaign: of R rows, N measured cells.
             sensitivities: of these rows.
-            known: columns (N, p), orthonormal all together.
+            known: columns (N, p), Y side by side.
             left: (N,) to which candidates are held.
         """
         cells = campaign.cells
