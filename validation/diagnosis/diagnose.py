@@ -84,7 +84,7 @@ def diagnose(
         far = np.zeros_like(outliers)
         called = int((outliers & ~impossible).sum())
         most = max(0, len(campaign) // BLUNDERS - called)
-        far[used] = outlying(fitting, left, most)
+        far[used] = outlying(fitting, left, most, worst=True)
         if far.any():
             outliers |= far
             continue

@@ -16,6 +16,7 @@ from validation.campaign.campaign import Campaign, number_rows
 SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
 _LEVELS = 30  # of a covariate's range within which rows are alike
 _OUTLYING = 5.5  # rms of a row, in medians of all rows
+_NEARLY = 0.7  # of the farthest row's
 
 
 @dataclass(frozen=True)
@@ -133,16 +134,24 @@ def _alike(campaign: Campaign) -> NDArray:
     return number_rows(*parts)
 
 
-def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
+def outlying(
+    campaign: Campaign, residual: NDArray, most: int | None = None, worst: bool = False
+) -> NDArray:
     """Rows that stand far off all others.
 
     Args:
         campaign: of R rows, N measured cells.
         residual: (N,) whitened.
         most: how many may be called so; one row in twenty if not said.
+        worst: only those nearly as far off as the farthest.  A blunder pulls the fit,
+            and others look off until it is left out.
 
     Returns:
         (R,) bool.
+
+    Sources:
+        Baarda (1968), A testing procedure for use in geodetic networks: the largest
+        first.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
@@ -152,6 +161,8 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // 20 if most is None else most
     if far.sum() > most:
-        worst = np.argsort(-rms)[:most]
-        far &= np.isin(np.arange(len(campaign)), worst)
+        first = np.argsort(-rms)[:most]
+        far &= np.isin(np.arange(len(campaign)), first)
+    if worst:
+        far &= rms >= _NEARLY * rms.max()
     return far

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -318,7 +319,10 @@ def start_command(folder, *words):
     with (
         errors.open("w+") as stderr,
         subprocess.Popen(
-            [*COMMAND, "-o", path, *words], stderr=stderr, start_new_session=True
+            [*COMMAND, "-o", path, *words],
+            stderr=stderr,
+            start_new_session=True,
+            preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
         ) as process,
     ):
         journal = journal_path(path)

@@ -46,7 +46,8 @@ if __name__ == "__main__":
         time.sleep(0.01)
     print(module.quarter(np.array([12.0])))
 else:
-    from assembly.solvers.compiled import Vector, kernel, part
+    from assembly.solvers.compiled import kernel, part
+    from assembly.solvers.layouts import Vector
 
     @part
     def half(v: Vector) -> float:
