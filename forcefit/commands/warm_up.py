@@ -12,6 +12,7 @@ from assembly.linear.energy import minimise_energies
 from assembly.linear.fallback import reference_assembly, reference_margin
 from assembly.linear.moving_clearances import Asked
 from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
+from assembly.linear.reach import reachable_screws
 from assembly.linear.zone import zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
@@ -39,6 +40,9 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
         # what the fallback calls
         lambda: reference_margin(posture, "rigid"),
         lambda: reference_pose_error(reference_assembly(posture), Asked()),
+        lambda: reachable_screws(reference_assembly(posture), "frozen").support(
+            np.eye(6)[3]
+        ),
         *(
             partial(_by_each_method, compute)
             for compute in (
