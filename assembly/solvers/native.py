@@ -66,21 +66,23 @@ def _library(source: str) -> ctypes.CDLL | None:
     """The library, or None, found out once."""
     digest = _digest(source)
     path = folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
-    library = _loaded(path, digest)
+    library, refused = _loaded(path, digest), path.with_suffix(".failed")
+    if library is not None or refused.exists():
+        return library
     compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
-    refused = path.with_suffix(".failed")
-    if library is None and compiler is not None and not refused.exists():
-        lock = path.with_suffix(".lock")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with locked_file(lock):
-                library = _loaded(path, digest)  # another program was waited for
-                if library is None and not refused.exists():
-                    _compile(compiler, source, digest, path)
-                    library = _loaded(path, digest)
-                lock.unlink()
-        except OSError:  # no folder to write to
-            return None
+    if compiler is None:
+        return None
+    lock = path.with_suffix(".lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with locked_file(lock):
+            library = _loaded(path, digest)  # another program was waited for
+            if library is None and not refused.exists():
+                _compile(compiler, source, digest, path)
+                library = _loaded(path, digest)
+            lock.unlink()
+    except OSError:  # no folder to write to
+        return None
     return library
 
 
