@@ -6,8 +6,6 @@ joints follow.  See :mod:`assembly.linear.pose_error` for the problem, and
 rank, or where a passive joint could pass the bound of its motion, go to the fallback.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,72 +18,24 @@ from assembly.linear.compiled_reduction import (
 from assembly.linear.compiled_structure import free_columns, paths_of
 from assembly.linear.compiled_zone import largest_clearance, orthonormal_rows
 from assembly.linear.robot_structure import Structure
-from assembly.linear.solutions import FALLBACK, SOLVED
+from assembly.linear.solutions import (
+    FALLBACK,
+    SOLVED,
+    Bounds,
+    Centres,
+    ClearanceLoads,
+)
 from assembly.linear.thresholds import MISMATCH_FACTOR, RANK, UNBOUNDED
 from assembly.solvers.compiled import kernel, part
 from assembly.solvers.farthest import DONE, advance, begin
 from assembly.solvers.householder import CLEAR, triangulate, turn_all
 from assembly.solvers.layers import LANES
-from assembly.solvers.layouts import Indices, Mask, Matrices, Matrix, Vector
+from assembly.solvers.layouts import Mask, Matrices, Matrix, Vector
 from assembly.solvers.polytope import empty_polytope
 from assembly.solvers.support import ConvexBody
 from assembly.solvers.vectors import copy, indices, into_cones, matrix, vector
 
 _APART = 100.0  # load and slack of a cone must differ by this factor, see loaded_cones
-
-
-class ClearanceLoads(NamedTuple):
-    """Loads and slack of the clearances of k points, from the solution of (22).
-
-    Attributes:
-        structure: the robot of (22).
-        multipliers: (k, 6 closures) of the scaled closures.
-        clearances: (k, nu) in units of these cones.
-        energy: (k,) [J].
-        without_clearance: (k,) [J] energy if every clearance stayed at zero.
-        cone_of: (cones,) the cone of (22) of each cone of the reading.
-    """
-
-    structure: Structure
-    multipliers: Matrix
-    clearances: Matrix
-    energy: Vector
-    without_clearance: Vector
-    cone_of: Indices
-
-
-class Centres(NamedTuple):
-    """Where the solution of (22) leaves k points.
-
-    Attributes:
-        screws: (k, 6) [rad, m] of the platform at its origin.
-        clearances: (k, nu) in the cones of the reading.
-        motions: (k, nq) [rad, m] where they have a bound, else anything.
-    """
-
-    screws: Matrix
-    clearances: Matrix
-    motions: Matrix
-
-
-class Bounds(NamedTuple):
-    """Rows of arrays filled by :func:`bound_all`, one row a point.
-
-    Attributes:
-        rotation: (k, 2) [rad] lower and upper.
-        translation: (k, 2) [m] likewise.
-        rotation_screw: (k, 6) [rad, m] attains the lower bound.
-        translation_screw: (k, 6) likewise.
-        supports: (k,) support functions computed.
-        outcome: (k,) SOLVED or FALLBACK.
-    """
-
-    rotation: NDArray
-    translation: NDArray
-    rotation_screw: NDArray
-    translation_screw: NDArray
-    supports: NDArray
-    outcome: NDArray
 
 
 @kernel

@@ -1,10 +1,10 @@
-"""Problems (22) and (21), and K_C, of several postures side by side, by ``lanes.cpp``.
+"""Problems (22), (21), (27) and K_C of several postures side by side, by ``lanes.cpp``.
 
 The same equations and thresholds as :mod:`assembly.linear.compiled_energy`,
-:mod:`assembly.linear.compiled_zone` and
-:mod:`assembly.platform_stiffness.compiled_compliance`, one posture in each lane of the
-processor's vector registers.  No lane depends on another: a point solved alone, in a
-batch or in another order has the same answer to the last bit.
+:mod:`assembly.linear.compiled_zone`, :mod:`assembly.linear.compiled_reach` and
+:mod:`assembly.platform_stiffness.compiled_compliance`, one posture, or one search of
+(27), in each lane of the processor's vector registers.  No lane depends on another: a
+point solved alone, in a batch or in another order has the same answer to the last bit.
 """
 
 import ctypes
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
-from assembly.linear.solutions import Solutions
+from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
 from assembly.solvers.native import load_library
 
 SOURCE = "linear/lanes.cpp"
@@ -86,6 +86,32 @@ def margins_side_by_side(
     return _side_by_side("all_margins", structure, (T, errors, mismatch), out)
 
 
+def bounds_side_by_side(
+    structure: Structure, T: NDArray, mismatch: NDArray, centres: Centres,
+    loads: ClearanceLoads, asked: tuple[NDArray, NDArray], out: Bounds,
+) -> bool:  # fmt: skip
+    """Bounds of the largest pose errors of the points whose outcome is SOLVED.
+
+    Args:
+        structure: the robot, without springs.
+        T: (k, n, 4, 4) frames.
+        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        centres: the solution of (22).
+        loads: which of its clearances are held.
+        asked: (3,) [m] offset and (2,) tolerances, as
+            :func:`assembly.linear.compiled_reach.bound_all` takes them.
+        out: arrays to fill; rows that are not solved become FALLBACK.
+
+    Returns:
+        Whether it did, as above.
+    """
+    none, held = np.zeros((1, T.shape[1], 6)), _robot(loads.structure)
+    loaded = (ctypes.addressof(held), *loads[1:])
+    return _side_by_side(
+        "bound_all", structure, (T, none, mismatch), centres, loaded, asked, out
+    )
+
+
 def compliances_side_by_side(
     structure: Structure, T: NDArray, mismatch: NDArray, springs: NDArray,
     status: NDArray,
@@ -113,21 +139,25 @@ def compliances_side_by_side(
 
 def _side_by_side(
     name: str, structure: Structure, points: tuple[NDArray, NDArray, NDArray],
-    out: tuple[NDArray, ...],
+    *tables: tuple[NDArray | int, ...],
 ) -> bool:  # fmt: skip
     """Call a function of the library on every point; whether it did."""
+    # tables are what its other arguments point to: addresses of arrays, in their order
     library = load_library(SOURCE)
     if library is None:
         return False
     T, errors, mismatch = points
-    given = _Points(
-        len(T), T.ctypes.data, errors.ctypes.data, mismatch.ctypes.data, len(errors) > 1
-    )
-    rows = [column.ctypes.data if column.size else None for column in out]
-    filled = (ctypes.c_void_p * len(rows))(*rows)
-    robot = _robot(structure)
+    given = _Points(len(T), *map(_address, points), len(errors) > 1)
+    rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
     function = getattr(library, name)
-    return bool(function(*map(ctypes.byref, (robot, given, filled))))
+    return bool(function(*map(ctypes.byref, (_robot(structure), given, *rows))))
+
+
+def _address(array: NDArray | int) -> int | None:
+    """Where an array's numbers are; None if it has none."""
+    if isinstance(array, int):
+        return array
+    return array.ctypes.data if array.size else None
 
 
 def _robot(structure: Structure) -> _Robot:

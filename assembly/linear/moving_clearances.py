@@ -2,20 +2,25 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.linear.assemblies import Assemblies
 from assembly.linear.energy import minimise_energies
+from assembly.linear.lanes import bounds_side_by_side
 from assembly.linear.reach import READINGS
 from assembly.linear.robot_structure import Structure, structure_of
+from assembly.linear.solutions import (
+    FALLBACK,
+    SOLVED,
+    Bounds,
+    Centres,
+    ClearanceLoads,
+)
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
-
-if TYPE_CHECKING:
-    from assembly.linear.compiled_reach import Bounds
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class Asked:
 def compiled_bounds(
     robot: Robot, transforms: NDArray, off: NDArray, errors: ArrayLike | None,
     energies: Assemblies, asked: Asked,
-) -> "Bounds":  # fmt: skip
+) -> Bounds:  # fmt: skip
     """Bounds of k points; NaN in the rows that are left to the fallback.
 
     Args:
@@ -58,15 +63,6 @@ def compiled_bounds(
     Returns:
         The bounds and where they come from.
     """
-    from assembly.linear.compiled_reach import (
-        FALLBACK,
-        SOLVED,
-        Bounds,
-        Centres,
-        ClearanceLoads,
-        bound_all,
-    )
-
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     count = len(T)
     bounds = Bounds(
@@ -106,9 +102,26 @@ def compiled_bounds(
         motions=motions,
     )
     tolerance = [asked.tolerance_rotation, asked.tolerance_translation]
-    point_and_tolerance = np.array(asked.offset, float), np.array(tolerance, float)
-    bound_all(places.moving, T, off, centres, loads, point_and_tolerance, bounds)
+    given = (
+        places.moving, T, off, centres, loads,
+        (np.array(asked.offset, float), np.array(tolerance, float)),
+    )  # fmt: skip
+    left = bounds.outcome == SOLVED
+    if bounds_side_by_side(*given, bounds):
+        left &= bounds.outcome != SOLVED
+    if left.any():
+        _bound_left(given, left, bounds)
     return bounds
+
+
+def _bound_left(given: tuple[Any, ...], left: NDArray, bounds: Bounds) -> None:
+    """By numba what side by side was not bounded; rounding there is another."""
+    from assembly.linear.compiled_reach import bound_all
+
+    again = bounds._replace(outcome=np.where(left, SOLVED, FALLBACK))
+    bounds.supports[left] = 0
+    bound_all(*given, again)
+    bounds.outcome[left] = again.outcome[left]
 
 
 class _Places(NamedTuple):

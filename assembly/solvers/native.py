@@ -120,7 +120,7 @@ def _processor() -> str:
 def _digest(source: str) -> str:
     """Of all that the machine code depends on."""
     parts = [" ".join(_OPTIONS), _processor()]
-    for file in (_PACKAGE / source, *sorted((_PACKAGE / "solvers/cpp").glob("*.h"))):
+    for file in (_PACKAGE / source, *sorted(_PACKAGE.rglob("cpp/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 

@@ -1,7 +1,7 @@
 // Small cone programmes side by side, assembly/solvers/interior.py and dual_newton.py
 // in lanes:
 //
-//     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = 0,  |u_k| <= 1, each cone k
+//     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 //
 // by Nesterov and Todd's scaling with Mehrotra's predictor and corrector, and without H
 // by Newton's method on the dual, smoothed about u_old by sigma:
@@ -10,7 +10,7 @@
 //
 // ========  ===========================================================================
 // M         (r + p, nu) rows of G, then of H
-// y         their multipliers: G u + h, and those of H u = 0
+// y         their multipliers: G u + h, and those of H u = e
 // z         (z0, z1), the cones' multipliers: z1 = M^T y - d
 // w, rho    Nesterov and Todd's points, W = rho^1/2 (w); here l = (w) z, and right sides
 //           of the scaled complementarity are rho^1/2 t: no root of rho is taken
@@ -52,6 +52,10 @@ struct Cones {
         known = int(column.size()) == nu;
     }
 
+    // So many discs, then intervals.
+    Cones(int discs, int intervals)
+        : discs(discs), count(discs + intervals), nu(2 * discs + intervals) {}
+
     // Calls visit.template operator()<size>(cone, first column) for every cone.
     template <typename Visit> void each(Visit visit) const {
         for (int c = 0; c < discs; ++c) visit(Size<2>{}, c, 2 * c);
@@ -67,11 +71,11 @@ struct Programme {
     const Cones &cones;
     int r, p;     // rows of G and of H
     Table M;      // (r + p, nu)
-    Row h, d;     // (r,), (nu,)
+    Row h, d, e;  // (r,), (nu,), (p,)
     Row u, y;     // (nu,), (r + p,) the answer
     bool loaded = false;  // else d is zero
     Programme(const Cones &cones, int rows)
-        : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu),
+        : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu), e(rows),
           u(cones.nu), y(rows) {}
 };
 
@@ -336,7 +340,7 @@ inline Whole Solver::interior_point(
         multiply(q.M.rows() + r, p, u.data(), k.nu, residual.data());
         Real worst = {};
         for (int i = 0; i < p; ++i) {
-            residual[i] = -residual[i];
+            residual[i] = q.e[i] - residual[i];
             worst = larger(magnitude(residual[i]), worst);
         }
         const Whole close = (gap <= tolerance + relative * energy) & (worst <= 1e-13);

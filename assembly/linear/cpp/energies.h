@@ -1,0 +1,234 @@
+// Problem (22), without loads, at several postures side by side, from the frames' poses to
+// the certified answer: compiled_energy.py in lanes.
+#pragma once
+
+#include "reduction.h"
+
+// assembly/solvers/conic.py
+constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
+// assembly/linear/thresholds.py
+constexpr double OPEN = 1e-11;
+// assembly/linear/compiled_energy.py
+enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED };
+constexpr double STOP = 3e-3;
+
+// compiled_energy.py's Solutions, one row a point; no `elastic` where nobody asks.
+struct Solutions {
+    int64_t *outcome;
+    double *energy, *bound, *without_clearance, *platform_screw, *clearances, *motions,
+        *multipliers, *residual, *elastic;
+};
+
+
+// Solves blocks of points of one robot, one after the other.
+class Energies : public Reduction {
+public:
+    Energies(const Robot &s, const Points &points)
+        : Reduction(s, points), solver(cones, m), v(m) {}
+
+    Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
+
+private:
+    Solver solver;
+    Row v;  // G u + h
+
+    Whole rigid_rows(int rank, int count, Real tolerance);
+    Whole minimise(int r, Whole asked);
+    Row least_multipliers(int r, int count);
+    void own_springs(int r, const Block &block, double *elastic, Whole where);
+    struct Proof { Real gain, cost; };
+    Proof complementary(const Row &motions, const Row &multipliers);
+};
+
+// Lanes where clearances or errors enter rows that no spring enters.
+inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
+    std::vector<Real> most(np), sizes(nu);
+    for (int g = 0; g < np; ++g)
+        for (int i = rank; slot[g] >= 0 && i < count; ++i)
+            for (int a = 0; a < 6; ++a)
+                most[g] = larger(magnitude(parts[i][6 * slot[g] + a]), most[g]);
+    Real worst = {};
+    for (int c = 0; c < nu; ++c)
+        for (int a = 0; a < 6; ++a) sizes[c] = larger(magnitude(play[c][a]), sizes[c]);
+    const Real limit = largest_clearance() * (NOISE / CLEAR);
+    for (int c = 0; c < nu; ++c) {
+        const int64_t g = s.pattern_of[s.cone_frame[c]];
+        const Whole near = 6.0 * sizes[c] * most[g] > limit;
+        if (!any(near)) continue;  // as nearly all are
+        for (int i = rank; i < count; ++i) {
+            const Real total = enters(c, parts[i] + 6 * slot[g]);
+            worst = near ? larger(magnitude(total), worst) : worst;
+        }
+    }
+    Whole rigid = worst > limit;
+    const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
+    for (int i = rank; i < count; ++i)  // written so that NaN is rigid
+        rigid |= ~(magnitude(inner(known.data(), Z[i], m)) <= allowed);
+    return rigid;
+}
+
+// Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y.  Newton alone where all
+// constraints are active, else after an interior point.  Returns the outcomes.
+inline Whole Energies::minimise(int r, Whole asked) {
+    Programme &q = programme;
+    Real square = inner(q.h.data(), q.h.data(), r), size = square;
+    for (int c = 0; c < nu; ++c) {
+        Real column = {};
+        for (int i = 0; i < r; ++i) column += q.M[i][c] * q.M[i][c];
+        size = larger(column, size);
+    }
+    size = root(size);
+    std::fill(q.u.begin(), q.u.end(), Real{});
+    std::copy(q.h.begin(), q.h.begin() + r, q.y.begin());
+    std::copy(q.h.begin(), q.h.begin() + r, v.begin());
+    asked &= square > 0.0;
+    if (nu == 0 || !any(asked)) return Whole{};
+    const Real over = 1.0 / (square > 0.0 ? size : real(1.0));
+    for (int i = 0; i < r; ++i) {
+        q.h[i] *= over;
+        for (int c = 0; c < nu; ++c) q.M[i][c] *= over;
+    }
+    const Real absolute =
+        STOP * GAP_WITHOUT_CLEARANCE * 0.5 * inner(q.h.data(), q.h.data(), r);
+    const Whole left = asked & ~solver.newton_alone(q, STOP * GAP, absolute, asked);
+    solver.interior_then_newton(q, STOP * GAP, absolute, left);
+    multiply(q.M.rows(), r, q.u.data(), nu, v.data());
+    for (int i = 0; i < r; ++i) {
+        v[i] = (v[i] + q.h[i]) * size;
+        q.y[i] = asked ? q.y[i] * size : q.y[i];
+        q.h[i] *= size;
+    }
+    return left ? whole(INTERIOR) : whole(NEWTON);
+}
+
+// Multipliers of the closures, the least ones where they are not unique.
+inline Row Energies::least_multipliers(int r, int count) {
+    Row multipliers(m);
+    combine(Z.data(), r, programme.y.data(), m, multipliers.data());
+    // nothing feels those along Z's other rows, made orthonormal here
+    for (int i = r; i < count; ++i) {
+        Real *own = Z[i];
+        for (int l = r; l < i; ++l) {
+            const Real along = inner(Z[l], own, m);
+            for (int a = 0; a < m; ++a) own[a] -= along * Z[l][a];
+        }
+        const Real over = 1.0 / root(inner(own, own, m));
+        for (int a = 0; a < m; ++a) own[a] *= over;
+        const Real along = inner(own, multipliers.data(), m);
+        for (int a = 0; a < m; ++a) multipliers[a] -= along * own[a];
+    }
+    return multipliers;
+}
+
+// Deformation of every spring, from that of the groups' six.
+inline void Energies::own_springs(int r, const Block &block, double *elastic, Whole where) {
+    const Row grouped = spring_strains(r, v);
+    Triangle rows(6, widest);
+    for (int g = 0; g < ng; ++g) {
+        const int count = spring_group(g, rows);
+        triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
+        Row own(count);
+        std::copy(&grouped[6 * g], &grouped[6 * g] + 6, own.begin());
+        Real *x = own.data();
+        turn_all(rows, 6, count, &x, 1);
+        for (int64_t c = s.groups[g]; c < s.groups[g + 1]; ++c)
+            block.write(elastic, s.ny, s.spring_order[c], own[c - s.groups[g]], where);
+    }
+}
+
+// Wrenches times f prove f gain - f^2 cost / 2, on the problem before elimination.
+inline Energies::Proof Energies::complementary(const Row &motions, const Row &multipliers) {
+    Real gain = -inner(multipliers.data(), known.data(), m), cost = {};
+    Row at_platform(6 * np);
+    for (int g = 0; g < np; ++g) part(multipliers.data(), g, &at_platform[6 * g]);
+    const auto on = [&](int64_t j) { return &at_platform[6 * s.pattern_of[j]]; };
+    for (int c = 0; c < s.ny; ++c) {
+        Real force = {};
+        for (int a = 0; a < 6; ++a) force += elastic[c][a] * on(s.spring_frame[c])[a];
+        cost += force * force;
+    }
+    cones.each([&](auto size, int, int at) {
+        Real squares = {};
+        for (int i = at; i < at + size; ++i) {
+            const int c = int(cones.column[i]);
+            const Real force = enters(c, on(s.cone_frame[c]));
+            squares += force * force;
+        }
+        gain -= root(squares);
+    });
+    for (int c = 0; c < nq; ++c) {
+        Real force = {};
+        for (int a = 0; a < 6; ++a) force += motion[c][a] * on(s.free_frame[c])[a];
+        gain -= magnitude(force * motions[c]);
+    }
+    return {gain, cost};
+}
+
+// Solves the lanes asked for that have the ranks of the first of them, and writes their
+// rows; returns the others.
+inline Whole Energies::solve(
+    const Points &points, const Block &block, Whole asked, Solutions &out) {
+    const auto settle = [&](Whole where, int64_t outcome) {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) out.outcome[block.point[l]] = outcome;
+    };
+    const Whole all = asked;
+    read(points, block);
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Ranks ranks = eliminate(tolerance, asked);
+    settle(ranks.unclear, AMBIGUOUS);
+    const Whole settled = ranks.unclear | ranks.same;
+    if (!any(asked = ranks.same)) return all & ~settled;
+    const int rank = ranks.free, count = m - rank, r = ranks.springs;
+    clearance_parts(count);
+    const Whole rigid = rigid_rows(r, count, tolerance);
+    settle(asked & rigid, RIGID);
+    if (!any(asked &= ~rigid)) return all & ~settled;
+    small_problem(r);
+    const Real without = 0.5 * inner(programme.h.data(), programme.h.data(), r);
+    const Whole solved = minimise(r, asked);
+    // back to the full problem
+    Row multipliers = least_multipliers(r, count);
+    Row moved = moved_by(spring_strains(r, v));
+    const Row motions = least_motions(rank, moved);
+    Whole outcome = solved;
+    for (int c = 0; c < nq; ++c) {
+        outcome = magnitude(motions[c]) > s.free_bound[c] ? whole(BOUNDED) : outcome;
+        const int64_t j = s.free_frame[c];
+        Real step[6];
+        for (int a = 0; a < 6; ++a)
+            step[a] = motion[c][a] * motions[c];
+        move(s.pattern_of[j], s.on_path[j], step, moved);
+    }
+    Real residual = {}, work = {};
+    for (int a = 0; a < m; ++a) {
+        residual = larger(magnitude(moved[a]), residual);
+        work += magnitude(moved[a] * multipliers[a]);
+    }
+    const Real energy = 0.5 * inner(v.data(), v.data(), r);
+    const Proof proof = complementary(motions, multipliers);
+    // any multiple of the wrenches proves a bound: the best one, zero inside a zone
+    const Real gain = proof.gain - work, cost = proof.cost;
+    const Whole some = (gain > 0.0) & (cost > 0.0);
+    const Real factor = some ? gain / cost : Real{};
+    const Real bound = 0.5 * factor * factor * cost;
+    // written so that NaN fails
+    const Real allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * without;
+    const Whole proved = (energy - bound <= allowed) & (residual <= OPEN);
+    outcome = (outcome == whole(BOUNDED)) | proved ? outcome : whole(UNCERTIFIED);
+    for (int l = 0; l < LANES; ++l)
+        if (asked[l]) out.outcome[block.point[l]] = outcome[l];
+    block.write(out.energy, 1, 0, energy, asked);
+    block.write(out.bound, 1, 0, bound, asked);
+    block.write(out.without_clearance, 1, 0, without, asked);
+    block.write(out.residual, 1, 0, residual, asked);
+    for (int a = 0; a < 6; ++a)
+        block.write(out.platform_screw, 6, a, a < 3 ? screw[a] : screw[a] * s.size, asked);
+    for (int c = 0; c < nu; ++c)
+        block.write(out.clearances, nu, cones.column[c], programme.u[c], asked);
+    for (int c = 0; c < nq; ++c) block.write(out.motions, nq, c, motions[c], asked);
+    for (int a = 0; a < m; ++a)
+        block.write(out.multipliers, m, a, factor * multipliers[a], asked);
+    if (out.elastic) own_springs(r, block, out.elastic, asked);
+    return all & ~settled;
+}
