@@ -27,6 +27,8 @@ WORKSPACE = {
 }  # fmt: skip
 
 
+# widths asked of brackets that are compared digit by digit [rad, m]
+CLOSE = {"tolerance_rotation": 1e-11, "tolerance_translation": 1e-11}
 LOAD = [3.0, -2.0, 1.0, 40.0, -30.0, 20.0]  # [N m, N]
 
 

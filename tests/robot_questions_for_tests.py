@@ -39,7 +39,7 @@ from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.tolerances import present_errors, present_text
-from tests.built_in_robots_for_tests import LOAD, WORKSPACE
+from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
 from tests.robots_for_tests import random_robot, small_clearance
 from tests.tolerances_for_tests import plan_for
 
@@ -58,7 +58,9 @@ def of_any_kind(seed: int, nudge: float) -> Any:
             "energy_lower_bound": solved.energy - solved.duality_gap(),
         }
     for reading in READINGS:
-        some = bound_pose_error(found["alone"]["solved"], reading, energy_budget=0.1)
+        some = bound_pose_error(
+            found["alone"]["solved"], reading, energy_budget=0.1, **CLOSE
+        )
         found[reading] = {
             "sizes": [some.rotation_error, some.translation_error],
         }

@@ -48,8 +48,6 @@ public:
         }
     }
 
-    bool covers() const { return cones.known; }
-
     // Draws inside the zone, and those that Newton's method solves alone; returns the
     // lanes that it leaves.
     Whole begin(const Block &block, Whole asked) {
@@ -187,12 +185,11 @@ private:
 
 }  // namespace
 
-// Least energies of `count` draws, rows of h; returns whether this kind of robot is
-// covered.  Draws that need the interior point stand together: no lane waits.
-EXPORTED int least_energies(
+// Least energies of `count` draws, rows of h.  Draws that need the interior point stand
+// together: no lane waits.
+EXPORTED void least_energies(
     const Reduced *reduced, const double *h, const int64_t *count, Energies *out) {
     Draws draws(*reduced, h, *out);
-    if (!draws.covers()) return 0;
     std::vector<int64_t> others;
     in_blocks(all_of(*count), [&](const Block &block, Whole pending) {
         const Whole unsolved = draws.begin(block, pending);
@@ -204,5 +201,4 @@ EXPORTED int least_energies(
         draws.finish(block, pending);
         return Whole{};
     });
-    return 1;
 }

@@ -42,7 +42,7 @@ def least_energies_side_by_side(
         out: arrays to fill.
 
     Returns:
-        Whether it did; not where there is no compiler, or for cones of three columns.
+        Whether it did; not where there is no compiler.
     """
     library = load_library(SOURCE)
     if library is None:
@@ -56,10 +56,8 @@ def least_energies_side_by_side(
     given = _Reduced(nu, r, len(reduced.starts) - 1, *fields, reduced.slip)
     filled = (ctypes.c_void_p * len(out))(*(column.ctypes.data for column in out))
     count = ctypes.c_int64(len(h))
-    function = library.least_energies
-    return bool(
-        function(
-            ctypes.byref(given), ctypes.c_void_p(rows), ctypes.byref(count),
-            ctypes.byref(filled),
-        )
+    library.least_energies(
+        ctypes.byref(given), ctypes.c_void_p(rows), ctypes.byref(count),
+        ctypes.byref(filled),
     )  # fmt: skip
+    return True

@@ -7,36 +7,30 @@
 
 constexpr size_t AT_ONCE = 1024;  // points whose reachable sets are kept together
 
-// Solves every point, as assemble_all of compiled_energy.py does.  Returns whether this
-// kind of robot is covered: no cone of more than two columns.
-EXPORTED int assemble_all(
+// Solves every point, as assemble_all of compiled_energy.py does.
+EXPORTED void assemble_all(
     const Robot *robot, const Points *points, Solutions *out) {
     Energies energies(*robot, *points);
-    if (!energies.covers()) return 0;
     in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return energies.solve(*points, block, pending, *out);
     });
-    return 1;
 }
 
 // Margins of every point of a robot without springs, as compiled_zone.py's all_margins.
-EXPORTED int all_margins(
+EXPORTED void all_margins(
     const Robot *robot, const Points *points, Margins *out) {
     ZoneMargins zone(*robot, *points);
-    if (robot->ng || !zone.covers()) return 0;
     in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return zone.margins(*points, block, pending, *out);
     });
-    return 1;
 }
 
 // Bounds of the largest pose errors of the points whose outcome is SOLVED, as
 // compiled_reach.py's bound_all.
-EXPORTED int bound_all(
+EXPORTED void bound_all(
     const Robot *robot, const Points *points, const Centres *centres, const Loads *loads,
     const Asked *asked, Bounds *out) {
     ReachableSets sets(*robot, *points, *centres, *loads, asked->offset);
-    if (robot->ng || !sets.covers()) return 0;
     std::vector<int64_t> left;
     for (int64_t i = 0; i < points->count; ++i)
         if (out->outcome[i] == SOLVED) left.push_back(i);
@@ -53,17 +47,15 @@ EXPORTED int bound_all(
         in_blocks({&left[first], &left[first] + last - first}, [&](const Block &block, Whole pending) {
             return sets.read_bodies(*points, block, pending, bodies, out->outcome);
         });
-        for (const auto &[size, own] : grouped(bodies))
-            Farthest(size[0], size[1], size[2]).search(own, asked->tolerance, settle);
+        for (const auto &[size, tasks] : searches_of(bodies, asked->tolerance))
+            Farthest(*tasks.front().body, size[0]).search(tasks, settle);
     }
-    return 1;
 }
 
 // Compliances of every point, as compiled_compliance.py's comply_all.
-EXPORTED int comply_all(const Robot *robot, const Points *points, Compliances *out) {
+EXPORTED void comply_all(const Robot *robot, const Points *points, Compliances *out) {
     Compliance compliance(*robot, *points);
     in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
         return compliance.comply(*points, block, pending, *out);
     });
-    return 1;
 }

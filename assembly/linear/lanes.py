@@ -61,7 +61,7 @@ def assemble_side_by_side(
         out: arrays to fill.
 
     Returns:
-        Whether it did; not where there is no compiler, or for cones of three columns.
+        Whether it did; not where there is no compiler.
     """
     return _side_by_side("assemble_all", structure, (T, errors, mismatch), out)
 
@@ -149,8 +149,8 @@ def _side_by_side(
     T, errors, mismatch = points
     given = _Points(len(T), *map(_address, points), len(errors) > 1)
     rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
-    function = getattr(library, name)
-    return bool(function(*map(ctypes.byref, (_robot(structure), given, *rows))))
+    getattr(library, name)(*map(ctypes.byref, (_robot(structure), given, *rows)))
+    return True
 
 
 def _address(array: NDArray | int) -> int | None:

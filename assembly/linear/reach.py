@@ -38,6 +38,7 @@ from assembly.model.clearance import (
     component_bounds,
     scales_with_margin,
 )
+from assembly.solvers import one_problem
 from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
@@ -139,8 +140,6 @@ class ReachableSet:
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.solvers.support import screw_near
-
         direction = np.asarray(direction, dtype=float)
         gradient = self.map.T @ direction
         along = np.abs(direction @ self.free).max(initial=0.0)
@@ -155,10 +154,24 @@ class ReachableSet:
             none, np.zeros(0), gradient / size, self.rows, right, self.group
         )
         height = at_centre - least.bound * size - float(gradient @ self.start)
-        body = self.body
-        screw = screw_near(body, least.clearances)
+        screw = self._screw_near(least.clearances)
         reduced = gradient + self.rows.T @ least.rigid_multipliers * size
         return Support(max(height, float(direction @ screw)), screw, reduced)
+
+    def _screw_near(self, v: NDArray) -> NDArray:
+        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones."""
+        start, group = self.start, self.group
+        step = v - start
+        step = step - self.rows.T @ (self.rows @ step)
+        # the longest part of the step, from a start inside, that stays in all cones
+        aa, ab, bb = (
+            np.bincount(group, one * other)
+            for one, other in ((step, step), (start, step), (start, start))
+        )
+        beyond = aa + 2.0 * ab + bb > 1.0
+        aa, ab, room = aa[beyond], ab[beyond], np.maximum(1.0 - bb[beyond], 0.0)
+        shares = (np.sqrt(ab**2 + aa * room) - ab) / aa
+        return self.centre + self.map @ (shares.min(initial=1.0) * step)
 
     def farthest(
         self, part: int, tolerance: float
@@ -175,10 +188,16 @@ class ReachableSet:
         Raises:
             SolverFailed: the cone solver gave up.
         """
-        from assembly.solvers.farthest import NEEDED, begin_search, search_on
-
         if self.unbounded(part):
             return (np.inf, np.inf), self.centre, 0
+        found = one_problem.farthest(
+            self.centre, self.map, self.rows, self.start, self._starts, part, tolerance
+        )
+        if found is not None:
+            (low, high), screw, supports = found
+            return (float(low), float(high)), screw, supports
+        from assembly.solvers.farthest import NEEDED, begin_search, search_on
+
         body = self.body
         search, nothing = begin_search(body, part, tolerance), np.zeros(0)
         state = search_on(body, search, 0.0, nothing, nothing)
@@ -193,12 +212,17 @@ class ReachableSet:
         """The set as the compiled search reads it."""
         from assembly.solvers.support import ConvexBody
 
-        starts = np.searchsorted(self.group, np.arange(self.group.max(initial=-1) + 2))
         centre, X, H, start = (
             np.require(a, requirements=["C", "W"])
             for a in (self.centre, self.map, self.rows, self.start)
         )
-        return ConvexBody(centre, X, H, start, starts)
+        return ConvexBody(centre, X, H, start, self._starts)
+
+    @property
+    def _starts(self) -> NDArray:
+        """(cones + 1,) first column of each cone, and nv."""
+        cones = np.arange(self.group.max(initial=-1) + 2)
+        return np.searchsorted(self.group, cones)
 
 
 def reachable_screws(

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_matrix, diags_array, hstack, vstack
 
+from assembly.solvers import one_problem
+
 _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
 # robot at a relative gap of 1e-6; without any it reaches 1e-13 on all of them
@@ -158,9 +160,14 @@ def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray | None, str]:
     """The interior-point method of this package; its solution must satisfy H."""
-    from assembly.solvers.cone_solvers import interior_point
+    starts = _starts(group)
+    solution = one_problem.interior_point(G, h, d, H, k, starts, 1e-12)
+    if solution is None:
+        from assembly.solvers.cone_solvers import interior_point
 
-    u, n, _ = interior_point(*_writable(G, h, d, H, k), _starts(group), 1e-12)
+        rows = _writable(G, h, d, H, k)
+        solution = interior_point(*rows, starts, 1e-12)[:2]
+    u, n = solution
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
         return None, None, "no feasible point found"

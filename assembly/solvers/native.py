@@ -1,8 +1,9 @@
 """C++ of this package, compiled where a compiler stands: problems side by side.
 
-A library is compiled at its first use, for this very processor, and kept beside what
-numba keeps.  Its name and what it says of itself hold a digest of its source, of the
-compiler's options and of the processor, so that none is used that is out of date.
+Libraries are compiled at the first use of one of them, next to each other, for this
+very processor, and kept beside what numba keeps.  A library's name and what it says of
+itself hold a digest of its source, of the compiler's options and of the processor, so
+that none is used that is out of date.
 Where no compiler stands, or it fails, there is no library, and callers use numba.
 """
 
@@ -16,9 +17,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from forcefit.inputs.locking import locked_file
@@ -30,6 +32,10 @@ _OPTIONS = (
     "-shared", "-fPIC",
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
+# what nearly every command needs
+_OFTEN = (
+    "linear/lanes.cpp", "kinematics/continuation.cpp", "solvers/one_problem.cpp"
+)  # fmt: skip
 _LONGEST = 120  # [s] a compiler may take
 # what /proc/cpuinfo says of processors of one kind
 _NAMED = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
@@ -64,26 +70,40 @@ def load_library(source: str) -> ctypes.CDLL | None:
 @cache
 def _library(source: str) -> ctypes.CDLL | None:
     """The library, or None, found out once."""
-    digest = _digest(source)
-    path = folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
-    library, refused = _loaded(path, digest), path.with_suffix(".failed")
-    if library is not None or refused.exists():
+    digest, path = _kept_at(source)
+    library = _loaded(path, digest)
+    if library is not None or path.with_suffix(".failed").exists():
         return library
     compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
     if compiler is None:
         return None
+    announce()
+    with ThreadPoolExecutor() as pool:  # each waits for a compiler
+        compiled = pool.map(partial(_compiled, compiler), {source, *_OFTEN})
+    return dict(compiled)[source]
+
+
+def _kept_at(source: str) -> tuple[str, Path]:
+    """Digest and place of a library."""
+    digest = _digest(source)
+    return digest, folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
+
+
+def _compiled(compiler: str, source: str) -> tuple[str, ctypes.CDLL | None]:
+    """The source file, and its library if the compiler can make it."""
+    digest, path = _kept_at(source)
     lock = path.with_suffix(".lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with locked_file(lock):
             library = _loaded(path, digest)  # another program was waited for
-            if library is None and not refused.exists():
+            if library is None and not path.with_suffix(".failed").exists():
                 _compile(compiler, source, digest, path)
                 library = _loaded(path, digest)
             lock.unlink()
     except OSError:  # no folder to write to
-        return None
-    return library
+        return source, None
+    return source, library
 
 
 def folder_of_compiled() -> Path:
@@ -137,7 +157,6 @@ def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
 
 def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     """Write the library, whole or not at all; where that fails, a note that it did."""
-    announce()
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
     command = [
@@ -148,7 +167,8 @@ def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
         subprocess.run(command, capture_output=True, timeout=_LONGEST, check=True)
         os.chmod(unfinished, 0o755)  # temporary files are their maker's alone
         os.replace(unfinished, path)
-    except subprocess.SubprocessError:  # it refused, or took too long
-        path.with_suffix(".failed").touch()
+    except subprocess.SubprocessError as error:  # it refused, or took too long
+        if getattr(error, "returncode", 1) > 0:  # nobody stopped it
+            path.with_suffix(".failed").touch()
     finally:
         Path(unfinished).unlink(missing_ok=True)

@@ -48,12 +48,6 @@ def gradient_along(
     return support(body, part, direction, tolerance)[2]
 
 
-@kernel
-def screw_near(body: ConvexBody, v: Vector) -> Vector:
-    """:func:`screw_at` of what is :func:`within`, for callers that are not compiled."""
-    return screw_at(body, within(body, v))
-
-
 @part
 def support(
     body: ConvexBody, part: int, direction: Vector, tolerance: float

@@ -161,19 +161,19 @@ inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
 
 // A lane's body: the columns that are not held, filled up.
 inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *centre) const {
-    Body body;
-    body.point = point, body.p = p;
+    const auto filled = [](int count) { return (count + FILLED - 1) / FILLED * FILLED; };
     std::vector<int> columns;
     for (int c = 0; c < 2 * cones.discs; ++c)
         if (!held[c][l]) columns.push_back(c);
-    body.own_discs = int(columns.size()) / 2;
-    body.discs = (body.own_discs + FILLED - 1) / FILLED * FILLED;
-    columns.resize(2 * body.discs, -1);
+    const int discs = int(columns.size()) / 2;
+    columns.resize(2 * filled(discs), -1);
     for (int c = 2 * cones.discs; c < nu; ++c)
         if (!held[c][l]) columns.push_back(c);
-    body.own_intervals = int(columns.size()) - 2 * body.discs;
-    body.intervals = (body.own_intervals + FILLED - 1) / FILLED * FILLED;
-    columns.resize(body.nv(), -1);
+    const int intervals = int(columns.size()) - 2 * filled(discs);
+    columns.resize(2 * filled(discs) + filled(intervals), -1);
+    Body body = {
+        point, Cones(filled(discs), filled(intervals), {}), discs, intervals, p, {}, {},
+        {}, {}};
     const auto copy = [&](const Real *row, std::vector<double> &to) {
         for (int c : columns) to.push_back(c < 0 ? 0.0 : row[c][l]);
     };
@@ -231,14 +231,17 @@ inline Whole ReachableSets::read_bodies(
     return others & ~asked;
 }
 
-// Bodies filled up to the same numbers, by columns and then by rows.
-typedef std::map<std::array<int, 3>, std::vector<const Body *>> Groups;
+// Searches of all bodies in both halves; together those of bodies that are filled up to
+// the same numbers of rows and columns.
+typedef std::map<std::array<int, 3>, std::vector<Task>> Groups;
 
-inline Groups grouped(const std::vector<Body> &bodies) {
+inline Groups searches_of(const std::vector<Body> &bodies, const double *tolerance) {
     Groups groups;
     for (const Body &body : bodies) {
         const int p = (body.p + FILLED - 1) / FILLED * FILLED;
-        groups[{body.discs, body.intervals, p}].push_back(&body);
+        for (int half = 0; half < 2; ++half)
+            groups[{p, body.cones.discs, body.cones.intervals}].push_back(
+                {&body, 3 * half, tolerance[half]});
     }
     return groups;
 }

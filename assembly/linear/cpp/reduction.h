@@ -41,8 +41,6 @@ class Reduction : public Linearised {
 public:
     Reduction(const Robot &s, const Points &points);
 
-    bool covers() const { return cones.known; }
-
 protected:
     const Cones cones;
     std::vector<int> slot;  // of the patterns with clearances, in parts; else -1

@@ -14,7 +14,7 @@
 // z         (z0, z1), the cones' multipliers: z1 = M^T y - d
 // w, rho    Nesterov and Todd's points, W = rho^1/2 (w); here l = (w) z, and right sides
 //           of the scaled complementarity are rho^1/2 t: no root of rho is taken
-// D         W^2 without its heads, of each cone
+// D         W^2 without its heads, of each cone; of a ball a - b w w^T
 // S         M D M^T + diag(1 .. 1, 0 .. 0)
 // ========  ===========================================================================
 //
@@ -22,6 +22,7 @@
 #pragma once
 
 #include <algorithm>
+#include <numeric>
 
 #include "real.h"
 
@@ -36,33 +37,43 @@ constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
 constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
 constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
 
-// The cones' columns: discs of two columns each first, then intervals of one.
+// The cones' columns: discs of two columns each first, then intervals of one, then balls
+// of more.
 struct Cones {
-    int discs = 0, count = 0, nu = 0;
+    int discs = 0, intervals = 0, count = 0, nu = 0;
+    std::vector<int> balls;       // columns of each
     std::vector<int64_t> column;  // (nu,) as the robot counts them
-    bool known = true;            // no cone has more than two columns
 
     Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
-        for (int size = 2; size >= 1; --size)
-            for (int c = 0; c < cones; ++c)
-                if (starts[c + 1] - starts[c] == size) {
-                    discs += size == 2;
-                    for (int k = 0; k < size; ++k) column.push_back(starts[c] + k);
-                }
-        known = int(column.size()) == nu;
+        const auto add = [&](int c) {
+            for (int64_t i = starts[c]; i < starts[c + 1]; ++i) column.push_back(i);
+        };
+        for (int c = 0; c < cones; ++c)
+            if (starts[c + 1] - starts[c] == 2) ++discs, add(c);
+        for (int c = 0; c < cones; ++c)
+            if (starts[c + 1] - starts[c] == 1) ++intervals, add(c);
+        for (int c = 0; c < cones; ++c)
+            if (const int size = int(starts[c + 1] - starts[c]); size > 2)
+                balls.push_back(size), add(c);
     }
 
-    // So many discs, then intervals.
-    Cones(int discs, int intervals)
-        : discs(discs), count(discs + intervals), nu(2 * discs + intervals) {}
+    // So many discs, then intervals, then balls of so many columns each.
+    Cones(int discs, int intervals, const std::vector<int> &balls)
+        : discs(discs), intervals(intervals), count(discs + intervals + int(balls.size())),
+          nu(std::accumulate(balls.begin(), balls.end(), 2 * discs + intervals)),
+          balls(balls) {}
 
-    // Calls visit.template operator()<size>(cone, first column) for every cone.
+    // Calls visit(columns, cone, first column) for every cone.
     template <typename Visit> void each(Visit visit) const {
-        for (int c = 0; c < discs; ++c) visit(Size<2>{}, c, 2 * c);
-        for (int c = discs; c < count; ++c) visit(Size<1>{}, c, discs + c);
+        int c = 0, at = 0;
+        for (; c < discs; ++c, at += 2) visit(Size<2>{}, c, at);
+        for (; c < discs + intervals; ++c, ++at) visit(Size<1>{}, c, at);
+        for (int size : balls) visit(Size<0>{size}, c++, at), at += size;
     }
-    template <int size> struct Size {
-        constexpr operator int() const { return size; }
+    template <int width> struct Size {  // of a ball if the width is 0
+        static constexpr bool ball = width == 0;
+        int columns = width;
+        constexpr operator int() const { return ball ? columns : width; }
     };
 };
 
@@ -123,7 +134,8 @@ public:
     explicit Solver(const Cones &cones, int rows)
         : k(cones), system(rows), B(2, cones.nu), heads(cones.count), z0(cones.count),
           z1(cones.nu), u(cones.nu), du(cones.nu), dz0(cones.count), dz1(cones.nu),
-          f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu) {}
+          f(cones.nu), y(rows), right(rows), residual(rows), start(rows), old(cones.nu),
+          wide(3, cones.balls.empty() ? 0 : cones.nu) {}
 
     Whole newton_alone(Programme &q, double relative, Real absolute, Whole asked) {
         return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
@@ -140,7 +152,7 @@ private:
     // that an iteration touches has to fit into the fastest cache.
     struct Head {
         Real rho, w0, w[2];
-        Real D[3];                                    // 11, 12, 22
+        Real D[3];                                    // 11, 12, 22; of a ball a, b
         Real over_s2, over_z0, over_l0, over_head;    // 1 / (1 - u.u) ..  1 / (1 + w0)
     };
 
@@ -149,6 +161,14 @@ private:
     Table B;
     std::vector<Head> heads;
     Row z0, z1, u, du, dz0, dz1, f, y, right, residual, start, old;
+    Table wide;  // of the balls: w, and room for l and t of the correction
+
+    template <typename Size> Real *turn_of(Size, Head &head, int at) {
+        if constexpr (Size::ball)
+            return wide[0] + at;
+        else
+            return head.w;
+    }
 
     Whole scale();
     template <int R> void square_scaled(Real *const *x, Real *const *out) const;
@@ -165,7 +185,7 @@ inline Whole Solver::scale() {
     Whole inside = whole(-1);
     k.each([&](auto size, int c, int at) {
         Head &o = heads[c];
-        Real s2 = real(1.0), z2 = z0[c] * z0[c], sz = z0[c];
+        Real *w = turn_of(size, o, at), s2 = real(1.0), z2 = z0[c] * z0[c], sz = z0[c];
         for (int i = at; i < at + size; ++i) {
             s2 -= u[i] * u[i];
             z2 -= z1[i] * z1[i];
@@ -181,9 +201,9 @@ inline Whole Solver::scale() {
         o.w0 = (1.0 + o.rho * z0[c]) * half;
         Real ww = {}, wz = {};
         for (int i = 0; i < size; ++i) {
-            o.w[i] = (u[at + i] - o.rho * z1[at + i]) * half;
-            ww += o.w[i] * o.w[i];
-            wz += o.w[i] * z1[at + i];
+            w[i] = (u[at + i] - o.rho * z1[at + i]) * half;
+            ww += w[i] * w[i];
+            wz += w[i] * z1[at + i];
         }
         const Real l0 = o.w0 * z0[c] + wz, head = 1.0 + o.w0, wide = 1.0 + 2.0 * ww;
         const Real most = head * l0, once = 1.0 / (most * wide), fewer = wide * once;
@@ -191,10 +211,11 @@ inline Whole Solver::scale() {
         const Real along = o.rho * most * once;  // of D, which is rho across w
         o.D[0] = along;
         if (size == 2) {
-            o.D[0] = along * (1.0 + 2.0 * o.w[1] * o.w[1]);
-            o.D[1] = -2.0 * along * o.w[0] * o.w[1];
-            o.D[2] = along * (1.0 + 2.0 * o.w[0] * o.w[0]);
+            o.D[0] = along * (1.0 + 2.0 * w[1] * w[1]);
+            o.D[1] = -2.0 * along * w[0] * w[1];
+            o.D[2] = along * (1.0 + 2.0 * w[0] * w[0]);
         }
+        if (size.ball) o.D[0] = o.rho, o.D[1] = 2.0 * along;
     });
     return inside;
 }
@@ -206,7 +227,11 @@ inline void Solver::square_scaled(Real *const *x, Real *const *out) const {
         const Real *o = heads[c].D, D[3] = {o[0], o[1], o[2]};
         for (int i = 0; i < R; ++i) {
             const Real first = x[i][at];
-            if (size == 1) {
+            if (size.ball) {
+                const Real along = D[1] * inner(wide[0] + at, x[i] + at, size);
+                for (int j = at; j < at + size; ++j)
+                    out[i][j] = D[0] * x[i][j] - along * wide[0][j];
+            } else if (size == 1) {
                 out[i][at] = D[0] * first;
             } else {
                 const Real second = x[i][at + 1];
@@ -248,6 +273,13 @@ inline void Solver::direction(Programme &q) {
     k.each([&](auto size, int c, int at) {
         const Real *D = heads[c].D, first = f[at] - dz1[at];
         du[at] = D[0] * first;
+        if (size.ball) {
+            Real along = {};
+            for (int i = at; i < at + size; ++i) along += wide[0][i] * (f[i] - dz1[i]);
+            along *= D[1];
+            for (int i = at; i < at + size; ++i)
+                du[i] = D[0] * (f[i] - dz1[i]) - along * wide[0][i];
+        }
         if (size == 2) {
             const Real second = f[at + 1] - dz1[at + 1];
             du[at] += D[1] * second;
@@ -284,21 +316,23 @@ inline Real Solver::fastest() const {
 // Solves l o t = r = target e - l o l - (W^-1 ds) o (W dz) for t; f = (W^-1 t)_1.
 inline void Solver::correct(Real target) {
     k.each([&](auto size, int c, int at) {
-        const Head &o = heads[c];
+        Head &o = heads[c];
+        const Real *w = turn_of(size, o, at);
         Real ds = {}, dz = {}, wz = {}, z2 = z0[c] * z0[c];
         for (int i = 0; i < size; ++i) {
-            ds += o.w[i] * du[at + i];
-            dz += o.w[i] * dz1[at + i];
-            wz += o.w[i] * z1[at + i];
+            ds += w[i] * du[at + i];
+            dz += w[i] * dz1[at + i];
+            wz += w[i] * z1[at + i];
             z2 -= z1[at + i] * z1[at + i];
         }
         const Real l0 = o.w0 * z0[c] + wz, s0 = -ds, y0 = o.w0 * dz0[c] + dz;
-        Real squares = l0 * l0, product = s0 * y0, lt = {}, wt = {}, l[2], t[2];
+        Real squares = l0 * l0, product = s0 * y0, lt = {}, wt = {}, room[4];
+        Real *l = size.ball ? wide[1] + at : room, *t = size.ball ? wide[2] + at : room + 2;
         ds *= o.over_head, dz = dz0[c] + dz * o.over_head;
         wz = z0[c] + wz * o.over_head;
         for (int i = 0; i < size; ++i) {
-            const Real s1 = du[at + i] + ds * o.w[i], y1 = dz1[at + i] + dz * o.w[i];
-            l[i] = z1[at + i] + wz * o.w[i];
+            const Real s1 = du[at + i] + ds * w[i], y1 = dz1[at + i] + dz * w[i];
+            l[i] = z1[at + i] + wz * w[i];
             squares += l[i] * l[i], product += s1 * y1;
             t[i] = -(s0 * y1 + y0 * s1) - 2.0 * o.rho * l0 * l[i];
             lt += l[i] * t[i];
@@ -308,11 +342,11 @@ inline void Solver::correct(Real target) {
         const Real t0 = (l0 * r0 - lt) * over_z2;
         for (int i = 0; i < size; ++i) {
             t[i] = (t[i] - t0 * l[i]) * o.over_l0;
-            wt += o.w[i] * t[i];
+            wt += w[i] * t[i];
         }
         wt = wt * o.over_head - t0;
         const Real over_rho = o.rho * z2 * o.over_s2;
-        for (int i = 0; i < size; ++i) f[at + i] = (t[i] + wt * o.w[i]) * over_rho;
+        for (int i = 0; i < size; ++i) f[at + i] = (t[i] + wt * w[i]) * over_rho;
         dz0[c] = r0;
     });
 }
@@ -392,7 +426,14 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
         Real *own = &u[first], *z = &z1[first], *kept = &old[first];
         Real *D = heads[c].D, along = {}, moved = {}, force;
         for (int i = 0; i < size; ++i) own[i] = kept[i] - sigma * z[i];
-        if (size == 1) {
+        if (size.ball) {
+            const Real length = root(inner(own, own, size));
+            const Whole inside = length <= 1.0;
+            const Real shorter = 1.0 / (inside ? real(1.0) : length);
+            for (int i = 0; i < size; ++i) wide[0][first + i] = own[i] *= shorter;
+            D[0] = sigma * shorter, D[1] = inside ? Real{} : D[0];
+            force = root(inner(z, z, size));
+        } else if (size == 1) {
             const Whole inside = magnitude(own[0]) <= 1.0;
             own[0] = inside ? own[0] : own[0] > 0.0 ? real(1.0) : real(-1.0);
             D[0] = inside ? sigma : Real{};

@@ -19,13 +19,13 @@ constexpr double ROUNDING = 1e-14;   // by which a cone may be exceeded
 // A body, its columns filled up with zeros to a number that others have too.
 struct Body {
     int64_t point;
-    int discs, intervals;          // of the columns
+    Cones cones;                   // of the columns
     int own_discs, own_intervals;  // that are not filled up
     int p;
     double centre[6];
     std::vector<double> X, H, start;  // (6, nv), (p, nv), (nv,)
 
-    int nv() const { return 2 * discs + intervals; }
+    int nv() const { return cones.nu; }
     double inner_of(const double *a, const double *b) const {
         double total = 0.0;
         for (int j = 0; j < nv(); ++j) total += a[j] * b[j];
@@ -33,10 +33,17 @@ struct Body {
     }
 };
 
+// A search: of a body, in the rotation (0) or the translation (3), to bounds so close.
+struct Task {
+    const Body *body;
+    int half;
+    double tolerance;
+};
+
 // The state of a search.
 struct Search {
     const Body *body = nullptr;
-    int half = 0;            // 0 for the rotation, 3 for the translation
+    int half = 0;
     double tolerance, low, high;
     double best[6];          // attains the lower bound
     Point direction = {};    // of the next support
@@ -49,7 +56,7 @@ struct Search {
     std::vector<Plane> planes;  // found before there was a box
     Polytope outer;
 
-    void begin(const Body &of, int part, double asked);
+    void begin(const Task &task);
     void improve(const double *screw);
     void add_plane(const Point &normal, double height);
     void choose();
@@ -65,16 +72,16 @@ private:
     }
 };
 
-inline void Search::begin(const Body &of, int part, double asked) {
-    body = &of, half = part, tolerance = asked;
-    std::copy(of.centre, of.centre + 6, best);
+inline void Search::begin(const Task &task) {
+    body = task.body, half = task.half, tolerance = task.tolerance;
+    std::copy(body->centre, body->centre + 6, best);
     const double *own = best + half;
     low = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
     high = INFINITY;
     stage = CLIMBING, supports = 0, gained = false;
     heights[0].fill(NAN), heights[1].fill(NAN);
     planes.clear();
-    if (of.own_discs + of.own_intervals)
+    if (body->nv())
         first_direction();
     else
         high = low;
@@ -106,18 +113,16 @@ inline void Search::first_direction() {
             d[a] /= size;
             middle += d[a] * b.centre[half + a];
         }
-        const auto cone = [&](int at, int width) {
+        b.cones.each([&](int columns, int, int at) {
             double length = 0.0;
-            for (int j = at; j < at + width; ++j) {
+            for (int j = at; j < at + columns; ++j) {
                 const double own =
                     d[0] * free[j] + d[1] * free[nv + j] + d[2] * free[2 * nv + j];
                 length += own * own;
                 middle -= own * b.start[j];
             }
             height += std::sqrt(length);
-        };
-        for (int k = 0; k < b.discs; ++k) cone(2 * k, 2);
-        for (int k = 0; k < b.intervals; ++k) cone(2 * b.discs + k, 1);
+        });
         if (height + std::fabs(middle) > most) {
             most = height + std::fabs(middle);
             for (int a = 0; a < 3; ++a) direction[a] = middle >= 0.0 ? d[a] : -d[a];
@@ -203,17 +208,15 @@ inline void Search::start_boxing() {
     for (const Plane &plane : planes) set_side(plane);
 }
 
-// Searches bodies whose columns are filled up to the same numbers, of at most p rows.
+// Searches bodies with cones as the first one, of at most p rows.
 class Farthest {
 public:
-    Farthest(int discs, int intervals, int p)
-        : cones(discs, intervals), body(cones, p), whole_map(6, cones.nu), q(cones, p),
+    Farthest(const Body &first, int p)
+        : cones(first.cones), body(cones, p), whole_map(6, cones.nu), q(cones, p),
           solver(cones, p), majorant(cones.nu, p), gradient(cones.nu), v(cones.nu) {}
 
-    // Every body in both halves; settle(search, solved) is called at the end of each.
-    template <typename Settle>
-    void search(
-        const std::vector<const Body *> &bodies, const double *tolerance, Settle settle) {
+    // Does all tasks; settle(search, solved) is called at the end of each.
+    template <typename Settle> void search(const std::vector<Task> &tasks, Settle settle) {
         size_t next = 0;
         Whole busy = {};
         while (true) {
@@ -226,9 +229,8 @@ public:
                         settle(own, done);
                         busy[l] = 0;
                     }
-                    if (next == 2 * bodies.size()) break;
-                    const int half = int(next % 2);
-                    own.begin(*bodies[next++ / 2], 3 * half, tolerance[half]);
+                    if (next == tasks.size()) break;
+                    own.begin(tasks[next++]);
                     load(l);
                     busy[l] = -1;
                 }
@@ -329,8 +331,10 @@ inline void Farthest::load(int l) {
     symmetric[l] = even ? -1 : 0;
     body.rows[l] = b.p;
     for (int c = 0; c < cones.count; ++c) {
-        const bool there = c < cones.discs ? c < b.own_discs
-                                           : c - cones.discs < b.own_intervals;
+        const int interval = c - cones.discs;
+        const bool there = interval < 0                 ? c < b.own_discs
+                           : interval < cones.intervals ? interval < b.own_intervals
+                                                        : true;
         body.present[c][l] = there ? -1 : 0;
     }
     tolerances[l] = own.tolerance;

@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-#if defined(__AVX512F__)
+#if defined(FEW_LANES)
+constexpr int LANES = 2;  // where few problems come at once
+#elif defined(__AVX512F__)
 constexpr int LANES = 8;
 #elif defined(__AVX__)
 constexpr int LANES = 4;

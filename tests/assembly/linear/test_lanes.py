@@ -303,7 +303,7 @@ def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
     asked = []
 
     def fail(command, **options):
-        asked.append(command)
+        asked.append(next(word for word in command if word.endswith(".cpp")))
         raise subprocess.CalledProcessError(1, command)
 
     monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
@@ -313,9 +313,26 @@ def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
         native._library.cache_clear()
         assert load_library(SOURCE) is None
     native._library.cache_clear()
-    assert len(asked) == 1
-    (note,) = tmp_path.iterdir()
-    assert note.suffix == ".failed"
+    assert str(native._PACKAGE / SOURCE) in asked
+    assert len(set(asked)) == len(asked)
+    assert {note.suffix for note in tmp_path.iterdir()} == {".failed"}
+
+
+def test_a_compiler_that_is_stopped_is_asked_again(tmp_path, monkeypatch):
+    """Ctrl-C while it works says nothing of the compiler."""
+
+    def stop(command, **options):
+        raise subprocess.CalledProcessError(-2, command)
+
+    monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
+    monkeypatch.setattr(native, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(native.subprocess, "run", stop)
+    native._library.cache_clear()
+    try:
+        assert load_library(SOURCE) is None
+    finally:
+        native._library.cache_clear()
+    assert list(tmp_path.iterdir()) == []
 
 
 @needs_compiler
