@@ -28,6 +28,7 @@ _TOLERANCE = 1e-13
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # gap that counts as proved: of the energy, and of the energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
+_GAP_WITHIN = 1e-12  # asked of the interior-point method
 _SHARE = 0.1  # of it that is asked here: the problem before elimination adds to it
 _STOP = 1e-2  # Newton's method stops at this fraction of it
 _STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
@@ -161,12 +162,12 @@ def _compiled(
 ) -> tuple[NDArray | None, NDArray | None, str]:
     """The interior-point method of this package; its solution must satisfy H."""
     starts = _starts(group)
-    solution = one_problem.interior_point(G, h, d, H, k, starts, 1e-12)
+    solution = one_problem.interior_point((G, h, d, H, k), starts, _GAP_WITHIN)
     if solution is None:
         from assembly.solvers.cone_solvers import interior_point
 
         rows = _writable(G, h, d, H, k)
-        solution = interior_point(*rows, starts, 1e-12)[:2]
+        solution = interior_point(*rows, starts, _GAP_WITHIN)[:2]
     u, n = solution
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
@@ -223,21 +224,21 @@ def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray
 ) -> Iterator[LeastEnergy]:
     """A solution with the bound of its own springs; the same refined by Newton."""
-    from assembly.solvers.cone_solvers import newton
-    from assembly.solvers.dual_newton import Dual
-
     G, h, d, H, k, group = problem
     yield _certify(problem, u, G @ u + h, rigid)
     if group.max() >= 0 and np.bincount(group).max() > 2:
         return  # Newton's method knows discs and intervals only
-    size = float(h @ h) / 2
-    u, y = u.copy(), np.concatenate([h, -rigid])
-    Gt, right, d = _writable(np.vstack([G, H]).T, np.concatenate([h, -k]), d)
-    dual = Dual(
-        Gt=Gt, h=right, d=d, springs=len(h), starts=_starts(group),
-        relative=_STOP * GAP, absolute=_STOP * GAP_WITHOUT_CLEARANCE * size,
-    )  # fmt: skip
-    newton(dual, _STEPS, _FIRST_SIGMA, u, y)
+    u, y, starts = u.copy(), np.concatenate([h, -rigid]), _starts(group)
+    relative = _STOP * GAP
+    absolute = _STOP * GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
+    limits = one_problem.Limits(relative, absolute, _FIRST_SIGMA, _STEPS)
+    if not one_problem.newton((G, h, d, H, k), starts, limits, u, y):
+        from assembly.solvers.cone_solvers import newton
+        from assembly.solvers.dual_newton import Dual
+
+        Gt, right, d = _writable(np.vstack([G, H]).T, np.concatenate([h, -k]), d)
+        dual = Dual(Gt, right, d, len(h), starts, relative, absolute)
+        newton(dual, _STEPS, _FIRST_SIGMA, u, y)
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():
         if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:

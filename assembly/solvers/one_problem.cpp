@@ -9,16 +9,20 @@ struct Given {
     int64_t r, p, cones;
     const int64_t *starts;                // (cones + 1,)
     const double *G, *h, *d, *H, *k;      // (r, nu), (r,), (nu,), (p, nu), (p,)
-    double tolerance;
 };
 
-// Overwrites u (nu,) and the multipliers n (p,) of H.
-EXPORTED void interior_point(const Given *given, double *u, double *n) {
-    const int r = int(given->r), p = int(given->p);
-    const Cones cones(given->starts, int(given->cones));
-    const int nu = cones.nu;
-    Programme q(cones, r + p);
-    q.r = r, q.p = p, q.loaded = true;
+// The gap that is asked for, and of Newton's method most steps and the first sigma.
+struct Limits {
+    double relative, absolute, first_sigma;
+    int64_t steps;
+};
+
+namespace {
+
+// The problem in every lane.
+void read(const Given *given, const Cones &cones, Programme &q) {
+    const int r = q.r = int(given->r), p = q.p = int(given->p), nu = cones.nu;
+    q.loaded = true;
     for (int c = 0; c < nu; ++c) {
         const int64_t own = cones.column[c];
         for (int i = 0; i < r; ++i) q.M[i][c] = real(given->G[i * nu + own]);
@@ -27,9 +31,36 @@ EXPORTED void interior_point(const Given *given, double *u, double *n) {
     }
     for (int i = 0; i < r; ++i) q.h[i] = real(given->h[i]);
     for (int i = 0; i < p; ++i) q.e[i] = real(given->k[i]);
-    Solver(cones, r + p).interior_point(q, real(given->tolerance), 0.0, whole(-1));
-    for (int c = 0; c < nu; ++c) u[cones.column[c]] = q.u[c][0];
-    for (int i = 0; i < p; ++i) n[i] = q.y[r + i][0];
+}
+
+}  // namespace
+
+// Overwrites u (nu,) and the multipliers y (r + p,), of H's rows last.
+EXPORTED void interior_point(
+    const Given *given, const Limits *limits, double *u, double *y) {
+    const Cones cones(given->starts, int(given->cones));
+    const int rows = int(given->r + given->p);
+    Programme q(cones, rows);
+    read(given, cones, q);
+    Solver(cones, rows).interior_point(
+        q, real(limits->absolute), limits->relative, whole(-1));
+    for (int c = 0; c < cones.nu; ++c) u[cones.column[c]] = q.u[c][0];
+    for (int i = q.r; i < rows; ++i) y[i] = q.y[i][0];
+}
+
+// The same from a first guess of u and of H's multipliers.
+EXPORTED void newton(const Given *given, const Limits *limits, double *u, double *y) {
+    const Cones cones(given->starts, int(given->cones));
+    const int rows = int(given->r + given->p);
+    Programme q(cones, rows);
+    read(given, cones, q);
+    for (int c = 0; c < cones.nu; ++c) q.u[c] = real(u[cones.column[c]]);
+    for (int i = q.r; i < rows; ++i) q.y[i] = real(y[i]);
+    Solver(cones, rows).dual_newton(
+        q, int(limits->steps), limits->first_sigma, limits->relative,
+        real(limits->absolute), whole(-1));
+    for (int c = 0; c < cones.nu; ++c) u[cones.column[c]] = q.u[c][0];
+    for (int i = 0; i < rows; ++i) y[i] = q.y[i][0];
 }
 
 // A body of platform screws; the half, 0 or 3, that is meant, and what is asked of upper

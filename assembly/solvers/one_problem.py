@@ -1,7 +1,8 @@
 """One cone programme, and one body's farthest screw, by ``one_problem.cpp``.
 
-The same equations and thresholds as :mod:`assembly.solvers.interior`, for cones of any
-size, and as :mod:`assembly.solvers.farthest`.
+The same equations and thresholds as :mod:`assembly.solvers.interior`,
+:mod:`assembly.solvers.dual_newton`, and :mod:`assembly.solvers.farthest`, for cones of
+any size.
 """
 
 import ctypes
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from assembly.solvers.native import load_library
 
 SOURCE = "solvers/one_problem.cpp"
+Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
 
 
 class _Given(ctypes.Structure):
@@ -20,7 +22,22 @@ class _Given(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("r", "p", "cones")),
         *((name, ctypes.c_void_p) for name in ("starts", "G", "h", "d", "H", "k")),
-        ("tolerance", ctypes.c_double),
+    )
+
+
+class Limits(ctypes.Structure):
+    """How far a method goes: ``Limits`` of one_problem.cpp.
+
+    Attributes:
+        relative: gap asked for, relative to |G u + h|^2 / 2 ..
+        absolute: .. plus this.
+        first_sigma: of Newton's method, times the mean |G_k^T h|.
+        steps: most of Newton's method.
+    """
+
+    _fields_ = (
+        *((n, ctypes.c_double) for n in ("relative", "absolute", "first_sigma")),
+        ("steps", ctypes.c_int64),
     )
 
 
@@ -35,17 +52,12 @@ class _Asked(ctypes.Structure):
 
 
 def interior_point(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, starts: NDArray,
-    tolerance: float,
-) -> tuple[NDArray, NDArray] | None:  # fmt: skip
+    problem: Problem, starts: NDArray, tolerance: float
+) -> tuple[NDArray, NDArray] | None:
     """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_k| <= 1 for each cone.
 
     Args:
-        G: (r, nu).
-        h: (r,).
-        d: (nu,).
-        H: (p, nu) of full row rank.
-        k: (p,).
+        problem: G (r, nu), h (r,), d (nu,), H (p, nu) of full row rank, k (p,).
         starts: (cones + 1,) first column of each cone, and nu.
         tolerance: gap asked for.
 
@@ -53,17 +65,48 @@ def interior_point(
         u (nu,) and the multipliers (p,) of H, as far as the method came; None where
         there is no compiler.
     """
+    _, h, d, _, k = problem
+    u, y = np.zeros(len(d)), np.zeros(len(h) + len(k))
+    limits = Limits(absolute=tolerance)
+    if not _solve("interior_point", problem, starts, limits, u, y):
+        return None
+    return u, y[len(h) :]
+
+
+def newton(
+    problem: Problem, starts: NDArray, limits: Limits, u: NDArray, y: NDArray
+) -> bool:
+    """The same by Newton's method on the dual.
+
+    Args:
+        problem: as above.
+        starts: as above.
+        limits: how far it goes.
+        u: (nu,) first guess within the cones; overwritten with the solution.
+        y: (r + p,) overwritten with the multipliers of G's rows, and of H's, which are
+            a first guess too.
+
+    Returns:
+        Whether it did; not where there is no compiler.
+    """
+    return _solve("newton", problem, starts, limits, u, y)
+
+
+def _solve(
+    name: str, problem: Problem, starts: NDArray, limits: Limits, u: NDArray, y: NDArray
+) -> bool:
+    """Call a function of the library; whether it did."""
     library = load_library(SOURCE)
     if library is None:
-        return None
-    arrays = _contiguous(starts, G, h, d, H, k)
-    u, n = np.zeros(len(d)), np.zeros(len(k))
-    given = _Given(len(h), len(k), len(starts) - 1, *_addresses(*arrays), tolerance)
-    library.interior_point(
-        ctypes.byref(given), ctypes.c_void_p(u.ctypes.data),
-        ctypes.c_void_p(n.ctypes.data),
+        return False
+    arrays = _contiguous(starts, *problem)
+    sizes = len(problem[1]), len(problem[4]), len(starts) - 1
+    given = _Given(*sizes, *_addresses(*arrays))
+    getattr(library, name)(
+        ctypes.byref(given), ctypes.byref(limits),
+        *map(ctypes.c_void_p, _addresses(u, y)),
     )  # fmt: skip
-    return u, n
+    return True
 
 
 def farthest(

@@ -3,10 +3,10 @@
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 //
-// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector, and without H
-// by Newton's method on the dual, smoothed about u_old by sigma:
+// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector, and by Newton's
+// method on the dual, smoothed about u_old by sigma; n, last of y, are H's multipliers:
 //
-//     maximise  y.h - |y|^2 / 2 - sum_k |(G^T y - d)_k|
+//     maximise  y.h - |y|^2 / 2 - n.e - sum_k |(G^T y + H^T n - d)_k|
 //
 // ========  ===========================================================================
 // M         (r + p, nu) rows of G, then of H
@@ -31,6 +31,7 @@ constexpr double START = 0.03;      // heads of z begin this far inside (numba: 
 constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a cone
 constexpr int HALVINGS = 12;        // of a step of Newton's
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
+constexpr double ON_ROWS = 1e-13;   // accepted of H u = e
 
 // of assembly/linear/compiled_energy.py's small_answer: gap from which Newton's method
 // finishes, of the energy and of that without clearance; its steps; its first sigma
@@ -176,7 +177,7 @@ private:
     void direction(Programme &q);
     Real fastest() const;
     void correct(Real target);
-    struct Slopes { Real smooth, residual, kink, primal; };
+    struct Slopes { Real smooth, residual, kink, primal; Whole closed; };
     Slopes slopes(const Programme &q, Real sigma, const Real *y);
 };
 
@@ -419,9 +420,9 @@ inline Whole Solver::interior_point(
 // gradient `right`, and D of minus the curvature M D M^T + 1.
 inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real *y) {
     for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
-    combine(q.M.rows(), q.r, y, k.nu, z1.data());
+    combine(q.M.rows(), q.r + q.p, y, k.nu, z1.data());
     const Real over_twice = 0.5 / sigma;
-    Slopes at = {};
+    Slopes at = {{}, {}, {}, {}, whole(-1)};
     k.each([&](auto size, int c, int first) {
         Real *own = &u[first], *z = &z1[first], *kept = &old[first];
         Real *D = heads[c].D, along = {}, moved = {}, force;
@@ -457,7 +458,14 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
         at.smooth += along + moved * over_twice;
         at.kink += larger(force + along, Real{});
     });
-    multiply(q.M.rows(), q.r, u.data(), k.nu, right.data());
+    multiply(q.M.rows(), q.r + q.p, u.data(), k.nu, right.data());
+    for (int i = q.r; i < q.r + q.p; ++i) {
+        right[i] -= q.e[i - q.r];
+        at.smooth -= y[i] * q.e[i - q.r];
+        at.kink -= y[i] * right[i];
+        at.residual += 0.5 * right[i] * right[i];
+        at.closed &= magnitude(right[i]) <= ON_ROWS;
+    }
     for (int i = 0; i < q.r; ++i) {
         at.smooth += y[i] * (q.h[i] - 0.5 * y[i]);
         const Real strain = right[i] + q.h[i];
@@ -468,8 +476,8 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
     return at;
 }
 
-// Maximises the dual in the lanes asked for; q.u is the first guess, and q.u and q.y
-// are overwritten there with the solution.
+// Maximises the dual in the lanes asked for; q.u and H's part of q.y are the first guess,
+// and q.u and q.y are overwritten there with the solution.
 //
 // steps        most Newton steps;
 // first_sigma  times the mean |(G^T h)_k|: the larger, the better the guess must be;
@@ -480,9 +488,9 @@ inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real 
 inline Whole Solver::dual_newton(
     Programme &q, int steps, double first_sigma, double relative, Real absolute,
     Whole asked) {
-    const int r = q.r;
+    const int r = q.r, m = r + q.p;
     old = q.u;
-    for (int i = 0; i < r; ++i) y[i] = q.h[i];
+    for (int i = 0; i < m; ++i) y[i] = i < r ? q.h[i] : q.y[i];
     multiply(q.M.rows(), r, old.data(), k.nu, right.data());
     for (int i = 0; i < r; ++i) y[i] += right[i];
     for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
@@ -493,10 +501,11 @@ inline Whole Solver::dual_newton(
     Real sigma = first_sigma > 0.0 ? first_sigma / larger(mean, real(1e-12)) : real(1e30);
     Real before = real(-INFINITY);
     Whole going = asked, done = {}, halvings = {}, taken = {};
-    Row step(r);
+    Row step(m);
     while (true) {
         Slopes at = slopes(q, sigma, y.data());
-        const Whole close = at.residual + at.kink <= relative * at.primal + absolute;
+        const Whole close =
+            at.closed & (at.residual + at.kink <= relative * at.primal + absolute);
         done |= going & close;
         going &= ~close;
         const Whole climbs = at.smooth >= before - 1e-14;
@@ -506,7 +515,7 @@ inline Whole Solver::dual_newton(
         if (!any(going)) break;
         // shorter where it did not climb, else on
         const Whole shorter = going & ~climbs, on = going & climbs;
-        for (int i = 0; i < r; ++i) {
+        for (int i = 0; i < m; ++i) {
             step[i] = shorter ? 0.3 * step[i] : step[i];
             y[i] = shorter ? start[i] + step[i] : y[i];
         }
@@ -521,17 +530,17 @@ inline Whole Solver::dual_newton(
             slopes(q, sigma, y.data());
         }
         fill_system(q);
-        going &= ~on | system.factor(r, false);
-        system.solve(r, right.data());
+        going &= ~on | system.factor(m, false);
+        system.solve(m, right.data());
         const Whole ahead = on & going;
-        for (int i = 0; i < r; ++i) {
+        for (int i = 0; i < m; ++i) {
             start[i] = ahead ? y[i] : start[i];
             step[i] = ahead ? right[i] : step[i];
             y[i] = ahead ? y[i] + step[i] : y[i];
         }
     }
     for (int j = 0; j < k.nu; ++j) q.u[j] = asked ? u[j] : q.u[j];
-    for (int i = 0; i < r; ++i) q.y[i] = asked ? y[i] : q.y[i];
+    for (int i = 0; i < m; ++i) q.y[i] = asked ? y[i] : q.y[i];
     return done;
 }
 
