@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import load_library
+from assembly.solvers.native import address, load_library
 
 if TYPE_CHECKING:
     from assembly.batch.compiled_draws import Energies, Reduced
@@ -51,10 +51,10 @@ def least_energies_side_by_side(
         reduced.Gt, reduced.starts, reduced.inverse, reduced.cones, reduced.gram
     )  # fmt: skip
     arrays = [np.ascontiguousarray(array) for array in (*shared, h)]
-    *fields, rows = (array.ctypes.data for array in arrays)
+    *fields, rows = map(address, arrays)
     nu, r = reduced.Gt.shape
     given = _Reduced(nu, r, len(reduced.starts) - 1, *fields, reduced.slip)
-    filled = (ctypes.c_void_p * len(out))(*(column.ctypes.data for column in out))
+    filled = (ctypes.c_void_p * len(out))(*map(address, out))
     count = ctypes.c_int64(len(h))
     library.least_energies(
         ctypes.byref(given), ctypes.c_void_p(rows), ctypes.byref(count),

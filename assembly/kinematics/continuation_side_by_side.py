@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import load_library
+from assembly.solvers.native import address, load_library
 
 if TYPE_CHECKING:
     from assembly.kinematics.nominal import Track
@@ -19,8 +19,8 @@ SOURCE = "kinematics/continuation.cpp"
 _ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
 
 
-class _Tree(ctypes.Structure):
-    """``Tree`` of continuation.cpp."""
+class Tree(ctypes.Structure):
+    """``Tree`` of continuation.cpp; ``arrays`` are kept as long as it is."""
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("n", "closures", "platform")),
@@ -39,14 +39,31 @@ class _Targets(ctypes.Structure):
     )
 
 
+def tree_of(fields: dict[str, Any]) -> Tree:
+    """A robot's tree for C++.
+
+    Args:
+        fields: of :class:`assembly.kinematics.compiled_continuation.Tree`.
+
+    Returns:
+        The addresses of its arrays.
+    """
+    tree = Tree(
+        len(fields["parents"]), len(fields["pairs"]), fields["platform"],
+        fields["size"], *(address(fields[name]) for name in _ARRAYS),
+    )  # fmt: skip
+    tree.arrays = fields
+    return tree
+
+
 def follow_side_by_side(
-    tree: dict[str, Any], start: NDArray, poses: NDArray, held: NDArray, guess: bool,
+    tree: Tree, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: "Track",
 ) -> bool:  # fmt: skip
     """Follow every target along its straight line.
 
     Args:
-        tree: fields of :class:`assembly.kinematics.compiled_continuation.Tree`.
+        tree: of the robot.
         start: (n,) coordinates at home.
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not asked.
         held: (k, n) coordinates, NaN where free.
@@ -59,11 +76,10 @@ def follow_side_by_side(
     library = load_library(SOURCE)
     if library is None:
         return False
-    robot = _Tree(
-        len(tree["parents"]), len(tree["pairs"]), tree["platform"], tree["size"],
-        *(tree[name].ctypes.data for name in _ARRAYS),
-    )  # fmt: skip
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
+    if len(held) == 1:
+        _follow(library, tree, (start, poses, held), guess, out)
+        return True
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
     while left.size:
@@ -73,13 +89,21 @@ def follow_side_by_side(
         whole = len(rows) == len(held)
         filled = out if whole else tuple(array[rows] for array in out)
         given = (start, poses[rows[: len(poses)]], held[rows])
-        arrays = [np.ascontiguousarray(array) for array in given]
-        targets = _Targets(
-            len(rows), *(a.ctypes.data if a.size else None for a in arrays), guess
-        )
-        tracks = (ctypes.c_void_p * len(out))(*(array.ctypes.data for array in filled))
-        library.follow_all(ctypes.byref(robot), ctypes.byref(targets), tracks)
+        _follow(library, tree, given, guess, filled)
         if not whole:
             for array, part in zip(out, filled, strict=True):
                 array[rows] = part
     return True
+
+
+def _follow(
+    library: ctypes.CDLL, tree: Tree, given: tuple[NDArray, NDArray, NDArray],
+    guess: bool, out: tuple[NDArray, ...],
+) -> None:  # fmt: skip
+    """Targets that ask for the same entries: start, poses and held coordinates."""
+    arrays = [np.ascontiguousarray(array) for array in given]
+    targets = _Targets(
+        len(arrays[2]), *(address(a) if a.size else None for a in arrays), guess
+    )
+    tracks = (ctypes.c_void_p * len(out))(*map(address, out))
+    library.follow_all(ctypes.byref(tree), ctypes.byref(targets), tracks)

@@ -14,7 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.continuation_side_by_side import follow_side_by_side
+from assembly.kinematics.continuation_side_by_side import (
+    Tree,
+    follow_side_by_side,
+    tree_of,
+)
 from assembly.model.robot import JOINTS, Robot
 
 NOT_CLOSED = "expected a configuration in which every closure holds"
@@ -113,6 +117,12 @@ def _tree(robot: Robot) -> dict[str, Any]:
     )
 
 
+@lru_cache(maxsize=64)
+def _tree_side_by_side(robot: Robot) -> Tree:
+    """The same for C++."""
+    return tree_of(_tree(robot))
+
+
 def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) -> Track:
     """Follow the nominal closures from one configuration to many targets.
 
@@ -126,6 +136,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         The ends of the tracks, and their progress.
     """
     tree, start = _tree(robot), np.array(start, dtype=float)
+    side_by_side = _tree_side_by_side(robot)
     count, n = len(target), len(robot.frames)
     held = np.full((count, n), np.nan)
     if target.coordinates is not None:
@@ -136,11 +147,11 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         np.zeros((count, len(tree["pairs"]))),
     )  # fmt: skip
     track.transforms[..., 3, 3] = 1.0
-    if not follow_side_by_side(tree, start, poses, held, guess, track):
-        from assembly.kinematics.compiled_continuation import Tree, follow_all
+    if not follow_side_by_side(side_by_side, start, poses, held, guess, track):
+        from assembly.kinematics import compiled_continuation as compiled
 
-        follow_all(
-            Tree(**tree), start, poses, held, guess, track.coordinates, track.progress,
-            track.transforms, track.closure_mismatch,
+        compiled.follow_all(
+            compiled.Tree(**tree), start, poses, held, guess, track.coordinates,
+            track.progress, track.transforms, track.closure_mismatch,
         )  # fmt: skip
     return track

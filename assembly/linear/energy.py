@@ -138,7 +138,7 @@ def _compiled_assembly(posture: Posture) -> Assembly | None:
     size = checked_size(robot)
     joints, _ = structure_of(robot)
     out = _solve_compiled(
-        robot, posture.transforms[None].copy(), robot.errors[None].copy(),
+        robot, posture.transforms[None], robot.errors[None],
         np.array([posture.mismatch]), "elastic", len(joints.links),
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
@@ -189,10 +189,19 @@ def _solve_compiled(
         if assemble_side_by_side(structure, T, errors, mismatch, out):
             _solve_left(structure, T, errors, mismatch, out)
         else:
-            from assembly.linear.compiled_energy import assemble_all
-
-            assemble_all(structure, T, errors, mismatch, out)
+            _by_numba(structure, T, errors, mismatch, out)
     return out
+
+
+def _by_numba(
+    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    out: Solutions,
+) -> None:  # fmt: skip
+    """One point after the other; numba's functions know writable arrays only."""
+    from assembly.linear.compiled_energy import assemble_all
+
+    T, errors = (np.require(rows, requirements=["C", "W"]) for rows in (T, errors))
+    assemble_all(structure, T, errors, mismatch, out)
 
 
 def _solve_left(
@@ -203,11 +212,9 @@ def _solve_left(
     left = np.flatnonzero(out.outcome >= COMPILED)
     if not len(left):
         return
-    from assembly.linear.compiled_energy import assemble_all
-
     again = Solutions._make(rows[left] if len(rows) else rows for rows in out)
     own = errors[left] if len(errors) > 1 else errors
-    assemble_all(structure, T[left], own, mismatch[left], again)
+    _by_numba(structure, T[left], own, mismatch[left], again)
     for rows, solved in zip(out, again, strict=True):
         if len(rows):
             rows[left] = solved

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
 from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
-from assembly.solvers.native import load_library
+from assembly.solvers.native import address, load_library
 
 SOURCE = "linear/lanes.cpp"
 _ARRAYS = (
@@ -157,7 +157,7 @@ def _address(array: NDArray | int) -> int | None:
     """Where an array's numbers are; None if it has none."""
     if isinstance(array, int):
         return array
-    return array.ctypes.data if array.size else None
+    return address(array) if array.size else None
 
 
 def _robot(structure: Structure) -> _Robot:
@@ -171,7 +171,7 @@ def _robot(structure: Structure) -> _Robot:
             len(s.on_path), s.patterns.shape[1], len(s.patterns), len(s.springs),
             len(s.groups) - 1, len(s.cone_frame), len(s.starts) - 1, len(s.free_frame),
         )  # fmt: skip
-        arrays = [getattr(s, name).ctypes.data for name in _ARRAYS]
+        arrays = [address(getattr(s, name)) for name in _ARRAYS]
         robot = _Robot(s.size, s.platform, *arrays, *counts)
         known = _known[id(structure)] = structure, robot
     return known[1]

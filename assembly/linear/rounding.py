@@ -72,8 +72,10 @@ def drop_zeros(
             than rounding.
         residual: (k,) [rad, lengths] open in the closures, rounding included.
     """
-    rounding = ~differs_from_zero(energy, 0.0, multipliers, residual)
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
+    if not zero.any():  # nor is any no more than rounding
+        return
+    rounding = ~differs_from_zero(energy, 0.0, multipliers, residual)
     energy[zero], multipliers[rounding] = 0.0, 0.0
     bound[zero] = np.minimum(bound[zero], 0.0)
 

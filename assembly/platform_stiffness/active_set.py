@@ -34,6 +34,7 @@ _RANK = 1e-10  # relative size below which a singular value counts as zero
 _FLAT = 1e-12  # of the largest curvature: what less counts as none
 _STEPS = 4  # of Newton's method; two are usual
 _SETTLED = 1e-14  # [-] beyond the bounds
+_GUESSES = 3  # of what is pressed
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
@@ -73,11 +74,26 @@ def settle(assembly: Assembly) -> Assembly:
 
     Returns:
         What Newton's method makes of it; the assembly itself if nothing is pressed, or
-        if a clearance would leave its bound or be pulled.
+        if it cannot be told what is.
     """
     pressed, _ = contacts(assembly)
-    if not pressed.any():
-        return assembly
+    for _ in range(_GUESSES):
+        if not pressed.any():
+            break
+        settled = _settled(assembly, pressed)
+        size = cone_sizes(settled.clearances, settled.joints.group)
+        if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
+            return settled
+        # a small force was taken for none, and its clearance leaves its bound
+        beyond = size > 1.0 + 1e-9
+        if not (beyond & ~pressed).any():
+            break
+        pressed = pressed | beyond
+    return assembly
+
+
+def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
+    """The equilibrium with these clearances at their bounds."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)
@@ -97,12 +113,9 @@ def settle(assembly: Assembly) -> Assembly:
         if np.abs(beyond).max() <= _SETTLED:
             break
     y, u, q = np.split(x, [bounded.start, bounded.stop])
-    settled = replace(
+    return replace(
         assembly, elastic=y, clearances=u, motions=q, multipliers=multipliers
     )
-    inside = cone_sizes(u, group) <= 1.0 + 1e-9
-    same = np.array_equal(contacts(settled)[0], pressed)
-    return settled if same and inside.all() else assembly
 
 
 def unknowns(assembly: Assembly) -> NDArray:

@@ -23,6 +23,8 @@ from contextvars import ContextVar
 from functools import cache, partial
 from pathlib import Path
 
+from numpy.typing import NDArray
+
 from forcefit.inputs.locking import locked_file
 
 _PACKAGE = Path(__file__).parents[1]
@@ -104,6 +106,14 @@ def _compiled(compiler: str, source: str) -> tuple[str, ctypes.CDLL | None]:
     except OSError:  # no folder to write to
         return source, None
     return source, library
+
+
+def address(array: NDArray) -> int:
+    """Where an array's numbers are, for C++; it must be contiguous."""
+    try:  # four times as fast as what NumPy offers
+        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
+    except (TypeError, ValueError):  # read-only, or empty
+        return array.ctypes.data
 
 
 def folder_of_compiled() -> Path:

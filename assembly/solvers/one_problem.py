@@ -10,7 +10,7 @@ import ctypes
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import load_library
+from assembly.solvers.native import address, load_library
 
 SOURCE = "solvers/one_problem.cpp"
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
@@ -137,9 +137,8 @@ def farthest(
     asked = _Asked(len(H), len(starts) - 1, half, *_addresses(*arrays), tolerance)
     library.farthest.restype = ctypes.c_int64
     supports = library.farthest(
-        ctypes.byref(asked), ctypes.c_void_p(bounds.ctypes.data),
-        ctypes.c_void_p(screw.ctypes.data),
-    )  # fmt: skip
+        ctypes.byref(asked), *map(ctypes.c_void_p, _addresses(bounds, screw))
+    )
     return None if supports < 0 else (bounds, screw, supports)
 
 
@@ -151,4 +150,4 @@ def _contiguous(starts: NDArray, *arrays: NDArray) -> tuple[NDArray, ...]:
 
 def _addresses(*arrays: NDArray) -> list[int]:
     """Where their numbers are."""
-    return [array.ctypes.data for array in arrays]
+    return [address(array) for array in arrays]

@@ -108,7 +108,8 @@ def test_a_settled_assembly_stands_on_its_bounds_to_rounding():
     )
     assert settled.closure_residual() < 1e-13
     assert settled.duality_gap() <= solved.duality_gap() + 1e-12
-    assert settled.energy == pytest.approx(solved.energy, rel=1e-9)
+    # less than the solver's, and no less than it proves
+    assert solved.bound - 1e-12 <= settled.potential <= solved.potential + 1e-12
     # of small ones the solver knows few digits: it proves the energy
     force = bound_forces(solved)
     np.testing.assert_allclose(bound_forces(settled), force, atol=1e-7 * force.max())
