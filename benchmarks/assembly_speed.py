@@ -7,7 +7,8 @@ grid of its workspace.  Printed, in this order:
 - microseconds of processor time a point for the energy (22), at the errors times 1 and
   times 0.2, by cvxpy rebuilt for every point (SI units), cvxpy with parameters (scaled,
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
-  reduced by ``assembly.linear.reduction`` (reduction counted), our reference in numpy,
+  reduced by ``assembly.linear.reduction`` (reduction counted), a batch of moreau's on
+  the full problem (to its 1e-8, without our certificate), our reference in numpy,
   ``solve_assembly`` and ``minimise_energies``, by numba and side by side in C++
   (linearisation, reduction and certificate counted), with the ratio of cvxpy's DPP to
   each;
@@ -184,6 +185,41 @@ def clarabel_reduced(posture: Posture) -> object:
     )
 
 
+def moreau_batched(postures: list[Posture]) -> float:
+    """Processor time a point [us] of the full problem, scaled, by moreau in one batch.
+
+    Its matrices are ready made; handing them over counts.
+    """
+    import moreau
+
+    data = [closure_matrices(posture) for posture in postures]
+    group = virtual_joints(postures[0].robot).group
+    limits, radii = conic._unit_cones(group, np.ones(len(group)))
+    springs, free = data[0][2].shape[1], data[0][0].shape[1]
+    limits = np.pad(limits.toarray(), ((0, 0), (0, springs + free)))
+    A = np.array([np.vstack([np.hstack([u, y, q]), limits]) for q, u, y, _ in data])
+    at = np.nonzero(np.any(A, axis=0))
+    offsets = np.cumsum([0, *np.bincount(at[0], minlength=A.shape[1])])
+    stored = len(group) + np.arange(springs)  # P = 1 on the springs' diagonal
+    P_offsets = np.searchsorted(stored, np.arange(A.shape[2] + 1))
+    solver = moreau.CompiledSolver(
+        A.shape[2], A.shape[1], P_offsets, stored, offsets, at[1],
+        moreau.Cones(
+            num_zero_cones=len(data[0][3]), so_cone_dims=list(np.bincount(group) + 1)
+        ),
+        moreau.Settings(batch_size=len(A), device="cpu", solver="ipm"),
+    )  # fmt: skip
+    q = np.zeros((len(A), A.shape[2]))
+    b = np.array([np.concatenate([-one[3], radii]) for one in data])
+    values, ones = A[:, *at], np.ones((len(A), springs))
+    start = time.process_time()
+    solver.setup(ones, values)
+    solver.solve(q, b)
+    taken = (time.process_time() - start) / len(A) * 1e6
+    solved = {status.name for status in solver.info.status}
+    return taken if solved == {"Solved"} else np.nan
+
+
 def cvxpy_rebuilt(posture: Posture) -> object:
     """As printed, in SI units, built anew."""
     reference._UNIT = 1.0
@@ -223,13 +259,15 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
     scaled = robot.with_errors(kappa * robot.errors)
     own = [replace(p, robot=scaled) for p in postures]
     few = own[:: len(own) // SAMPLE][:SAMPLE]
-    solve_assembly(few[0])
+    for posture in own:  # what one of them needs first is loaded
+        solve_assembly(posture)
     data = [closure_matrices(p) for p in few]
     rows = {
         "cvxpy rebuilt, SI": timed(cvxpy_rebuilt, few[::3]),
         "cvxpy DPP, scaled": timed(Dpp(robot, "elastic", False, data), data),
         "Clarabel, full problem, scaled": timed(clarabel_full, few),
         "Clarabel, our reduction (numpy)": timed(clarabel_reduced, few),
+        "moreau, batched, full problem": moreau_batched(own),
         "ours, reference in numpy": timed(reference_assembly, few),
         "ours, one at a time": timed(solve_assembly, own),
         **batched(minimise_energies, own),

@@ -185,7 +185,7 @@ def _secant_node(
     A = vstack([csc_matrix(H), sides, limits], format="csc")
     b = np.concatenate([k, high - c, c - low, radii])
     v, z, status = conic._clarabel(
-        csc_matrix((nu, nu)), -X.T @ slope, A, b, len(k), group, 1e-8, positive=6
+        csc_matrix((nu, nu)), -X.T @ slope, A, b, conic._Cones(len(k), group, 6), 1e-8
     )
     if v is None:
         return None

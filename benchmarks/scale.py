@@ -1,0 +1,107 @@
+"""Time and memory from a thousand points to a million, and ten million energies.
+
+    python -m benchmarks.scale [LARGEST]
+
+A sweep of the four-bar linkage with twelve errors, energy, margins and bounds of the
+pose error, over 1000 crank angles and 1, 10, 100 .. draws, up to LARGEST points
+(default 10^6); then 10^7 energies of the paper's robot at one posture, in blocks.  Each
+case has a process of its own: printed are its points, processor seconds, microseconds
+of processor time a point less those of starting, largest memory and the file's size.
+"""
+
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+ANGLES, SMALLEST, LARGEST = 1000, 1000, 1_000_000
+BLOCK, ENERGIES = 100_000, 10_000_000
+
+
+def sweep(draws: int, path: Path) -> int:
+    """Sweep so many draws into a file; how many points."""
+    from assembly.model.error_distributions import tolerance_sources
+    from assembly.robots import load_robot
+    from assembly.sweeps.plan import Sweep
+    from assembly.sweeps.quantities import Question
+    from assembly.sweeps.sweep import run_sweep
+    from assembly.sweeps.targets import grid_targets, parse_grid
+
+    robot = load_robot("four_bar")
+    (drive,) = (frame.name for frame in robot.frames if frame.actuated)
+    step = 6.0 / ANGLES
+    grid = parse_grid(f"q.{drive}=0.0:{6.0 - step / 2}:{step}", robot)
+    targets = grid_targets(grid)
+    sources = tolerance_sources(robot, np.array([1e-5] * 6))
+    question = Question(robot, None, (), targets.names, sources, 1, "frozen")
+    asked = Sweep(question, targets, (), draws)
+    run_sweep(asked, path)
+    return asked.size
+
+
+def energies(count: int) -> int:
+    """So many least energies at one posture, each with errors of its own."""
+    from assembly.kinematics.posture import place_robot
+    from assembly.linear.energy import solve_assembly
+    from assembly.robots import load_robot
+
+    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
+    n, done = len(posture.robot.frames), 0
+    rng = np.random.default_rng(0)
+    bodies = [frame.link is not None for frame in posture.robot.frames]
+    while done < count:
+        errors = np.zeros((min(BLOCK, count - done), n, 6))
+        errors[:, bodies] = 1e-4 * rng.normal(size=(len(errors), sum(bodies), 6))
+        assert solve_assembly(posture, errors=errors).certified.all()
+        done += len(errors)
+    return count
+
+
+def case(name: str, count: int) -> None:
+    """One case, in this process: points, seconds, memory [MB] and file [MB]."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "sweep.nc"
+        began = time.process_time()
+        points = sweep(count, path) if name == "sweep" else energies(count)
+        seconds = time.process_time() - began
+        size = path.stat().st_size / 1e6 if path.exists() else 0.0
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    print(points, seconds, memory, size)
+
+
+def measured(name: str, count: int) -> tuple[int, float, float, float]:
+    """What a process of its own says of a case."""
+    words = [sys.executable, "-m", "benchmarks.scale", name, str(count)]
+    done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+    points, *figures = done.stdout.splitlines()[-1].split()
+    return int(points), *map(float, figures)  # type: ignore[return-value]
+
+
+def main(largest: int = LARGEST) -> None:
+    """Print the table."""
+    print(f"{'':10}{'points':>10}{'s':>9}{'us/point':>10}{'MB':>8}{'file, MB':>10}")
+    measured("sweep", 1)  # the first compiles
+    draws, first = 1, None
+    while SMALLEST * draws <= largest:
+        points, seconds, memory, size = measured("sweep", draws)
+        first = first or (points, seconds)
+        more = points - first[0]
+        each = f"{(seconds - first[1]) / more * 1e6:10.1f}" if more else f"{'':10}"
+        print(f"{'sweep':10}{points:10}{seconds:9.1f}{each}{memory:8.0f}{size:10.1f}")
+        draws *= 10
+    measured("energies", BLOCK)
+    for count in (ENERGIES // 100, ENERGIES // 10, ENERGIES):
+        points, seconds, memory, _ = measured("energies", count)
+        each = f"{seconds / points * 1e6:10.1f}"
+        print(f"{'energies':10}{points:10}{seconds:9.1f}{each}{memory:8.0f}")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2:
+        case(sys.argv[1], int(sys.argv[2]))
+    else:
+        main(*map(int, sys.argv[1:]))
