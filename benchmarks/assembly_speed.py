@@ -53,7 +53,7 @@ from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from assembly.solvers import conic
-from assembly.solvers.native import by_numba
+from forcefit.native.libraries import by_numba
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways

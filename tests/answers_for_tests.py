@@ -31,7 +31,6 @@ from assembly.model.robot import Frame, Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import exact_of, solution_of
 from assembly.robots import load_robot
-from assembly.solvers.native import by_numba
 from assembly.statistics.allocated_tolerances import allocation_of
 from assembly.statistics.allocation import allocate
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
@@ -40,6 +39,7 @@ from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
 from assembly.statistics.tolerances import present_errors
+from forcefit.native.libraries import by_numba
 from stiffness.fem.fea import FemOptions, solve_bar
 from stiffness.fem.material import Material
 from stiffness.fem.stress import peak_stress, stress_influence

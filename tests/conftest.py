@@ -16,10 +16,10 @@ import pytest
 import typer
 from hypothesis import settings
 
-from assembly.solvers.native import folder_of_compiled
 from forcefit.commands import app as command
 from forcefit.commands.warm_up import warm_up
 from forcefit.inputs.locking import locked_file
+from forcefit.native.libraries import folder_of_compiled
 
 # a command is the same whenever it is called: its options are read from the signatures
 # once, not in each of a thousand tests

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # from the ground up: a chapter imports only chapters before its own, and itself
 FLOORS = (
-    "forcefit/inputs", "forcefit/page",
+    "forcefit/inputs", "forcefit/native", "forcefit/page",
     "stiffness/screws", "stiffness/link", "stiffness/beam", "stiffness/surface",
     "stiffness/mesh", "stiffness/fem", "stiffness/report", "stiffness/exchange",
     "assembly/solvers", "assembly/model", "assembly/kinematics", "assembly/linear",

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import address, load_library
+from forcefit.native.libraries import address, load_library
 
 if TYPE_CHECKING:
     from assembly.batch.compiled_draws import Energies, Reduced
 
-SOURCE = "batch/draws.cpp"
+SOURCE = "assembly/batch/draws.cpp"
 
 
 class _Reduced(ctypes.Structure):

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import address, load_library
+from forcefit.native.libraries import address, load_library
 
 if TYPE_CHECKING:
     from assembly.kinematics.nominal import Track
 
-SOURCE = "kinematics/continuation.cpp"
+SOURCE = "assembly/kinematics/continuation.cpp"
 _ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
 from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
-from assembly.solvers.native import address, load_library
+from forcefit.native.libraries import address, load_library
 
-SOURCE = "linear/lanes.cpp"
+SOURCE = "assembly/linear/lanes.cpp"
 _ARRAYS = (
     "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
     "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis", "cone_size",

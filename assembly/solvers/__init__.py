@@ -2,5 +2,5 @@
 
 Begin at ``conic.py``, the second-order cone programme, and ``interior.py``, its
 compiled interior-point method; ``cpp/cones.h`` is the same for several problems side by
-side, compiled by ``native.py``.
+side, compiled by ``forcefit/native``.
 """

@@ -31,7 +31,7 @@ from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.extending import lower_builtin, type_callable
 
 from assembly.solvers.layouts import Layout
-from assembly.solvers.native import announce
+from forcefit.native.libraries import announce
 
 _OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True}
 _parts: dict[Callable, "_Part"] = {}

@@ -10,9 +10,9 @@ import ctypes
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.native import address, load_library
+from forcefit.native.libraries import address, load_library
 
-SOURCE = "solvers/one_problem.cpp"
+SOURCE = "assembly/solvers/one_problem.cpp"
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
 
 

@@ -16,9 +16,9 @@ from assembly.linear.reach import reachable_screws
 from assembly.linear.zone import zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
-from assembly.solvers.native import by_numba
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.worst_clearance import worst_error_slopes
+from forcefit.native.libraries import by_numba
 
 
 def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> None:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
+from forcefit.native.libraries import load_library
 from stiffness.surface.decimate import coarser_surface, euler_characteristic
 from stiffness.surface.interface import Interface, parse_interface
 from stiffness.surface.patches import Patches, find_patches
@@ -35,7 +36,8 @@ __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"
 
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-_FORMAT = 2  # of the cached meshes; raised when what they hold changes
+_SAME_NUMBERS = "stiffness/mesh/same_random_numbers.cpp"  # makes meshes reproducible
+_FORMAT = 3  # of the cached meshes; raised when what they hold changes
 
 
 class MeshFailed(BadInput):
@@ -153,6 +155,8 @@ def _tetrahedralize(
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
         # -P: our modules' names are not to be taken for others'
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
+        if (library := load_library(_SAME_NUMBERS)) is not None:
+            command.append(library._name)
         try:
             # the mesher leaves a file in the folder it runs in
             run = subprocess.run(

@@ -1,22 +1,28 @@
 """The mesher's own process: pytetwild on a stored surface.
 
-``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz``
+``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz [LIBRARY]``
+
+The library is of ``same_random_numbers.cpp``.
 """
 
+import ctypes
 import sys
 from pathlib import Path
 
 import numpy as np
 
 
-def main(given: Path, made: Path) -> None:
+def main(given: Path, made: Path, library: str | None = None) -> None:
     """Read a surface and its settings, write points and cells.
 
     Args:
         given: ``points`` (n, 3) [m], ``triangles`` (m, 3), ``settings``: edge length
             [m] and envelope as a share of the diagonal.
         made: ``points`` (n, 3) [m] and ``cells`` (t, 4).
+        library: with it the same surface and settings give the same mesh.
     """
+    if library is not None:  # before the mesher is: the first definition counts
+        ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
     import pytetwild
 
     with np.load(given) as stored:
@@ -34,4 +40,4 @@ def main(given: Path, made: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), *sys.argv[3:])

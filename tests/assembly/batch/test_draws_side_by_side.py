@@ -9,7 +9,7 @@ from assembly.batch.draws_side_by_side import SOURCE, least_energies_side_by_sid
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
 from assembly.robots import BUILT_IN
-from assembly.solvers.native import by_numba, load_library
+from forcefit.native.libraries import by_numba, load_library
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 needs_compiler = pytest.mark.skipif(

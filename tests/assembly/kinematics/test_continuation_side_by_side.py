@@ -9,7 +9,7 @@ from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import home_posture, pose_components
 from assembly.model.robot import Frame, Robot
 from assembly.robots import BUILT_IN
-from assembly.solvers.native import by_numba, load_library
+from forcefit.native.libraries import by_numba, load_library
 
 pytestmark = pytest.mark.skipif(
     load_library(SOURCE) is None, reason="no compiler for C++"

@@ -15,7 +15,7 @@ from assembly.linear.fallback import (
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
-from assembly.solvers.native import by_numba
+from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,

@@ -23,8 +23,8 @@ from assembly.linear.lanes import (
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margins
 from assembly.robots import BUILT_IN
-from assembly.solvers import native
-from assembly.solvers.native import by_numba, load_library
+from forcefit.native import libraries
+from forcefit.native.libraries import by_numba, load_library
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, stack
 
 needs_compiler = pytest.mark.skipif(
@@ -287,13 +287,13 @@ def test_without_a_compiler_numba_answers(grid, tmp_path, monkeypatch):
     robot, postures = grid
     T, mismatch = stack(postures[:3])
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.setattr(native, "folder_of_compiled", lambda: tmp_path)
-    native._library.cache_clear()
+    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
+    libraries._library.cache_clear()
     try:
         batch = minimise_energies(robot, T, mismatch=mismatch)
         assert load_library(SOURCE) is None
     finally:
-        native._library.cache_clear()
+        libraries._library.cache_clear()
     assert list(tmp_path.iterdir()) == []
     numba = numbas_energies(robot, T, None, mismatch)
     assert np.array_equal(batch.energy, numba.energy)
@@ -307,13 +307,13 @@ def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
         raise subprocess.CalledProcessError(1, command)
 
     monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
-    monkeypatch.setattr(native, "folder_of_compiled", lambda: tmp_path)
-    monkeypatch.setattr(native.subprocess, "run", fail)
+    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(libraries.subprocess, "run", fail)
     for _ in range(2):
-        native._library.cache_clear()
+        libraries._library.cache_clear()
         assert load_library(SOURCE) is None
-    native._library.cache_clear()
-    assert str(native._PACKAGE / SOURCE) in asked
+    libraries._library.cache_clear()
+    assert str(libraries._ROOT / SOURCE) in asked
     assert len(set(asked)) == len(asked)
     assert {note.suffix for note in tmp_path.iterdir()} == {".failed"}
 
@@ -325,13 +325,13 @@ def test_a_compiler_that_is_stopped_is_asked_again(tmp_path, monkeypatch):
         raise subprocess.CalledProcessError(-2, command)
 
     monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
-    monkeypatch.setattr(native, "folder_of_compiled", lambda: tmp_path)
-    monkeypatch.setattr(native.subprocess, "run", stop)
-    native._library.cache_clear()
+    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(libraries.subprocess, "run", stop)
+    libraries._library.cache_clear()
     try:
         assert load_library(SOURCE) is None
     finally:
-        native._library.cache_clear()
+        libraries._library.cache_clear()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -339,12 +339,12 @@ def test_a_compiler_that_is_stopped_is_asked_again(tmp_path, monkeypatch):
 def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
     """A file of the right name that says it was made from something else."""
     made = Path(load_library(SOURCE)._name)
-    monkeypatch.setattr(native, "folder_of_compiled", lambda: tmp_path)
+    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.setattr(native, "_digest", lambda source: "0" * 16)
+    monkeypatch.setattr(libraries, "_digest", lambda source: "0" * 16)
     shutil.copy(made, tmp_path / f"lanes.{'0' * 16}.so")
-    native._library.cache_clear()
+    libraries._library.cache_clear()
     try:
         assert load_library(SOURCE) is None
     finally:
-        native._library.cache_clear()
+        libraries._library.cache_clear()

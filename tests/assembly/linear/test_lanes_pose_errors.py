@@ -11,7 +11,7 @@ from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.pose_error import bound_pose_errors
 from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.robots import BUILT_IN
-from assembly.solvers.native import by_numba, load_library
+from forcefit.native.libraries import by_numba, load_library
 from tests.robots_for_tests import random_robot, stack
 
 needs_compiler = pytest.mark.skipif(

@@ -10,7 +10,7 @@ from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import BUILT_IN, load_robot
-from assembly.solvers.native import by_numba
+from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import random_robot
 
 UNIT = np.eye(6)

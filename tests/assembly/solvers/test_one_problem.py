@@ -6,7 +6,7 @@ import pytest
 from assembly.linear.reach import ReachableSet
 from assembly.solvers import one_problem
 from assembly.solvers.conic import cone_sizes, minimise_energy
-from assembly.solvers.native import by_numba, load_library
+from forcefit.native.libraries import by_numba, load_library
 
 needs_compiler = pytest.mark.skipif(
     load_library(one_problem.SOURCE) is None, reason="no C++ compiler"

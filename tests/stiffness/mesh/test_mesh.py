@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forcefit.native.libraries import load_library
 from stiffness.fem.quality import element_quality
 from stiffness.mesh import mesh as mesh_module
 from stiffness.mesh.mesh import (
@@ -109,6 +110,21 @@ def test_the_mesher_is_ended_when_its_time_is_up(tmp_path):
     with pytest.raises(MeshFailed, match=r"no mesh after 0.05 s"):
         mesh_solid(bar(), *faces, time_limit=0.05, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(
+    load_library(mesh_module._SAME_NUMBERS) is None, reason="no C++ compiler"
+)
+def test_the_same_surface_gives_the_same_mesh(tmp_path):
+    """Made twice, with caches of their own; and another where the edge is another."""
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    one, again, other = (
+        mesh_solid(bar(), *faces, edge=edge, cache=tmp_path / str(number))
+        for number, edge in enumerate((0.03, 0.03, 0.029))
+    )
+    assert np.array_equal(one.points, again.points)
+    assert np.array_equal(one.cells, again.cells)
+    assert not np.array_equal(one.cells, other.cells)
 
 
 def test_a_mesh_that_is_not_the_part_is_refused(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""C++ of this package, compiled where a compiler stands: problems side by side.
+"""C++ of the packages, compiled where a compiler stands.
 
 Libraries are compiled at the first use of one of them, next to each other, for this
 very processor, and kept beside what numba keeps.  A library's name and what it says of
@@ -27,17 +27,18 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.locking import locked_file
 
-_PACKAGE = Path(__file__).parents[1]
+_ROOT = Path(__file__).parents[2]
 # lanes must not depend on each other: nothing that lets sums be reordered
 _OPTIONS = (
     "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fvisibility=hidden",
     "-shared", "-fPIC",
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
-# what nearly every command needs
-_OFTEN = (
-    "linear/lanes.cpp", "kinematics/continuation.cpp", "solvers/one_problem.cpp"
-)  # fmt: skip
+# what nearly every command that needs one of them needs
+_TOGETHER = {
+    "assembly/linear/lanes.cpp", "assembly/kinematics/continuation.cpp",
+    "assembly/solvers/one_problem.cpp",
+}  # fmt: skip
 _LONGEST = 120  # [s] a compiler may take
 # what /proc/cpuinfo says of processors of one kind
 _NAMED = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
@@ -60,8 +61,8 @@ def load_library(source: str) -> ctypes.CDLL | None:
     """The library of a source file, compiled before if it has to be.
 
     Args:
-        source: file below this package, such as ``"linear/lanes.cpp"``, that exports
-            ``source_digest``.
+        source: file of the packages, such as ``"assembly/linear/lanes.cpp"``, that
+            exports ``source_digest``.
 
     Returns:
         The library; None where there is no compiler, or it cannot compile it.
@@ -79,10 +80,11 @@ def _library(source: str) -> ctypes.CDLL | None:
     compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
     if compiler is None:
         return None
-    announce()
+    if source in _TOGETHER:  # others take less than a second
+        announce()
     with ThreadPoolExecutor() as pool:  # each waits for a compiler
-        compiled = pool.map(partial(_compiled, compiler), {source, *_OFTEN})
-    return dict(compiled)[source]
+        sources = _TOGETHER if source in _TOGETHER else {source}
+        return dict(pool.map(partial(_compiled, compiler), sources))[source]
 
 
 def _kept_at(source: str) -> tuple[str, Path]:
@@ -150,7 +152,8 @@ def _processor() -> str:
 def _digest(source: str) -> str:
     """Of all that the machine code depends on."""
     parts = [" ".join(_OPTIONS), _processor()]
-    for file in (_PACKAGE / source, *sorted(_PACKAGE.rglob("cpp/*.h"))):
+    package = _ROOT / Path(source).parts[0]
+    for file in (_ROOT / source, *sorted(package.rglob("cpp/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
@@ -170,7 +173,7 @@ def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
     command = [
-        compiler, *_OPTIONS, f'-DSOURCE_DIGEST="{digest}"', str(_PACKAGE / source),
+        compiler, *_OPTIONS, f'-DSOURCE_DIGEST="{digest}"', str(_ROOT / source),
         "-o", unfinished,
     ]  # fmt: skip
     try:
