@@ -358,12 +358,12 @@ def main() -> None:
         return
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}
     stored |= stored_anew(names)
-    STORED.write_text(_a_leaf_a_line({
+    STORED.write_text(written({
         name: stored[name] for name in QUESTIONS if name in stored
     }))  # fmt: skip
 
 
-def _a_leaf_a_line(answers: dict[str, dict[str, Leaf]]) -> str:
+def written(answers: dict[str, dict[str, Leaf]]) -> str:
     """JSON in which changes are seen line by line."""
     parts = []
     for name, answer in answers.items():
