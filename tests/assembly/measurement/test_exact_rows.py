@@ -133,7 +133,7 @@ def test_rows_that_do_not_converge_claim_nothing():
 
 
 def test_contacts_that_load_each_other_balance_their_laws(rng):
-    """c |d|^n sign d = w + A d with A < 0, of of all signs and sizes."""
+    """c |d|^n sign d = w + A d with A < 0, of all signs and sizes."""
     laws = tuple(
         ContactLaw(f"j{k}", c, n) for k, (c, n) in enumerate([(2e6, 1.5), (3e7, 2.0)])
     )
