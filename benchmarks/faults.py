@@ -1,7 +1,9 @@
 """Wrong expressions of one line, drawn at random from the numerical modules.
 
 A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``) are
-left out: what they show is tested where it is a number.
+left out: what they show is tested where it is a number.  So is what compiles loops and
+loads them (``compiled.py``, ``native.py``): it works out no number, and runs once, in
+processes of its own, which no fork of one that has loaded it can try again.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
@@ -31,6 +33,7 @@ SWAPS: dict[type, type] = {
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
 LARGE = 10  # numbers above it become one
+LEFT_OUT = {"report.py", "plot.py", "compiled.py", "native.py"}
 
 
 @dataclass(frozen=True)
@@ -172,5 +175,5 @@ def files_of(chapters: str) -> list[tuple[str, Path]]:
         for chapter in CHAPTERS
         if chapter.startswith(chapters)
         for path in sorted((ROOT / chapter).rglob("*.py"))
-        if path.name not in {"report.py", "plot.py"}
+        if path.name not in LEFT_OUT
     ]

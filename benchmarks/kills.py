@@ -30,7 +30,6 @@ import traceback
 import zlib
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
@@ -44,53 +43,9 @@ import numpy as np
 import assembly.statistics.monte_carlo as monte_carlo
 import assembly.sweeps.sweep as sweeps
 from assembly.sweeps import journal
+from benchmarks.kills_commands import COMMANDS, SHARES, Case, inputs
 
-ERRORS = """
-[[errors]]
-frames = ["elbow", "arm"]
-most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
-"""
-PLAN = """
-yield = 0.9
-draws = 100
-[limits]
-margin_free = 1.0
-[[tolerance]]
-frames = ["elbow"]
-components = ["TX", "TY", "TZ"]
-most = 1e-4
-"""
-COMMANDS = {
-    "sweep": "assembly sweep five_bar --grid tx=-0.04:0.04:0.01,ty=0.1:0.15:0.01 "
-    "--errors errors.toml --draws 20 --reading none -o out.nc --json out.json",
-    "statistics": "assembly statistics five_bar --errors errors.toml --draws 4000 "
-    "--pose ty=0.13 --no-margins -o out.nc --json out.json",
-    "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "
-    "--plan plan.toml --fresh 50 -o out.nc --figure out.png --json out.json",
-    "diagnose": "validation diagnose campaign --json out.json --report out.html "
-    "--save out.toml",
-}
-SHARES = {"sweep": 6, "statistics": 5, "tolerances": 3, "diagnose": 3}
 WAYS = {signal.SIGKILL: 12, signal.SIGTERM: 2, signal.SIGINT: 3, "full": 3}
-
-
-@dataclass
-class Case:
-    """A command and what it does undisturbed.
-
-    Attributes:
-        words: of the command.
-        seconds: that it takes.
-        files: by name, what it writes.
-        header: first line of its journal; empty without one.
-        points: in the journal at the end.
-    """
-
-    words: list[str]
-    seconds: float = 0.0
-    files: dict[str, bytes] = field(default_factory=dict)
-    header: bytes = b""
-    points: int = 0
 
 
 SOLVED, KEPT = 0, 8  # places of two numbers that a child shares with its parent
@@ -335,15 +290,6 @@ def mounted(folder: Path, kilobytes: int) -> bool:
     """Whether a small tmpfs could be mounted on a folder."""
     command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", str(folder)]
     return subprocess.run(command, check=False, capture_output=True).returncode == 0
-
-
-def inputs(folder: Path) -> None:
-    """What the commands read."""
-    from tests.planar_arm_for_tests import measure
-
-    (folder / "errors.toml").write_text(ERRORS)
-    (folder / "plan.toml").write_text(PLAN)
-    measure(folder / "campaign", configurations=8, passes=2, offset=(0, 8e-5))
 
 
 def main() -> int:

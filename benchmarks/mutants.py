@@ -3,9 +3,9 @@
     python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--seconds S]
         [--traced FOLDER]
 
-The default tests of the numerical modules and ``tests/test_answers.py`` run once,
-traced: which test passes which line, and how long it takes (kept in the folder after
---traced, and traced anew where a test has changed).  Compiled loops have no lines to
+The default tests of all folders and ``tests/test_answers.py`` run once, traced: which
+test passes which line, and how long it takes (kept in the folder after --traced, and
+traced anew where a test has changed).  Compiled loops have no lines to
 trace: tests of loops by themselves run a second time uncompiled, each for a few seconds
 at most.  Then every fault is put into a copy of the tree and the tests that pass its
 line run, in a fork of this process, which has imported all libraries: those of an

@@ -18,10 +18,10 @@ import numba
 import pytest
 from coverage import Coverage, CoverageData
 
-from benchmarks.faults import CHAPTERS, ROOT, Fault
+from benchmarks.faults import ROOT, Fault
 
 PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
-BESIDE = ("tests/test_answers.py",)  # asked besides the chapters' own tests
+BESIDE = ("tests/test_answers.py", "tests/test_hand_overs.py")
 # of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
 UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
 UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
@@ -216,9 +216,12 @@ def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
 
 
 def places_of_tests() -> list[str]:
-    """Folders of the tests that mirror a chapter, and what else is asked."""
-    mirrors = [f"tests/{chapter}" for chapter in CHAPTERS]
-    return [m for m in mirrors if any((ROOT / m).glob("test_*.py"))] + list(BESIDE)
+    """Folders of tests, files where one has folders within, and what else is asked."""
+    tests, places = ROOT / "tests", set[Path]()
+    for path in tests.glob("*/**/test_*.py"):
+        folder = path.parent
+        places.add(path if any(folder.glob("*/test_*.py")) else folder)
+    return [str(place.relative_to(ROOT)) for place in sorted(places)] + list(BESIDE)
 
 
 def tests_in(place: str) -> list[Path]:

@@ -46,6 +46,7 @@ from stiffness.fem.stress import peak_stress, stress_influence
 from stiffness.fem.two_ends import two_ends
 from stiffness.link import LinkStiffness
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
+from tests.further_questions_for_tests import FURTHER
 from tests.part_questions_for_tests import PARTS
 from tests.planar_arm_for_tests import measured
 from tests.robot_questions_for_tests import ROBOTS
@@ -308,11 +309,12 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
     "tolerances, most": partial(allocated, {"energy": 1.0}, 0.9),
     "tube": partial(bar, {"radius": 0.1, "inner_radius": 0.06}, "rigid"),
     **{f"diagnosis {c}": partial(diagnosed, c)
-       for c in ("constant_temperature",)},
+       for c in ("constant_temperature", "stand", "encoder_offset")},
     "inaccurate": inaccurate,
     "planar": planar,
     **PARTS,
     **ROBOTS,
+    **FURTHER,
 }  # fmt: skip
 
 
@@ -358,12 +360,12 @@ def main() -> None:
         return
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}
     stored |= stored_anew(names)
-    STORED.write_text(_a_leaf_a_line({
+    STORED.write_text(written({
         name: stored[name] for name in QUESTIONS if name in stored
     }))  # fmt: skip
 
 
-def _a_leaf_a_line(answers: dict[str, dict[str, Leaf]]) -> str:
+def written(answers: dict[str, dict[str, Leaf]]) -> str:
     """JSON in which changes are seen line by line."""
     parts = []
     for name, answer in answers.items():

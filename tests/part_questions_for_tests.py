@@ -258,49 +258,51 @@ def effects(name: str, nudge: float) -> Any:
     return found
 
 
+DRIVE = "q.leg1.drive"
+WHERE: Any = {"where": "leg1.drive", "components": ("rz",), "variables": (DRIVE,)}
+FUNCTIONS = [
+    Function(**WHERE, form="powers", parameters={"0": 1e-4, "1": 2e-4, "2": -1e-4}),
+    Function(
+        **WHERE | {"variables": (DRIVE, "load.fx")}, form="powers",
+        parameters={"1.1": 1e-5, "0.1": -2e-5, "2.0": 3e-5},
+    ),
+    Function(
+        **WHERE, form="waves",
+        parameters={"1.sine": 2e-4, "2.cosine": 1e-4, "period": 0.7},
+    ),
+    Function(
+        **WHERE, form="spline",
+        parameters={"first": -1.5, "last": 1.0, "1": 1e-4, "2": -2e-4, "3": 3e-4},
+    ),
+    *(
+        Function(
+            "reading", ("tx", "rz"), ("cov.temperature",), form,
+            {"gain": 1e-5, "start": 2e-5, "time_constant": 200.0},
+        )
+        for form in ("lag", "creep")
+    ),
+    Function("base", ("ty",), ("cov.time",), "step", {"at": 400.0, "size": 3e-5}),
+    Function(
+        "reading", ("tz",), ("cov.time",), "slow_wave",
+        {"period": 900.0, "sine": 1e-5, "cosine": 2e-5},
+    ),
+    Function(**WHERE, form="reversal", parameters={"0": 1e-4}),
+    Function("load", ("fx",), ("load.fx",), "powers", {"1": 0.1, "2": 1e-3}),
+    Function(
+        **WHERE | {"variables": ("wrench.leg1.drive.mz",)}, form="powers",
+        parameters={"1": 1e-5, "3": 1e-7}, kind="screw",
+    ),
+    Function(**WHERE, form="powers", parameters={"0": 1e-5}, kind="compliance"),
+]  # fmt: skip
+
+
 def functions(nudge: float) -> Any:
     """What functions of every form, place and kind add to the readings."""
     _, conditions = rows("base_compliance_drift", nudge)
-    drive = "q.leg1.drive"
-    where = {"where": "leg1.drive", "components": ("rz",), "variables": (drive,)}
-    asked = [
-        Function(**where, form="powers", parameters={"0": 1e-4, "1": 2e-4, "2": -1e-4}),
-        Function(
-            **where | {"variables": (drive, "load.fx")}, form="powers",
-            parameters={"1.1": 1e-5, "0.1": -2e-5, "2.0": 3e-5},
-        ),
-        Function(
-            **where, form="waves",
-            parameters={"1.sine": 2e-4, "2.cosine": 1e-4, "period": 0.7},
-        ),
-        Function(
-            **where, form="spline",
-            parameters={"first": -1.5, "last": 1.0, "1": 1e-4, "2": -2e-4, "3": 3e-4},
-        ),
-        *(
-            Function(
-                "reading", ("tx", "rz"), ("cov.temperature",), form,
-                {"gain": 1e-5, "start": 2e-5, "time_constant": 200.0},
-            )
-            for form in ("lag", "creep")
-        ),
-        Function("base", ("ty",), ("cov.time",), "step", {"at": 400.0, "size": 3e-5}),
-        Function(
-            "reading", ("tz",), ("cov.time",), "slow_wave",
-            {"period": 900.0, "sine": 1e-5, "cosine": 2e-5},
-        ),
-        Function(**where, form="reversal", parameters={"0": 1e-4}),
-        Function("load", ("fx",), ("load.fx",), "powers", {"1": 0.1, "2": 1e-3}),
-        Function(
-            **where | {"variables": ("wrench.leg1.drive.mz",)}, form="powers",
-            parameters={"1": 1e-5, "3": 1e-7}, kind="screw",
-        ),
-        Function(**where, form="powers", parameters={"0": 1e-5}, kind="compliance"),
-    ]  # fmt: skip
     conditions = with_history(conditions)
     return {
         f"function_{k}": predict(apply_functions(conditions, [one])).deviation
-        for k, one in enumerate(asked)
+        for k, one in enumerate(FUNCTIONS)
     }
 
 

@@ -102,15 +102,8 @@ def interior_point(
     p, cones = len(k), len(starts) - 1
     m = r + p
     order, layers = layers_of(starts)
-    # rows are padded with zeros to a multiple of the vector registers
-    width = nu + -nu % LANES
-    M, linear = matrix(m, width), vector(width)
-    for j in range(nu):
-        linear[j] = -d[order[j]]
-        for i in range(r):
-            M[i, j] = G[i, order[j]]
-        for i in range(p):
-            M[r + i, j] = H[i, order[j]]
+    M, linear = _in_layers(programme, order)
+    width = len(linear)
     # one number a column, and one a cone
     columns, heads = matrix(9, width), matrix(15, cones)
     point = Point(columns[0], heads[0], columns[1])
@@ -124,8 +117,7 @@ def interior_point(
         M, matrix(m, width), matrix(m, m), vector(p), vector(m), columns[7], columns[8]
     )
     u, z0, z1 = point.u, point.z0, point.z1
-    t0, t1, r0 = sides.t0, sides.t1, sides.r0
-    sums, residual = scaling.sums, system.residual
+    sums = scaling.sums
     # multipliers of all rows: springs' own, v = G u + h, and n
     y = vector(m)
     for i in range(r):
@@ -136,15 +128,9 @@ def interior_point(
         z0[c] = np.sqrt(sums[0, c]) + 1.0
     taken = -1
     for iteration in range(_ITERATIONS):
-        gap = 0.0
-        gap += dot(z1, u)
+        worst, energy, gap = _violation(system, k, u), 0.0, dot(z1, u)
         for c in range(cones):
             gap += z0[c]
-        worst = 0.0
-        for i in range(p):
-            residual[i] = k[i] - dot(M[r + i], u)
-            worst = max(worst, abs(residual[i]))
-        energy = 0.0
         for i in range(r):
             energy += 0.5 * y[i] * y[i]
         if gap <= tolerance + relative * energy and worst <= 1e-13:
@@ -156,13 +142,7 @@ def interior_point(
         _fill_system(system, scaling)
         if not _cholesky(system.S):
             break
-        # predictor: no centring, no correction
-        cone_sums(layers, u, z1, sums[0])
-        for c in range(cones):
-            t0[c] = -scaling.l0[c]
-            r0[c] = -z0[c] - sums[0, c]
-        for j in range(width):
-            t1[j] = -scaling.l1[j]
+        _predict(point, scaling, sides)
         _direction(system, scaling, sides, point, step)
         length = min(1.0, _longest(scaling, point, step))
         sigma = (1.0 - length) ** _CENTRING
@@ -186,6 +166,51 @@ def interior_point(
     for j in range(nu):
         minimiser[order[j]] = u[j]
     return minimiser, y[r:].copy(), taken
+
+
+@part(fastmath=FAST)
+def _in_layers(programme: Programme, order: Indices) -> tuple[Matrix, Vector]:
+    """The programme's matrices with their columns in layers.
+
+    Rows are padded with zeros to a multiple of the vector registers.
+
+    Returns:
+        G above H (m, width), and -d (width,).
+    """
+    G, H, d = programme.G, programme.H, programme.d
+    (r, nu), p = G.shape, len(H)
+    width = nu + -nu % LANES
+    M, linear = matrix(r + p, width), vector(width)
+    for j in range(nu):
+        linear[j] = -d[order[j]]
+        for i in range(r):
+            M[i, j] = G[i, order[j]]
+        for i in range(p):
+            M[r + i, j] = H[i, order[j]]
+    return M, linear
+
+
+@part(fastmath=FAST)
+def _violation(system: System, k: Vector, u: Vector) -> float:
+    """Largest of |k - H u|, which is kept as the residual."""
+    residual, worst = system.residual, 0.0
+    r = len(system.M) - len(residual)
+    for i in range(len(residual)):
+        residual[i] = k[i] - dot(system.M[r + i], u)
+        worst = max(worst, abs(residual[i]))
+    return worst
+
+
+@part(fastmath=FAST)
+def _predict(point: Point, scaling: Scaling, sides: Sides) -> None:
+    """Right sides of the predictor: no centring, no correction."""
+    t0, t1, r0, sums = sides.t0, sides.t1, sides.r0, scaling.sums
+    cone_sums(scaling.layers, point.u, point.z1, sums[0])
+    for c in range(len(t0)):
+        t0[c] = -scaling.l0[c]
+        r0[c] = -point.z0[c] - sums[0, c]
+    for j in range(len(t1)):
+        t1[j] = -scaling.l1[j]
 
 
 @kernel(fastmath=FAST)

@@ -110,7 +110,7 @@ def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
         y = column[known]
         varied = X[known] - X[known].mean(axis=0)
         size = np.linalg.norm(varied, axis=0)
-        varied = varied[:, size > 1e-12 * max(1.0, float(np.abs(X).max(initial=0.0)))]
+        varied = varied[:, size > 1e-12 * np.abs(X).max(initial=1.0)]
         if not varied.shape[1]:
             continue
         y = y - y.mean()

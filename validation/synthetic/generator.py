@@ -153,43 +153,48 @@ def generate_campaign(
         redraw = partial(draw_effect, robot=robot, duration=duration, rng=rng)
         drawn = {name: redraw(name) for name in wanted}
         wanted = [(drawn[name], multiple) for name, multiple in wanted.items()]
-    # what has no strength of its own sets the noise, before the others follow it
-    wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
     machine = _SimulatedMachine(robot, point, plan.rows, program, update)
-    declared = machine.read((), "declared")
-    if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
-        declared = _linear(machine)
-    sigma, exact = noise.sigma, declared
-    effects, strength = [], {}
-    for effect, multiple in wanted:
-        effect, exact, sigma = _shown_effect(
-            machine, effect, multiple, sigma, declared, redraw
-        )
-        effects.append(effect)
-        strength[effect.name] = _rms((exact - declared) / sigma)
-    if len(effects) > 1:
-        exact = machine.read(effects, "all effects")
-    added = exact - declared
+    shown = _shown_effects(machine, wanted, noise.sigma, redraw)
+    exact = shown.exact
     base = noise.hidden_frame * rng.uniform(-1, 1, 6) if noise.hidden_frame else None
     if base is not None:
         keys = (f"base.{k}" for k in SCREW)
         frame = Hidden("registration", dict(zip(keys, base.tolist(), strict=True)))
-        exact = machine.read([*effects, frame], "hidden frame")
-    readings, outliers = _measured(exact, sigma, noise, rng)
+        exact = machine.read([*shown.effects, frame], "hidden frame")
+    readings, outliers = _measured(exact, shown.sigma, noise, rng)
     return Synthetic(
         robot=robot,
         plan=plan,
         reference_point=point,
         registration="known" if base is None else "unknown",
-        sigma=sigma,
+        sigma=shown.sigma,
         readings=readings,
         exact=exact,
-        added=added,
-        effects=tuple(effects),
-        strength=strength,
+        added=shown.exact - shown.declared,
+        effects=shown.effects,
+        strength=shown.strength,
         outliers=outliers,
         hidden_base=base,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """Hidden effects that the readings show.
+
+    Attributes:
+        effects: with their parameters.
+        strength: of each alone, by name, in sigmas.
+        declared: (rows, 6) [rad, m] readings without them.
+        exact: (rows, 6) [rad, m] readings with all of them.
+        sigma: (6,) [rad, m] noise.
+    """
+
+    effects: tuple[Hidden, ...]
+    strength: dict[str, float]
+    declared: NDArray
+    exact: NDArray
+    sigma: NDArray
 
 
 @dataclass(eq=False)
@@ -209,6 +214,29 @@ class _SimulatedMachine:
         return simulate_readings(
             self.robot, self.point, self.rows, effects, self.program, progress
         )
+
+
+def _shown_effects(
+    machine: _SimulatedMachine, wanted: Sequence[tuple[Hidden, float]], sigma: NDArray,
+    redraw: Draw | None,
+) -> _Shown:  # fmt: skip
+    """Each effect scaled to its multiple of the noise, then all together."""
+    # what has no strength of its own sets the noise, before the others follow it
+    wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
+    declared = machine.read((), "declared")
+    if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
+        declared = _linear(machine)
+    exact = declared
+    effects, strength = [], {}
+    for effect, multiple in wanted:
+        effect, exact, sigma = _shown_effect(
+            machine, effect, multiple, sigma, declared, redraw
+        )
+        effects.append(effect)
+        strength[effect.name] = _rms((exact - declared) / sigma)
+    if len(effects) > 1:
+        exact = machine.read(effects, "all effects")
+    return _Shown(tuple(effects), strength, declared, exact, sigma)
 
 
 def _shown_effect(

@@ -7,61 +7,25 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import (
     home_posture,
-    place_many,
-    place_many_joints,
     place_robot,
-    pose_components,
 )
-from assembly.model.robot import Frame, Robot
-from assembly.robots import load_robot
+from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix, rotation_vector, transform
+from tests.linkages_for_tests import (
+    CRANK,
+    GROUND,
+    driven,
+    five_bar,
+    four_bar,
+    four_bar_angles,
+    frame,
+    free,
+)
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
-
-
-def frame(name, parent="base", at=(0, 0, 0), turn=(0, 0, 0), **more):
-    return Frame(name, parent, np.array(at, float), np.array(turn, float), **more)
-
-
-def driven(position=0.0):
-    return {"joint": "revolute", "actuated": True, "position": position}
-
-
-def free(position=0.0, joint="revolute"):
-    return {"joint": joint, "position": position}
-
-
-CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.7, 0.6, 0.8
-
-
-def four_bar_angles(q, mode=1.0):
-    """Coupler and rocker angles of the four-bar by the law of cosines."""
-    elbow = np.array([CRANK * math.cos(q), CRANK * math.sin(q)])
-    to_rocker = np.array([GROUND, 0.0]) - elbow
-    far = float(np.hypot(*to_rocker))
-    inner = (COUPLER**2 + far**2 - ROCKER**2) / (2 * COUPLER * far)
-    coupler = math.atan2(to_rocker[1], to_rocker[0]) + mode * math.acos(inner)
-    end = elbow + COUPLER * np.array([math.cos(coupler), math.sin(coupler)])
-    return coupler, math.atan2(end[1], end[0] - GROUND), end
-
-
-def four_bar(q=0.5, mode=1.0, order=None):
-    """Planar four-bar whose platform is the end of its coupler."""
-    coupler, rocker, _ = four_bar_angles(q, mode)
-    frames = [
-        frame("crank", **driven(q)),
-        frame("elbow", "crank", (CRANK, 0, 0), **free(coupler - q + 0.05)),
-        frame("end", "elbow", (COUPLER, 0, 0)),
-        frame("rocker", at=(GROUND, 0, 0), **free(rocker - 0.05)),
-        frame("wrist", "rocker", (ROCKER, 0, 0), **free(coupler - rocker)),
-        frame("seat", "wrist"),
-    ]
-    order = range(len(frames)) if order is None else order
-    return Robot("bars", "end", tuple(frames[i] for i in order), (("end", "seat"),))
 
 
 @pytest.mark.parametrize("mode", [1.0, -1.0])
@@ -171,17 +135,6 @@ def test_the_angle_that_is_missing_is_that_between_two_rotations():
     assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
 
 
-@pytest.mark.parametrize("guess", [True, False])
-def test_progress_is_one_where_a_target_is_reached(guess):
-    robot = four_bar()
-    start = home_posture(robot).coordinates
-    near = np.full(len(start), np.nan)
-    near[robot.index("crank")] = 0.6
-    track = follow(robot, start, Target(coordinates=near[None]), guess)
-    assert track.progress.tolist() == [1.0]
-    assert track.reached.tolist() == [True]
-
-
 def test_a_pose_outside_the_arms_plane_is_refused():
     with pytest.raises(BadInput, match="cannot be reached"):
         place_robot(arm(), pose={"tz": 0.1})
@@ -275,26 +228,6 @@ def test_a_slider_crank_slides():
     assert slide == pytest.approx(x, abs=EXACT)
 
 
-def five_bar():
-    """Two driven proximal bars, two passive distal ones: reaches (x, y)."""
-    robot = []
-    x, y, b, l1, l2 = 0.0, 0.5, 0.1, 0.35, 0.4
-    for side, name in ((1, "right"), (-1, "left")):
-        far = math.hypot(x - side * b, y)
-        aim = math.atan2(y, x - side * b)
-        q = aim - side * math.acos((far**2 + l1**2 - l2**2) / (2 * far * l1))
-        elbow = np.array([side * b + l1 * math.cos(q), l1 * math.sin(q)])
-        bend = math.atan2(y - elbow[1], x - elbow[0])
-        robot += [
-            frame(f"{name}.drive", at=(side * b, 0, 0), **driven(q)),
-            frame(f"{name}.elbow", f"{name}.drive", (l1, 0, 0), **free(bend - q)),
-            frame(f"{name}.pin", f"{name}.elbow", (l2, 0, 0), **free(-bend)),
-            frame(f"{name}.tip", f"{name}.pin"),
-        ]
-    closure = (("right.tip", "left.tip"),)
-    return Robot("five_bar", "right.tip", tuple(robot), closure)
-
-
 @pytest.mark.parametrize("x", [-0.2, 0.05, 0.25])
 def test_a_parallel_robot_has_the_drives_of_its_inverse_kinematics(x):
     """Both legs by the law of cosines; the platform's turn is left near home."""
@@ -326,80 +259,6 @@ def test_a_parallel_robot_stops_where_a_leg_is_straight():
     assert short == pytest.approx(1.0 - reach, abs=1e-4)
 
 
-def test_many_poses_are_those_placed_one_by_one():
-    robot = five_bar()
-    goals = np.full((3, 6), np.nan)
-    goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
-    postures, reasons = place_many(robot, goals)
-    assert postures[1] is None
-    assert "five_bar" not in reasons[0]
-    assert reasons[0] == reasons[2] == ""
-    assert "cannot be reached" in reasons[1]
-    for i in (0, 2):
-        one = place_robot(robot, pose={"tx": goals[i, 0], "ty": goals[i, 1]})
-        np.testing.assert_allclose(
-            postures[i].platform[:3, 3], one.platform[:3, 3], rtol=0, atol=EXACT
-        )
-
-
-@pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
-def test_a_long_way_ends_where_many_short_ones_do(name):
-    """Home's assembly mode: through 40 targets on the line, each from the last."""
-    robot = load_robot(name)
-    home = home_posture(robot)
-    given = (0, 2) if name == "irsbot2" else (0, 1, 2)
-    signs = np.array(np.meshgrid(*[[-1, 1]] * len(given))).reshape(len(given), -1).T
-    ends = pose_components(home.platform)[list(given)] + 0.12 * signs
-    goals = np.full((len(ends), 6), np.nan)
-    goals[:, given] = ends
-    postures, _ = place_many(robot, goals)
-    assert sum(posture is not None for posture in postures) > 1
-    for goal, posture in zip(goals, postures, strict=True):
-        if posture is None:
-            continue
-        at, pose = home.coordinates, np.full((1, 6), np.nan)
-        begin = pose_components(home.platform)
-        for share in np.linspace(0, 1, 41)[1:]:
-            pose[0] = begin + share * (goal - begin)
-            at = follow(robot, at, Target(pose=pose)).coordinates[0]
-        np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
-
-
-def test_a_ball_near_gimbal_lock_turns_on_as_it_did():
-    """Beside the lock a long step ends half a turn about two of its axes away."""
-    robot = load_robot("hexapod")
-    home = home_posture(robot)
-    goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
-    begin, at = pose_components(home.platform), home.coordinates
-    for share in np.linspace(0, 1, 81)[1:]:
-        pose = begin + share * (goal - begin)
-        at = follow(robot, at, Target(pose=pose)).coordinates[0]
-    track = follow(robot, home.coordinates, Target(pose=goal))
-    assert track.reached[0]
-    np.testing.assert_allclose(track.coordinates[0], at, rtol=0, atol=EXACT)
-
-
-def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
-    """Law of cosines one way, the closure the other; flat outward the elbows are
-    0.9 m apart and two bars of 0.4 m cannot meet."""
-    robot = five_bar()
-    goals = np.full((3, 8), np.nan)
-    tips = np.array([[0.1, 0.45], [-0.05, 0.55]])
-    for side, name in ((1, "right"), (-1, "left")):
-        x, y = (tips - [side * 0.1, 0.0]).T
-        far = np.hypot(x, y)
-        inner = np.arccos((far**2 + 0.35**2 - 0.4**2) / (2 * far * 0.35))
-        drive = robot.index(f"{name}.drive")
-        goals[:2, drive] = np.arctan2(y, x) - side * inner
-        goals[2, drive] = 0.0 if side == 1 else math.pi
-    postures, reasons = place_many_joints(robot, goals)
-    assert reasons[:2] == ["", ""]
-    for posture, tip in zip(postures[:2], tips, strict=True):
-        np.testing.assert_allclose(posture.platform[:2, 3], tip, rtol=0, atol=1e-9)
-    assert postures[2] is None
-    assert "cannot be reached" in reasons[2]
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -415,15 +274,3 @@ def test_a_request_that_makes_no_sense_is_refused(given, message):
     with pytest.raises(BadInput) as caught:
         place_robot(arm(), **given)
     assert str(caught.value).startswith(message)
-
-
-@pytest.mark.parametrize("name", ["arm6", "five_bar", "3rrr", "irsbot2"])
-def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
-    """A target changed in its last digit, as another processor would change it."""
-    robot = load_robot(name)
-    tx = place_robot(robot).pose()["tx"] + 0.06
-    first, *others = (
-        place_robot(robot, {"tx": tx * (1 + k * np.finfo(float).eps)}).coordinates
-        for k in range(5)
-    )
-    assert all(np.abs(first - other).max() < 1e-6 for other in others)

@@ -214,14 +214,14 @@ def test_planar_loop_by_vertex_enumeration():
     assert np.abs(np.abs(found.translation_screw[3:5]) - [3e-5, 1e-5]).max() < 1e-9
 
 
-@pytest.mark.parametrize("eta", [0.05, 0.5])
-def test_budget_around_two_springs_is_a_ball_known_in_closed_form(eta):
+@pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
+def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
     """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
-    k1, k2, gap = 1e6, 3e6, 2e-4
+    k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
     least = k1 * k2 / (k1 + k2) * gap**2 / 2
     radius = np.sqrt(2 * eta * least / (k1 + k2))
-    found = bounds(robot, "budget", energy_budget=eta)
+    found = bounds(robot, "budget", **asked)
     assert_holds(found.translation_error, gap * k2 / (k1 + k2) + radius, 1e-9)
     assert_holds(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
 

@@ -1,18 +1,26 @@
 """Whole links from their surfaces, to an asked accuracy within a budget."""
 
+import time
+
 import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
+from stiffness.fem import fea, sparse_solver
+from stiffness.fem.adaptive_step import solve_level
 from stiffness.fem.fea import (
     Budget,
     FemOptions,
+    _affordable_mesh,
+    _wanted_growth,
     interface_center,
     solve_bar,
     solve_link,
 )
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
+from stiffness.mesh.mesh import MeshFailed
+from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
@@ -126,3 +134,86 @@ def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
     too_stiff = np.diag(first.stiffness) / np.diag(finer.stiffness) - 1
     assert (too_stiff > 0).all()
     assert too_stiff.max() <= first.relative_error_estimate
+
+
+@pytest.mark.parametrize(
+    ("rate", "believed"), [(1.0, 1.0), (1.5, 1.5), (0.4, 1.0), (3.0, 2.0)]
+)
+def test_a_mesh_grows_as_its_error_fell(rate, believed):
+    """Errors ~ N^-rate, of the worst motion; rates from 1 to 2 are believed."""
+    K = np.diag([1e3, 2e3, 3e3, 4e3, 5e3, 6e3])
+    errors = [np.diag(np.diag(K) * [1e-3, 1, 1e-3, 1e-3, 1e-3, 1e-3] * 2.0**-fall)
+              for fall in (0.0, rate)]  # fmt: skip
+    errors[1][0, 0] = errors[0][0, 0]  # another motion's error does not matter
+    history = [(K, error, error) for error in errors]
+    grown = [_wanted_growth(history, [50, 100], excess) for excess in (1.5, 3.0)]
+    assert grown[1] / grown[0] == pytest.approx(2 ** (1 / believed))
+    assert 1.5 < grown[0] ** believed < 1.2 * 1.5  # a little more than is needed
+
+
+def test_a_mesh_grows_by_a_fifth_at_least_and_sixfold_at_most():
+    one = [(np.eye(6), np.eye(6), np.eye(6))]
+    assert _wanted_growth(one, [10], 1.0) == 1.2
+    assert _wanted_growth(one, [10], 1e9) == 6.0
+    # a first mesh: between the linear and the smooth rate
+    assert 2.0 < _wanted_growth(one, [10], 3.0) < 3.0
+
+
+def test_a_refined_mesh_is_as_large_as_wanted_or_as_can_be_paid():
+    level = solve_level(
+        straight_bar({"width": 0.2, "height": 0.2}), [Material(E, NU)],
+        np.array([[0.0, 0, 0], [0, 0, 1]]), "rigid",
+    )  # fmt: skip
+    count = len(level.solid.cells)
+    each = level.solution.unknowns / count
+    now = time.monotonic()
+    for growth in (1.5, 3.0):
+        solid = _affordable_mesh(level, growth, Budget(), now)
+        assert 0.6 * growth < len(solid.cells) / count < 1.4 * growth
+    # just too small for what is wanted: a share of what it adds
+    budget = Budget(unknowns=int(each * len(solid.cells)) - 1)
+    smaller = _affordable_mesh(level, 3.0, budget, now)
+    assert count < len(smaller.cells) < len(solid.cells)
+    assert len(smaller.cells) > 1.5 * count
+    exact = Budget(unknowns=int(each * len(solid.cells)))
+    assert len(_affordable_mesh(level, 3.0, exact, now).cells) == len(solid.cells)
+    assert _affordable_mesh(level, 3.0, Budget(unknowns=1), now) is None
+    late = now - Budget().seconds
+    assert _affordable_mesh(level, 3.0, Budget(), late) is None
+
+
+def test_expected_costs_are_those_measured_and_grow_faster_than_the_mesh(monkeypatch):
+    """3.8 GB and 20 s for 400 thousand unknowns; ten times as long by SuperLU."""
+    monkeypatch.setattr(sparse_solver, "solver_name", lambda: "PARDISO")
+    memory, seconds = sparse_solver.expected_cost(400_000)
+    assert (memory, seconds) == (3.8e9, 20.0)
+    twice = sparse_solver.expected_cost(800_000)
+    assert 2 < twice[0] / memory < 2.5
+    assert 2.5 < twice[1] / seconds < 3
+    monkeypatch.setattr(sparse_solver, "solver_name", lambda: "SuperLU")
+    assert sparse_solver.expected_cost(400_000) == (3 * memory, 10 * seconds)
+
+
+def test_a_mesher_that_fails_is_asked_for_finer_meshes_while_there_is_time(monkeypatch):
+    """Twice finer, then five times, then its failure; at once where time is up."""
+    surface, tried = bar_surface(), []
+
+    def fail(*_, edge, envelope, **__):
+        tried.append((edge, envelope))
+        raise MeshFailed("no mesh")
+
+    monkeypatch.setattr(fea, "mesh_solid", fail)
+    with pytest.raises(MeshFailed):
+        fea.first_mesh(surface, *PLANES, Budget())
+    edge, envelope = tried[0]
+    assert edge == pytest.approx(surface.diagonal / 10)
+    wall = 2 * surface.volume / surface.area  # of a rod: nearly its radius
+    assert wall == pytest.approx(0.04, rel=0.1)
+    assert 0 < envelope <= wall / 8
+    np.testing.assert_allclose(
+        np.array(tried) / tried[0], [[1, 1], [0.5] * 2, [0.2] * 2]
+    )
+    tried.clear()
+    with pytest.raises(MeshFailed):
+        fea.first_mesh(surface, *PLANES, Budget(seconds=1e-12))
+    assert len(tried) == 1

@@ -234,3 +234,24 @@ def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
     assert np.hypot(side[..., 0], side[..., 1]) == pytest.approx(0.02)
     assert np.abs(along[solid.patch > 1]).max() < 1e-9
     assert (solid.volumes() > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("system", "variable", "within"),
+    [
+        ("win32", "LOCALAPPDATA", ""),
+        ("darwin", "", "Library/Caches"),
+        ("linux", "XDG_CACHE_HOME", ".cache"),
+    ],
+)
+def test_the_cache_is_where_each_system_keeps_them(
+    system, variable, within, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(mesh_module.sys, "platform", system)
+    monkeypatch.setattr(mesh_module.Path, "home", lambda: tmp_path / "me")
+    for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    assert cache_folder() == tmp_path / "me" / within / "forcefit"
+    if variable:
+        monkeypatch.setenv(variable, str(tmp_path / "other"))
+        assert cache_folder() == tmp_path / "other" / "forcefit"

@@ -227,3 +227,39 @@ def test_a_calibration_without_effects_has_none_to_be_right_about(rng):
     tally = calibrate(screen, screen.fit(()), 5, lambda *done: None)
     assert np.isnan(tally.right)
     assert tally.with_found.keys() <= {"none_needed", "ambiguous", "explained"}
+
+
+def test_a_screen_for_another_residual_is_that_made_of_it(rng):
+    one, other = rng.normal(size=(2, 12))
+    signatures = made_up_effects(rng, 4, 12)
+    again = Screen(one, signatures).with_residual(other)
+    fresh = Screen(other, signatures)
+    for members in [(), (0,), (1, 3), (0, 2, 3)]:
+        a, b = again.fit(members), fresh.fit(members)
+        np.testing.assert_allclose(a.values, b.values)
+        assert (a.rss, a.rank, a.score) == pytest.approx((b.rss, b.rank, b.score))
+
+
+def test_columns_that_say_the_same_count_once_and_share_the_fit():
+    """Two equal columns and a third: least norm, rank two."""
+    a, b = np.eye(3)[0], np.eye(3)[1]
+    screen = Screen(np.array([2.0, 1.0, 0.5]), [signature("s", np.array([a, a, b]).T)])
+    one = screen.fit((0,))
+    assert one.rank == 2
+    np.testing.assert_allclose(one.values, [1.0, 1.0, 1.0])
+    assert one.rss == pytest.approx(0.25)
+    # 1e-3 apart they are two
+    apart = signature("s", np.array([a, a + 1e-3 * np.eye(3)[2], b]).T)
+    assert Screen(np.array([2.0, 1.0, 0.5]), [apart]).fit((0,)).rank == 3
+
+
+def test_a_claim_of_one_effect_where_two_are_hidden_is_false(rng):
+    """The second is so faint that mostly the first alone is claimed."""
+    signatures = made_up_effects(rng)
+    signal = signatures[2].columns @ [3.0, -2.0] + signatures[7].columns @ [0.2, 0.2]
+    screen = Screen(signal, signatures)
+    tally = calibrate(screen, screen.fit((2, 7)), 20, lambda *done: None)
+    false = tally.false_claims * 40
+    claims = tally.with_found["explained"] + tally.without.get("explained", 0)
+    assert 10 < false <= claims <= 40
+    assert tally.right * 20 + false == pytest.approx(claims)

@@ -1,0 +1,173 @@
+"""What the answers of ``diagnosis_confusion.py`` are worth, counted.
+
+Counted as right: a definite verdict with the hidden effects or a set that explains the
+data as well.  A false claim is a definite verdict with any other set.
+"""
+
+import json
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+WITHIN_90 = 1.645  # [-] standard deviations
+VERDICTS = ("explained", "learned", "none_needed", "ambiguous", "outside_library")
+
+
+def score(folder: Path) -> dict[str, Any]:
+    """Everything that is asked of the answers in a folder.
+
+    Args:
+        folder: with truths and answers.
+
+    Returns:
+        Plain values; see the head of this file.
+    """
+    confusion: dict[str, Counter] = defaultdict(Counter)
+    outcome: dict[str, Counter] = defaultdict(Counter)
+    inside: list[bool] = []
+    ratios: list[float] = []
+    outside: list[float] = []
+    places: list[bool] = []
+    variables: list[bool] = []
+    brier: list[float] = []
+    seconds: list[float] = []
+    wrong: list[str] = []
+    for path in sorted((folder / "answers").glob("*.json")):
+        diagnosis = json.loads(path.read_text())
+        truth = json.loads((folder / "truths" / path.name).read_text())[path.stem]
+        names = sorted(effect["name"] for effect in truth["effects"])
+        result = _judge(truth, diagnosis)
+        strength = min(truth["contribution_rms"].values(), default=0.0)
+        for group in (truth["kind"], f"{truth['kind']} {_band(strength)}", "all"):
+            outcome[group][result] += 1
+        confusion["+".join(names) or "none"][_told(diagnosis)] += 1
+        seconds.append(diagnosis.get("seconds", 0.0))
+        if result in ("false claim", "false outside", "crashed", "missed"):
+            claimed = "+".join(sorted(e["name"] for e in diagnosis.get("effects", [])))
+            sizes = {k: round(v, 1) for k, v in truth["contribution_rms"].items()}
+            wrong.append(
+                f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
+                f"{diagnosis['verdict']} {claimed}: {result}"
+            )
+        if truth["kind"] == "outside":
+            outside.append(diagnosis["error"]["after"]["normalised"])
+            if diagnosis.get("learned"):
+                place, variable = _place_and_variable(truth, diagnosis)
+                places.append(place)
+                variables.append(variable)
+        if result == "right" and diagnosis["verdict"] == "explained":
+            ratios.append(diagnosis["error"]["after"]["normalised"])
+            inside += _inside(truth, diagnosis)
+        probabilities = diagnosis.get("probabilities") or {}
+        if probabilities and truth["kind"] in ("single", "pair", "none"):
+            squares = [(p - (n in names)) ** 2 for n, p in probabilities.items()]
+            brier.append(float(np.mean(squares)))
+    return {
+        "outcome": {k: dict(v) for k, v in sorted(outcome.items())},
+        "confusion": {k: dict(v) for k, v in sorted(confusion.items())},
+        "coverage_90": _share(inside),
+        "after_over_noise": _spread(ratios),
+        "outside_after_over_noise": _spread(outside),
+        "outside_within_1.2": _share([ratio <= 1.2 for ratio in outside]),
+        "place_right": _share(places),
+        "variable_right": _share(variables),
+        "brier": _spread(brier),
+        "seconds": _spread(seconds),
+        "wrong": wrong,
+    }
+
+
+def _judge(truth: dict, diagnosis: dict) -> str:
+    """right, abstained, false claim, false outside, missed or crashed."""
+    verdict = diagnosis["verdict"]
+    if verdict == "crashed":
+        return "crashed"
+    claimed = sorted(effect["name"] for effect in diagnosis.get("effects", []))
+    accepted = [sorted(names) for names in truth["accept_effects"]]
+    loose = len(truth["accept_verdicts"]) == len(VERDICTS)
+    if verdict == "ambiguous":
+        return "right" if verdict in truth["accept_verdicts"] else "abstained"
+    if verdict in {"outside_library", "learned"}:
+        outside = truth["kind"] == "outside"
+        return "right" if outside else "false outside"
+    if verdict == "none_needed":
+        fine = truth["kind"] == "none" or loose or [] in accepted
+        return "right" if fine and truth["kind"] != "outside" or loose else "missed"
+    if truth["kind"] == "outside":
+        return "right" if loose and claimed in accepted else "false claim"
+    return "right" if claimed in accepted and claimed else "false claim"
+
+
+def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
+    """Whether some function learned is where, and of what, the hidden effect is."""
+    (effect,) = truth["effects"]
+    name, keys = effect["name"], [p["name"] for p in effect["parameters"]]
+    frames = {key.removesuffix(".amplitude").removesuffix(".phase") for key in keys}
+    at_reading = name in ("_stand", "_sag")
+    wanted = {"reading"} if at_reading else frames
+    of = {
+        "_humidity": {"cov.humidity"},
+        "_quadratic_temperature": {"cov.temperature"},
+    }.get(name, {f"q.{frame}" for frame in frames})
+    places = {one["where"] for one in diagnosis["learned"]}
+    for one in diagnosis["learned"]:
+        for same in one["equivalent_places"]:
+            places |= {part["where"] for part in same}
+    variables = {v for one in diagnosis["learned"] for v in one["variables"]}
+    loaded = at_reading and any(v.startswith("load.") for v in variables)
+    return bool(places & wanted), loaded or bool(variables & of)
+
+
+def _told(diagnosis: dict) -> str:
+    """What was claimed, in a word."""
+    if diagnosis["verdict"] == "explained":
+        return "+".join(sorted(effect["name"] for effect in diagnosis["effects"]))
+    return str(diagnosis["verdict"])
+
+
+def _band(strength: float) -> str:
+    """Of a strength in sigmas, the weakest of what is hidden."""
+    return (
+        "none"
+        if not strength
+        else min(
+            ("2x", "5x", "9x"),
+            key=lambda band: abs(np.log(strength / float(band[:-1]))),
+        )
+    )
+
+
+def _inside(truth: dict, diagnosis: dict) -> list[bool]:
+    """For every parameter found: is the truth within the 90 % interval?"""
+    known = {
+        (effect["name"], parameter["name"]): parameter["value"]
+        for effect in truth["effects"]
+        for parameter in effect["parameters"]
+    }
+    inside = []
+    for effect in diagnosis["effects"]:
+        for parameter in effect["parameters"]:
+            key = effect["name"], parameter["name"]
+            if key in known and parameter["std"]:
+                away = abs(parameter["value"] - known[key])
+                inside.append(away <= WITHIN_90 * parameter["std"])
+    return inside
+
+
+def _share(right: list[bool]) -> list[float | int | None]:
+    """Share of what is right, and of how many."""
+    return [float(np.mean(right)) if right else None, len(right)]
+
+
+def _spread(values: list[float]) -> dict[str, float | int]:
+    """Median, 90 % and number."""
+    if not values:
+        return {"count": 0}
+    return {
+        "median": float(np.median(values)),
+        "p90": float(np.quantile(values, 0.9)),
+        "mean": float(np.mean(values)),
+        "count": len(values),
+    }

@@ -1,0 +1,116 @@
+"""Ways to one target and to many: where they end, in which assembly mode."""
+
+import math
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import (
+    home_posture,
+    place_many,
+    place_many_joints,
+    place_robot,
+    pose_components,
+)
+from assembly.robots import load_robot
+from tests.linkages_for_tests import five_bar, four_bar
+
+EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
+
+
+@pytest.mark.parametrize("guess", [True, False])
+def test_progress_is_one_where_a_target_is_reached(guess):
+    robot = four_bar()
+    start = home_posture(robot).coordinates
+    near = np.full(len(start), np.nan)
+    near[robot.index("crank")] = 0.6
+    track = follow(robot, start, Target(coordinates=near[None]), guess)
+    assert track.progress.tolist() == [1.0]
+    assert track.reached.tolist() == [True]
+
+
+def test_many_poses_are_those_placed_one_by_one():
+    robot = five_bar()
+    goals = np.full((3, 6), np.nan)
+    goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
+    postures, reasons = place_many(robot, goals)
+    assert postures[1] is None
+    assert "five_bar" not in reasons[0]
+    assert reasons[0] == reasons[2] == ""
+    assert "cannot be reached" in reasons[1]
+    for i in (0, 2):
+        one = place_robot(robot, pose={"tx": goals[i, 0], "ty": goals[i, 1]})
+        np.testing.assert_allclose(
+            postures[i].platform[:3, 3], one.platform[:3, 3], rtol=0, atol=EXACT
+        )
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
+def test_a_long_way_ends_where_many_short_ones_do(name):
+    """Home's assembly mode: through 40 targets on the line, each from the last."""
+    robot = load_robot(name)
+    home = home_posture(robot)
+    given = (0, 2) if name == "irsbot2" else (0, 1, 2)
+    signs = np.array(np.meshgrid(*[[-1, 1]] * len(given))).reshape(len(given), -1).T
+    ends = pose_components(home.platform)[list(given)] + 0.12 * signs
+    goals = np.full((len(ends), 6), np.nan)
+    goals[:, given] = ends
+    postures, _ = place_many(robot, goals)
+    assert sum(posture is not None for posture in postures) > 1
+    for goal, posture in zip(goals, postures, strict=True):
+        if posture is None:
+            continue
+        at, pose = home.coordinates, np.full((1, 6), np.nan)
+        begin = pose_components(home.platform)
+        for share in np.linspace(0, 1, 41)[1:]:
+            pose[0] = begin + share * (goal - begin)
+            at = follow(robot, at, Target(pose=pose)).coordinates[0]
+        np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
+
+
+def test_a_ball_near_gimbal_lock_turns_on_as_it_did():
+    """Beside the lock a long step ends half a turn about two of its axes away."""
+    robot = load_robot("hexapod")
+    home = home_posture(robot)
+    goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
+    begin, at = pose_components(home.platform), home.coordinates
+    for share in np.linspace(0, 1, 81)[1:]:
+        pose = begin + share * (goal - begin)
+        at = follow(robot, at, Target(pose=pose)).coordinates[0]
+    track = follow(robot, home.coordinates, Target(pose=goal))
+    assert track.reached[0]
+    np.testing.assert_allclose(track.coordinates[0], at, rtol=0, atol=EXACT)
+
+
+def test_many_sets_of_joints_are_those_of_the_inverse_kinematics():
+    """Law of cosines one way, the closure the other; flat outward the elbows are
+    0.9 m apart and two bars of 0.4 m cannot meet."""
+    robot = five_bar()
+    goals = np.full((3, 8), np.nan)
+    tips = np.array([[0.1, 0.45], [-0.05, 0.55]])
+    for side, name in ((1, "right"), (-1, "left")):
+        x, y = (tips - [side * 0.1, 0.0]).T
+        far = np.hypot(x, y)
+        inner = np.arccos((far**2 + 0.35**2 - 0.4**2) / (2 * far * 0.35))
+        drive = robot.index(f"{name}.drive")
+        goals[:2, drive] = np.arctan2(y, x) - side * inner
+        goals[2, drive] = 0.0 if side == 1 else math.pi
+    postures, reasons = place_many_joints(robot, goals)
+    assert reasons[:2] == ["", ""]
+    for posture, tip in zip(postures[:2], tips, strict=True):
+        np.testing.assert_allclose(posture.platform[:2, 3], tip, rtol=0, atol=1e-9)
+    assert postures[2] is None
+    assert "cannot be reached" in reasons[2]
+
+
+@pytest.mark.parametrize("name", ["arm6", "five_bar", "3rrr", "irsbot2"])
+def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
+    """A target changed in its last digit, as another processor would change it."""
+    robot = load_robot(name)
+    tx = place_robot(robot).pose()["tx"] + 0.06
+    first, *others = (
+        place_robot(robot, {"tx": tx * (1 + k * np.finfo(float).eps)}).coordinates
+        for k in range(5)
+    )
+    assert all(np.abs(first - other).max() < 1e-6 for other in others)

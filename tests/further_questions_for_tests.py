@@ -1,0 +1,215 @@
+"""Questions about what is seldom needed, for ``answers_for_tests.py``: meshes that are
+refined, surfaces that are repaired, motions that are finite, poses that clearances
+leave free, whatever a campaign's residual varies with."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.places import drives
+from assembly.effects.units import units_of
+from assembly.kinematics.posture import Posture, place_many_joints, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.linear.error_body import error_body
+from assembly.linear.load import loads_with_weight
+from assembly.linear.nearest_pose import nearest_pose
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.linear.without_clearance import flexibility
+from assembly.measurement.conditions import ContactLaw, as_declared
+from assembly.measurement.predict import predict, with_finite_motions
+from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.model.robot import Robot
+from assembly.robots import load_robot
+from assembly.statistics.stiffness_spread import draw_stiffnesses
+from assembly.statistics.uniform_clearance import diagnose as diagnose_chains
+from stiffness.fem.fea import FemOptions, solve_bar
+from stiffness.fem.material import Material
+from stiffness.surface.decimate import coarser_surface
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import triangles_on
+from stiffness.surface.surface import check_surface
+from tests.built_in_robots_for_tests import LOAD, WORKSPACE
+from tests.part_questions_for_tests import FUNCTIONS
+from tests.robots_for_tests import random_robot
+from tests.solids_for_tests import cylinder
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.structure import trends
+
+TESTS = Path(__file__).parent
+
+
+def refined(nudge: float) -> Any:
+    """A bar on meshes that become finer, to one accuracy and to another."""
+    section = {"width": 0.3 * (1 + nudge), "height": 0.3}
+    material = Material(7e10, 0.31, density=2700.0)
+    return [
+        solve_bar(section, material, FemOptions(accuracy, interface=kind)).link
+        for accuracy, kind in ((0.02, "rigid"), (0.003, "distributing-both"))
+    ]
+
+
+def repaired(nudge: float) -> Any:
+    """Surfaces turned inside out, mixed up, hollow, of corners that nearly agree."""
+    points, triangles = cylinder(0.02, 0.1 * (1 + nudge), 24)
+    rng = np.random.default_rng(4)
+    found = []
+    for share in (0.0, 0.2, 0.7, 1.0):
+        turned = rng.random(len(triangles)) < share
+        some = np.where(turned[:, None], triangles[:, ::-1], triangles)
+        found.append(check_surface(points, some, "turned"))
+    inner = 0.5 * points + [0, 0, 0.025]
+    both = np.concatenate([triangles, triangles + len(points)])
+    found.append(check_surface(np.concatenate([points, inner]), both, "hollow"))
+    soup = points[triangles].reshape(-1, 3)
+    soup = soup + 1e-9 * rng.normal(size=soup.shape)
+    apart = np.arange(len(soup)).reshape(-1, 3)
+    found.append(check_surface(soup, apart, "soup"))
+    ends = [triangles_on(found[0], parse_interface("z=0"), "base")]
+    coarse = [coarser_surface(found[0], tolerance) for tolerance in (2e-4, 2e-3)]
+    return {"surfaces": found, "ends": ends, "coarse": coarse}
+
+
+def finite(name: str, nudge: float) -> Any:
+    """Finite motions of rows with loads, errors, contacts and beams in pieces."""
+    robot = without_joint_clearances(load_robot(name))
+    rng = np.random.default_rng(7)
+    home = np.array([f.position if f.actuated else np.nan for f in robot.frames])
+    size = {"five_bar": 0.3, "hexapod": 0.02, "arm6": 0.4}[name]
+    wanted = home + size * rng.uniform(-1, 1, (3, len(home)))
+    postures = [p for p in place_many_joints(robot, wanted)[0] if p is not None] * 2
+    loads = rng.uniform(-1, 1, (len(postures), 6)) * np.repeat([5.0, 100.0], 3)
+    rows = as_declared(
+        Posture(
+            robot, np.array([p.coordinates for p in postures]),
+            np.array([p.transforms for p in postures]), 1e-9,
+        ),
+        loads * (1 + nudge), mismatch=[p.mismatch for p in postures],
+        point=[0.02, -0.01, 0.03], gravity=[1.0, 2.0, -9.81],
+    )  # fmt: skip
+    rows = replace(rows, errors=rng.uniform(-1, 1, rows.errors.shape) * 2e-4)
+    law = (ContactLaw(drives(robot)[0], 3e6, 1.5),)
+    links = {
+        f.name: replace(f.link, pieces=2)
+        for f in robot.frames
+        if f.link is not None and hasattr(f.link, "pieces")
+    }
+    changed = {"plain": rows, "contact": replace(rows, laws=law)}
+    if links:
+        changed["cut"] = replace(rows, robot=robot.with_links(links))
+    return {
+        key: [
+            predict(one).deviation,
+            predict(replace(one, exact=True)).deviation,
+            with_finite_motions(one).second_order,
+        ]
+        for key, one in changed.items()
+    }
+
+
+def finite_effects(name: str, nudge: float) -> Any:
+    """What effects add to finite motions of two rows of a campaign."""
+    campaign = read_campaign(TESTS / "campaigns" / name)
+    campaign = replace(campaign, loads=campaign.loads * (1 + nudge))
+    conditions = replace(conditions_of(campaign).take(np.arange(2)), exact=True)
+    found = {}
+    for key, effect in LIBRARY.items():
+        robot = conditions.robot
+        places = effect.frames(robot)[:1] if effect.frames else ("",)
+        values = {
+            f"{place}.{u.name}" if place and u.name else place or u.name:
+            float(np.clip(u.start + 0.7 * u.scale, u.lower, u.upper))
+            for place in places
+            for u in effect.unknowns(robot)
+        }  # fmt: skip
+        changed = apply_effects(conditions, {key: effect.public(robot, values)})
+        if not effect.clearance:
+            found[key] = predict(changed).deviation
+    return found
+
+
+def left_free(name: str, nudge: float) -> Any:
+    """The nearest pose, bodies of pose errors, stiffnesses of a few draws."""
+    where = {key: (2 * low + high) / 3 for key, (low, high) in WORKSPACE[name].items()}
+    robot = load_robot(name)
+    rng = np.random.default_rng(8)
+    errors = rng.uniform(-1, 1, (3, len(robot.frames), 6)) * [2e-4] * 1
+    posture = place_robot(robot.with_errors(errors[0] * (1 + nudge)), where)
+    found: dict[str, Any] = {}
+    for key, load in (("alone", None), ("loaded", np.array(LOAD) / 10)):
+        solved = solve_assembly(posture, load)
+        found[key] = nearest_pose(solved, (0.01, -0.02, 0.03))
+        bound = bound_pose_error(solved, "free", offset=(0.0, 0.03, 0.0))
+        found[f"error {key}"] = [bound.rotation_error, bound.translation_error]
+    reachable = reachable_screws(solve_assembly(posture), "frozen")
+    for part in ("rotation", "translation"):
+        if not reachable.unbounded(0 if part == "rotation" else 3):
+            found[part] = error_body(reachable, part, 20)
+    for state in ("contact", "exact"):
+        found[state] = draw_stiffnesses(posture, errors, state, np.array(LOAD) / 10)
+    return found
+
+
+def flexible(nudge: float) -> Any:
+    """Random robots without clearance, solved by one inverse."""
+    found = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        robot = random_robot(rng, 2 + seed % 2, link_share=1.0)
+        robot = Robot(
+            robot.name, robot.platform,
+            tuple(replace(f, clearance=None) for f in robot.frames), robot.closures,
+        )  # fmt: skip
+        here = place_robot(robot)
+        both = replace(
+            here, coordinates=np.array([here.coordinates] * 2),
+            transforms=np.array([here.transforms] * 2),
+        )  # fmt: skip
+        loads = rng.normal(size=(2, 6)) * (1 + nudge)
+        forces = loads_with_weight(both, loads, np.array([[0.5, 0, -9.81]]))
+        errors = rng.normal(size=(2, 6 * len(robot.frames))) * 1e-4
+        model = flexibility(both)
+        found.append(model.solve([0, 1], errors, forces))
+    return found
+
+
+def varying(name: str, nudge: float) -> Any:
+    """What readings vary with, before anything explains them."""
+    campaign = read_campaign(TESTS / "campaigns" / name)
+    campaign = replace(campaign, measured=campaign.measured * (1 + nudge))
+    conditions = conditions_of(campaign)
+    residual = campaign.measured - predict(conditions).deviation
+    return trends(campaign, conditions, residual)
+
+
+def units(nudge: float) -> Any:
+    """Units of the parameters of functions; worth of chains that are correlated."""
+    robot = load_robot("3rrr")
+    rng = np.random.default_rng(2)
+    chains = rng.normal(size=(4, 100)) * (1 + nudge)
+    chains[1:] += 0.4 * chains[:-1]
+    return {
+        "units": [units_of(robot, function) for function in FUNCTIONS],
+        "chains": [diagnose_chains(chains), diagnose_chains(np.cumsum(chains, axis=1))],
+    }
+
+
+FURTHER: dict[str, Callable[[float], Any]] = {
+    "refined": refined,
+    "repaired": repaired,
+    **{f"finite {n}": partial(finite, n) for n in ("five_bar", "hexapod", "arm6")},
+    **{f"finite effects, {n}": partial(finite_effects, n)
+       for n in ("encoder_offset", "base_compliance_drift")},
+    **{f"left free, {n}": partial(left_free, n)
+       for n in ("five_bar", "hexapod", "delta")},
+    "flexible": flexible,
+    **{f"varying, {n}": partial(varying, n)
+       for n in ("self_weight", "base_compliance_drift", "thermal_expansion")},
+    "units": units,
+}  # fmt: skip
