@@ -23,13 +23,17 @@ def imbalance(local: Expansion) -> float:
 
     Returns:
         [-] largest generalised force on an unknown that nothing balances, relative to
-        the sizes of those that act on it, or to those of a residual of 1e-9.
+        the sizes of those that act on it, or to those of a residual of 1e-9, in
+        closures or in the unknown itself.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
+    # what no load reaches in an open chain carries forces of rounding alone
+    unit = np.sqrt(np.diag(model.metric))
+    acting = np.maximum(acting, local.small_wrench * unit)
     # inside a cone the force is zero; at its boundary it is normal to it
     u, group = at.x[model.bounded], model.joints.group
     force = cone_multipliers(u, unbalanced[model.bounded], group)
@@ -37,7 +41,7 @@ def imbalance(local: Expansion) -> float:
     complementarity = np.zeros(len(unbalanced))
     complementarity[model.bounded] = (force * (1.0 - cone_sizes(u, group)))[group]
     worst = np.maximum(np.abs(unbalanced), np.abs(complementarity))
-    return float(np.max(worst / np.maximum(acting, 1e-30), initial=0.0))
+    return float(np.max(worst / acting, initial=0.0))
 
 
 def least_curvature(local: Expansion) -> float:

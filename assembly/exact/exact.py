@@ -70,10 +70,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-
 _STEPS = 160  # at most; 3 to 5 are usual, metres of travel take 80
 _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
 _DECREMENT = 1e-14  # relative energy left to gain before the last step
+_RESTLESS = 40  # steps after which what is in balance counts, though it moves in play
 _STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
 _STATIONARY = 1e-7  # relative imbalance of a solution; 1e-12 is usual
 _ROUNDING = 1e-30  # [J] energies of robots without errors are some 1e-48 J of rounding
@@ -366,7 +366,7 @@ def _search(
         scale = max(_energy_scale(current, linear, loads), local.small_energy)
         near = step.decrement <= _NEAR * scale
         still = damping == 0.0 and step.length <= _STILL
-        still = still or abs(step.decrement) <= _DECREMENT * scale
+        still = still or abs(step.decrement) <= _DECREMENT * scale or count > _RESTLESS
         if still and current.largest_gap <= CLOSED + linear.posture.mismatch:
             last = expand(current, loads, rigid)
             if imbalance(last) <= _STATIONARY:

@@ -15,9 +15,19 @@ from assembly.linear.mobility import mobility
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
+from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded, screw_text
+
+_UNSTABLE = "the potential falls along a motion, as beyond a critical load"
+# of the platform's motion and the energy: links that turn by 0.1 rad are off by less,
+# and where play is taken up the energy is not
+_FAR = 0.3
+_FAR_LINE = (
+    "far from the linear model, by {:.0f} % of the motion: this may lie beyond a "
+    "critical load (assembly deflection --exact or --follow)"
+)
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
@@ -167,7 +177,8 @@ def exact_of(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The keys of ``assembly solve`` for finite motions; ``status`` as there.
+        The keys of ``assembly solve`` for finite motions; ``status`` as there, or
+        ``"unstable"`` where the potential falls along a motion.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
@@ -183,10 +194,14 @@ def exact_of(
         "stationarity": assembly.stationarity,
         "iterations": assembly.iterations,
     }
-    linear = {
+    linear: dict[str, Any] = {
         "energy": assembly.linear.energy,
         "platform_screw": assembly.linear.platform_screw,
     }
+    if assembly.load.any() or gravity is not None:
+        linear["off_by"] = _off_by(assembly)
+        if not exact_tangent(assembly).stable:
+            results |= {"status": "unstable", "reason": _UNSTABLE}
     return results | {
         **_screws_and_wrenches(assembly),
         "certificate": certificate,
@@ -195,12 +210,24 @@ def exact_of(
     }
 
 
+def _off_by(assembly: ExactAssembly) -> float:
+    """[-] how far the linear platform is from where it is, of how far it has moved."""
+    scale = np.repeat([assembly.linear.linearisation.size, 1.0], 3)
+    exact = scale * assembly.platform_screw
+    off = np.linalg.norm(scale * assembly.linear.platform_screw - exact)
+    moved = float(np.linalg.norm(exact))
+    return float(off) / moved if moved else 0.0
+
+
 def exact_text(results: dict[str, Any]) -> str:
     """An exact solution for people: a few lines."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
-        return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    certificate = results["certificate"]
+        lines.append(f"{results['status']}: {results['reason']}")
+    if "certificate" not in results:
+        return "\n".join(lines)
+    certificate, off = results["certificate"], results["linear"].get("off_by", 0.0)
+    energy_off = abs(results["linearisation_error"]["relative_energy"])
     return "\n".join([
         *lines,
         f"energy: {results['energy']:.6g} J with finite motions",
@@ -208,6 +235,7 @@ def exact_text(results: dict[str, Any]) -> str:
         _linearisation_text(results["linearisation_error"]),
         f"closures hold to {certificate['closure_residual']:.1e}, balance to "
         f"{certificate['stationarity']:.1e}; {certificate['iterations']} steps",
+        *([_FAR_LINE.format(100 * off)] if min(off, energy_off) > _FAR else []),
     ])  # fmt: skip
 
 

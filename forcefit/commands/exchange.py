@@ -5,8 +5,11 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.diagnose import diagnose as trace
 from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption
+from forcefit.commands.report import ReportOption
+from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
 
@@ -24,6 +27,15 @@ def import_(
         Path, typer.Option("-o", "--output", help="Folder of the new campaign.")
     ],
     json: JsonOption = None,
+    diagnose: Annotated[
+        bool,
+        typer.Option(
+            "--diagnose",
+            help="Then trace what the model lacks, as validation diagnose does; --json "
+            "and --report are its.",
+        ),
+    ] = False,
+    report: ReportOption = None,
 ) -> None:
     """Make a campaign of a measuring device's own files.
 
@@ -32,10 +44,15 @@ def import_(
     """
     from validation.exchange.tracker import import_readings
 
+    if report is not None and not diagnose:
+        raise BadInput("--report: expected --diagnose with it, whose report it is")
     imported = import_readings(files, targets, commands, output)
-    write_json(imported.table(), json)
+    if not diagnose:
+        write_json(imported.table(), json)
     if json != "-":
         print(imported.text())
+    if diagnose:
+        trace(output, json, report)
 
 
 def iso(campaign: CampaignArgument, json: JsonOption = None) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from forcefit.commands.options import JsonOption
+from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.writing import Kind, check_writable, write_bytes, write_json
 
 Length = Annotated[str, typer.Option(help="Of lengths: m, cm, mm, um, inch; N, rad.")]
@@ -73,6 +74,12 @@ def export(
 
     stiffness, offset = read_link_results(file)
     content = link_file(stiffness, offset, to, unit)
+    if (to == "numpy") != (output.suffix.lower() == ".npy"):
+        expected = ".npy" if to == "numpy" else "another than .npy"
+        raise BadInput(
+            f"--output: found {quoted(output.name)}, expected the ending {expected} "
+            f"for {to}: by it the file is read again"
+        )
     # a matrix of the same format may be replaced, nothing else
     endings, begins = (output.suffix.lower(),), (content[:8].lower(),)
     check_writable(output, Kind(f"a matrix for {to}", endings, begins))

@@ -14,6 +14,7 @@ SAME = 1e-9  # relative: less is rounding
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
 _HEADLINES = {"worst_play", "within_limits", "error", "allocation"}
+_FIGURES = {("solution", "energy"), ("zone", "margin"), ("zone", "margin_free")}
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,12 @@ def compare(
     """
     a, b = (dict(_leaves(one, ())) for one in (first, second))
     both = [place for place in a if place in b]
-    changes = [Change(p, a[p], b[p]) for p in both if not _same(a[p], b[p])]
+    sizes = _sizes(a) | _sizes(b)
+    changes = [
+        Change(p, a[p], b[p])
+        for p in both
+        if not _same(a[p], b[p], sizes.get(_vector(p), 0.0))
+    ]
     only = [Change(p, v, None) for p, v in a.items() if p not in b]
     only += [Change(p, None, v) for p, v in b.items() if p not in a]
     titles = (_title(first), _title(second))
@@ -129,17 +135,41 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _same(a: Any, b: Any) -> bool:
-    """Whether two values are one, up to rounding."""
+def _vector(place: tuple[str, ...]) -> tuple[str, ...]:
+    """The vector or matrix of which a number is a component, or its own place."""
+    while len(place) > 1 and place[-1].isdigit():
+        place = place[:-1]
+    return place
+
+
+def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float]:
+    """The largest component of each vector: zeros among them hold its rounding."""
+    sizes: dict[tuple[str, ...], float] = {}
+    for place, value in leaves.items():
+        if _is_number(value) and math.isfinite(value):
+            vector = _vector(place)
+            sizes[vector] = max(sizes.get(vector, 0.0), abs(value))
+    return sizes
+
+
+def _same(a: Any, b: Any, size: float) -> bool:
+    """Whether two values are one, up to rounding of their vector of a size."""
     if _is_number(a) and _is_number(b):
-        return math.isclose(a, b, rel_tol=SAME, abs_tol=1e-15)
+        return math.isclose(a, b, rel_tol=SAME, abs_tol=max(1e-15, 1e-3 * SAME * size))
     return bool(a == b)
+
+
+def _is_headline(place: tuple[str, ...]) -> bool:
+    """Whether it is one of the figures on top of a page; no component of a vector."""
+    if any(key.isdigit() for key in place):
+        return False
+    return place[0] in _HEADLINES or place[-2:] in _FIGURES
 
 
 def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
     """Numbers first, those of headlines before all, the largest change on top."""
     relative = change.relative
-    group = 2 if math.isnan(relative) else int(change.place[0] not in _HEADLINES)
+    group = 2 if math.isnan(relative) else int(not _is_headline(change.place))
     return (group, 0.0 if group == 2 else -abs(relative), change.place)
 
 

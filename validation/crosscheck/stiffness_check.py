@@ -25,7 +25,7 @@ from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance as classical
 from assembly.platform_stiffness.matrices import PlatformStiffness
 from forcefit.inputs.display import html_table, numbers, short_repr
-from stiffness.screws import SCREW
+from stiffness.screws import SCREW, rotation_vector
 from validation.crosscheck.link_models import link_models
 from validation.multibody.simulation import TIME_LIMIT, without_clearance
 from validation.multibody.tangent import SimulatedTangent, is_bent, simulated_tangent
@@ -33,6 +33,7 @@ from validation.multibody.tangent import SimulatedTangent, is_bent, simulated_ta
 # of entries over sqrt(C_ii C_jj); contacts of the simulation give way by themselves
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
+_ELSEWHERE = 0.1  # of how far platforms have moved; links as beams differ by 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,8 @@ class StiffnessCheck:
         links: how the simulation modelled links.
         bent: whether springs are bent: by errors, a load or weight.
         clearances: whether they count.
+        moved: (6,) [rad, m] by how far the platform stands from where it is nominally,
+            by the exact equilibrium.
     """
 
     exact: PlatformStiffness
@@ -55,6 +58,7 @@ class StiffnessCheck:
     load: NDArray
     links: str
     bent: bool
+    moved: NDArray
     clearances: bool = False
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -108,6 +112,25 @@ class StiffnessCheck:
                 names += [frame.name] * bool(several and not soft.all())
         return tuple(names)
 
+    @cached_property
+    def simulated_moved(self) -> NDArray:
+        """(6,) [rad, m] the same by the simulation."""
+        nominal, there = self.exact.posture.platform, self.simulated.platform
+        turn = rotation_vector(there[:3, :3] @ nominal[:3, :3].T)
+        return np.concatenate([turn, there[:3, 3] - nominal[:3, 3]])
+
+    @property
+    def another_equilibrium(self) -> bool:
+        """Whether the tangents differ because the platforms stand elsewhere.
+
+        A robot loaded beyond what buckles it has several equilibria.
+        """
+        scale = np.repeat([self.exact.length, 1.0], 3)
+        ours, theirs = scale * self.moved, scale * self.simulated_moved
+        farthest = max(np.linalg.norm(ours), np.linalg.norm(theirs))
+        apart = np.linalg.norm(ours - theirs) > _ELSEWHERE * farthest
+        return bool(apart and self._decided and not all(self._decided))
+
     @property
     def passed(self) -> bool:
         """Whether every road that decides agrees, and one decides."""
@@ -138,6 +161,9 @@ class StiffnessCheck:
             "uncertainty": self.uncertainties,
             "tolerance": self.tolerance,
             "undecided_joints": self.mixed,
+            "moved": {"exact": self.moved, "multibody": self.simulated_moved},
+            "stable": {"exact": self.exact.stable, "multibody": self.simulated.stable},
+            "another_equilibrium": self.another_equilibrium,
             "passed": self.passed,
         }
 
@@ -168,7 +194,19 @@ class StiffnessCheck:
             cells = "".join(f"{value:12.5g}" for value in np.diag(C))
             lines.append(f"{name:12s}{cells}")
         lines += texts
-        if self.mixed:
+        if self.another_equilibrium:
+            ours, theirs = (
+                f"{numbers(screw)} rad, m ({'' if stable else 'un'}stable)"
+                for screw, stable in (
+                    (self.moved, self.exact.stable),
+                    (self.simulated_moved, self.simulated.stable),
+                )
+            )
+            lines.append(
+                f"undecided: another equilibrium: the platform has moved by {ours}, in "
+                f"the simulation by {theirs}"
+            )
+        elif self.mixed:
             lines.append(
                 f"undecided: {', '.join(self.mixed)} both locked and elastic, bent: "
                 "no one finite law"
@@ -224,5 +262,6 @@ def check_stiffness(
     )
     bent = is_bent(robot.errors, wrench, gravity)
     return StiffnessCheck(
-        exact, classical(posture), simulated, wrench, links, bent, clearances
-    )
+        exact, classical(posture), simulated, wrench, links, bent,
+        equilibrium.platform_screw, clearances,
+    )  # fmt: skip

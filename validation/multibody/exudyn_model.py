@@ -133,6 +133,12 @@ class Model:
             K = np.diag(np.where(np.arange(6) == axis, stiffness, 0.0))
             self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
+    def rest_idle(self, motions: NDArray) -> None:
+        """Set how far the free motions (j,) [rad or m] are where nothing holds them."""
+        for (part, axis), motion in zip(self.idle, motions, strict=True):
+            rest = np.where(np.arange(6) == axis, motion, 0.0)
+            self.mbs.SetObjectParameter(part, "offset", rest[_SWAP].tolist())
+
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
         """A new body at the place within a clearance; a weak spring centres it."""
         rows = np.array(clearance.unlocked, dtype=int)

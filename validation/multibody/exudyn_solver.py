@@ -10,7 +10,7 @@ them, are raised again.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,13 @@ from numpy.typing import NDArray
 
 from validation.multibody.contact import WIDE
 from validation.multibody.exudyn_model import HOLDING_STIFFNESS, Model
-from validation.multibody.exudyn_parts import Closure, OutOfTime, SimulationFailed
-from validation.multibody.exudyn_reading import closure_error, pose
+from validation.multibody.exudyn_parts import (
+    Closure,
+    Elastic,
+    OutOfTime,
+    SimulationFailed,
+)
+from validation.multibody.exudyn_reading import closure_error, idle_motions, pose
 from validation.multibody.motion import exponential, inverse, logarithm
 
 _CLOSED = 1e-12  # [rad, m] largest component of a closure error
@@ -27,6 +32,8 @@ _LOAD_STEPS = 4
 _RELEASING_STEPS = 4  # of motions that nothing resists
 _NARROWING_STEPS = 30  # of the smoothing of contacts, geometrically
 _CLOSING_STEPS = 30
+_RELAXING_STEPS = 4  # what is left falls a million times in each
+_RESTS = 1e-10  # [rad, m] by which free motions are at rest
 _STAGES = (
     "closures are pulled shut and loads grow",
     "contacts harden and free motions are released",
@@ -85,6 +92,32 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
         f"a closure stays open by {largest_gap(model, closures):.2g} rad or m: rigid "
         "parts do not fit",
     )
+
+
+def relax(
+    model: Model, closures: list[Closure], idle: Mapping[str, Elastic], shift: NDArray
+) -> None:
+    """Let the weak springs of free motions rest where the model stands.
+
+    They pull it away from the equilibrium that it has without them.  A robot that is
+    soft along such a motion and bends as it moves has another stiffness there.
+
+    Args:
+        model: solved.
+        closures: to be kept closed.
+        idle: the springs of free motions.
+        shift: as above.
+
+    Raises:
+        SimulationFailed: as above.
+    """
+    for _ in range(_RELAXING_STEPS):
+        motions = idle_motions(model, idle)
+        model.rest_idle(motions)
+        equilibrate(model, 2.0, 1)
+        close(model, closures, shift)
+        if np.abs(idle_motions(model, idle) - motions).max(initial=0.0) <= _RESTS:
+            return
 
 
 def _before_step(

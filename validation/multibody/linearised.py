@@ -30,6 +30,7 @@ from validation.multibody.exudyn_reading import (
     pose,
 )
 from validation.multibody.exudyn_solver import raise_callback_error, static_settings
+from validation.multibody.motion import turned
 from validation.multibody.open_robot import Tree
 
 # of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
@@ -43,7 +44,7 @@ _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
 
 def linearised_compliance(
     model: Model, tree: Tree, platform: str
-) -> tuple[NDArray, float]:
+) -> tuple[NDArray, float, bool]:
     """Compliance at the equilibrium in which a model stands.
 
     Args:
@@ -53,7 +54,8 @@ def linearised_compliance(
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] of small motions at the platform's present origin,
-        base axes; and its uncertainty, of entries over sqrt(C_ii C_jj).
+        base axes; its uncertainty, of entries over sqrt(C_ii C_jj); and whether the
+        equilibrium is stable.
 
     Raises:
         OutOfTime: the model's deadline has passed.
@@ -78,16 +80,24 @@ _LAW = "springForceTorqueUserFunction"
 
 
 def _freeze(model: Model, closure: Closure) -> None:
-    """Let a closed closure's wrench be what it is, whatever moves."""
-    wrench = connector_wrench(model, closure.connector).tolist()
+    """Let a closed closure's wrench be what it is, whatever moves.
+
+    The connector pulls half-way between the closed place and a target behind it, off
+    by its own deformation, a mm under 1e5 N; the wrench that stays is read where it is
+    closed.
+    """
+    wrench = connector_wrench(model, closure.connector)
+    screw = wrench / model.regularisation.closing
+    moment, force = wrench[:3] - np.cross(screw[3:] / 2, wrench[3:]), wrench[3:]
+    kept = (np.stack([moment, force]) @ turned(screw[:3] / 2)).ravel().tolist()
     local = model.transform(closure.first.local @ closure.closed)
     model.mbs.SetMarkerParameter(closure.marker, "localHT", local)
-    model.set_law(closure.connector, lambda screw: wrench)
+    model.set_law(closure.connector, lambda screw: kept)
 
 
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: Tree
-) -> tuple[NDArray, float]:
+) -> tuple[NDArray, float, bool]:
     """V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
@@ -131,7 +141,16 @@ def _compliance(
     size = np.sqrt(np.abs(np.diag(found[-1])))
     units = np.outer(size, size)
     C, change = steadiest(found, lambda change: float((change / units).max()))
-    return C, float((change / units).max())
+    return C, float((change / units).max()), _is_stable(model, K[-1], V[-1])
+
+
+def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
+    """Whether no motion lowers the potential by more than K is known to."""
+    # what nothing resists is rounding, of either sign
+    K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
+    size = 1.0 / np.sqrt(np.abs(np.diag(K)))
+    scaled = (K + K.T) / 2 * np.outer(size, size)
+    return bool(np.linalg.eigvalsh(scaled)[0] > -_RANK)
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:

@@ -5,6 +5,7 @@ by the gradient of their energy, so that the tangent is one of a potential.
 """
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.display import html_table, short_repr
 from validation.multibody.exudyn_model import Model, Regularisation
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
-from validation.multibody.exudyn_solver import solve
+from validation.multibody.exudyn_reading import pose
+from validation.multibody.exudyn_solver import relax, solve
 from validation.multibody.linearised import linearised_compliance
 from validation.multibody.load_steps import add_step_loads, stepped_compliance
 from validation.multibody.open_robot import Case, PostureLike, build, link_springs
@@ -29,6 +31,9 @@ _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
+# large load steps may go past a fork onto the equilibrium that has become unstable
+_SMALLER_STEPS = (16, 64)
+
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTangent:
@@ -41,6 +46,8 @@ class SimulatedTangent:
         linearised_error: [-] own uncertainty of the first, of entries over
             sqrt(C_ii C_jj).
         stepped_error: [-] of the second.
+        platform: (4, 4) where the platform stands, seen from the base.
+        stable: whether the equilibrium is.
         seconds: [s] taken.
     """
 
@@ -48,6 +55,8 @@ class SimulatedTangent:
     stepped: NDArray
     linearised_error: float
     stepped_error: float
+    platform: NDArray
+    stable: bool
     seconds: float
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -74,7 +83,8 @@ def simulated_tangent(
         time_limit: [s] of all of it.
 
     Returns:
-        Both compliances.
+        Both compliances, at a stable equilibrium unless smaller load steps than usual
+        lead to an unstable one, too.
 
     Raises:
         BadInput: a spring's stiffness is missing.
@@ -86,15 +96,30 @@ def simulated_tangent(
     # where no spring is bent its law does not matter, and Exudyn's own is faster
     bent = is_bent(posture.robot.errors, load, gravity)
     tried = WITH_CLEARANCES[:2] if model.clearances else _REGULARISATIONS
-    *first, last = (replace(one, conservative=bent) for one in tried)
-    for regularisation in first:
+    ways = [replace(one, conservative=bent) for one in tried]
+    answer = _first(case, ways, 0, steps, started, time_limit)
+    for load_steps in _SMALLER_STEPS:
+        if answer.stable:
+            break
+        with suppress(SimulationFailed):
+            answer = _first(case, ways, load_steps, steps, started, time_limit)
+    return answer
+
+
+def _first(
+    case: Case, ways: list[Regularisation], load_steps: int, steps: bool,
+    started: float, limit: float,
+) -> SimulatedTangent:  # fmt: skip
+    """The answer by the first regularisation that has one in time."""
+    *first, last = ways
+    for way in first:
         try:
-            return _tangent(case, regularisation, steps, started, time_limit)
+            return _tangent(case, way, load_steps, steps, started, limit)
         except OutOfTime:
             raise
         except SimulationFailed:
             continue
-    return _tangent(case, last, steps, started, time_limit)
+    return _tangent(case, last, load_steps, steps, started, limit)
 
 
 def is_bent(*causes: ArrayLike | None) -> bool:
@@ -121,7 +146,7 @@ def _case(
 
 
 def _tangent(
-    case: Case, regularisation: Regularisation, steps: bool,
+    case: Case, regularisation: Regularisation, load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
     """Build, solve, differentiate, and give the memory back."""
@@ -131,14 +156,18 @@ def _tangent(
     try:
         tree = build(program, case)
         loads = add_step_loads(program, tree, robot.platform)
-        shift = solve(program, tree.closures, narrow=bool(tree.contacts))
-        C, error = linearised_compliance(program, tree, robot.platform)
+        shift = solve(program, tree.closures, bool(tree.contacts), load_steps)
+        if regularisation.conservative and tree.idle:
+            relax(program, tree.closures, tree.idle, shift)
+        C, error, stable = linearised_compliance(program, tree, robot.platform)
+        stands = pose(program, tree.before[robot.platform])
         stepped, own = np.full((6, 6), np.nan), np.nan
         if steps and not tree.contacts:
             sizes = np.abs(C).max(axis=0)
             stepped, own = stepped_compliance(
                 program, tree, robot.platform, loads, shift, sizes
             )
-        return SimulatedTangent(C, stepped, error, own, time.monotonic() - started)
+        seconds = time.monotonic() - started
+        return SimulatedTangent(C, stepped, error, own, stands, stable, seconds)
     finally:
         program.discard()

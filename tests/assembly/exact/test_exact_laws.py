@@ -13,6 +13,7 @@ from assembly.kinematics.se3 import (
 from assembly.linear.closure import closure_signs
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import joint_compliances, link_compliances
+from assembly.robots import load_robot
 from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
 from stiffness.screws import rotation_matrix, rotation_vector, transform
@@ -150,3 +151,29 @@ def test_slowly_curved_valleys_are_followed_to_their_end(seed):
     assert answer.stationarity < 1e-9
     assert answer.least_curvature > 0
     assert np.abs(answer.placement.own).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "component", "value"),
+    [
+        ("arm6", 5, -100.0), ("arm6", 2, 1.0), ("delta", 5, -1.0), ("four_bar", 0, 1.0),
+        ("five_bar", 0, 0.01),
+    ],
+)  # fmt: skip
+def test_a_load_along_one_axis_moves_by_the_slope_of_the_potential(
+    name, component, value
+):
+    """Castigliano, also where symmetry leaves clearances unloaded that touch.
+
+    They carry forces of rounding, and may move within it for ever.
+    """
+    posture = home_posture(load_robot(name))
+    unit, step = np.eye(6)[component], 1e-3
+    low, middle, high = (
+        solve_exact(posture, share * value * unit)
+        for share in (1 - step, 1.0, 1 + step)
+    )
+    assert middle.stationarity < 1e-7
+    slope = (high.potential - low.potential) / (2 * step * value)
+    # the third derivative times the square of the step
+    assert -slope == pytest.approx(middle.platform_screw[component], rel=1e-5)

@@ -139,6 +139,32 @@ def test_exact_states_what_the_linear_model_gets_wrong(run, robot_file):
     assert 1e-6 < np.linalg.norm(gap[3:]) < 2e-4  # tens of micrometres at full errors
 
 
+COLUMN = """name = "column"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+translation = [1.0, 0.0, 0.0]
+link = { beam = { radius = 0.005 }, young = 7e10, poisson = 0.3, pieces = 4 }
+"""
+
+
+def test_exact_says_where_it_stands_beyond_a_critical_load(run, tmp_path):
+    """Euler's, 84.8 N, is 82.7 N with 4 pieces: straight it is unstable, bent not."""
+    column = tmp_path / "column.toml"
+    column.write_text(COLUMN)
+    for load, status, said in (
+        ("fx=-80", 0, ""),
+        ("fx=-90", 1, "unstable: the potential falls along a motion"),
+        ("fx=-90,fy=0.1", 0, "% of the motion: this may lie beyond a critical load"),
+        ("fx=-20,fy=0.1", 0, ""),
+    ):
+        found, out, _ = run("assembly", "exact", column, "--load", load)
+        assert said in out
+        assert ("critical load" in out) == bool(said)
+        assert found == status
+
+
 def test_gravity_pulls_an_arm_down(run):
     _, out, _ = run("assembly", "solve", "arm6", "--gravity", "z=-9.81", "--json", "-")
     found = json.loads(out)

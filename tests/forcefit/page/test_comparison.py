@@ -42,6 +42,24 @@ def test_every_change_is_found_the_largest_first():
     assert compare(BEFORE, BEFORE, ("x", "x")).changes == ()
 
 
+def test_figures_of_the_top_come_before_components_that_changed_more():
+    first = {
+        "error": {"frozen": {"upper": 1.0, "platform_screw": [1.0, 2.0]}},
+        "solution": {"energy": 2.0, "wrenches": [[1e3, 0.0], [0.0, 5.0]]},
+    }
+    second = {
+        "error": {"frozen": {"upper": 1.1, "platform_screw": [4.0, 2.0]}},
+        "solution": {"energy": 2.4, "wrenches": [[1e3, -4e-13], [0.0, 5.0]]},
+    }
+    places = [one.place for one in compare(first, second, ("a", "b")).changes]
+    # a zero beside 1000 N holds their rounding
+    assert places == [
+        ("solution", "energy"),
+        ("error", "frozen", "upper"),
+        ("error", "frozen", "platform_screw", "1"),
+    ]
+
+
 def test_a_comparison_is_a_page_without_charts():
     text = comparison_page(compare(BEFORE, AFTER, ("x", "y")), Provenance())
     rows = {row[0].text: row[1:] for row in parse(text).tables[0][1:]}

@@ -171,6 +171,17 @@ def test_what_is_written_is_read_back(to, unit, tmp_path, rng):
     assert link.base - link.tip == pytest.approx(offset, abs=1e-8)
 
 
+def test_a_matrix_has_the_ending_by_which_it_is_read(run, tmp_path):
+    run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 7e10,
+        "--poisson", 0.3, "--json", tmp_path / "rod.json")  # fmt: skip
+    for to, name in (("numpy", "rod.npz"), ("nastran", "rod.npy")):
+        status, _, err = run("stiffness", "export", tmp_path / "rod.json", "--to", to,
+                             "-o", tmp_path / name)  # fmt: skip
+        assert status == 2
+        assert f'--output: found "{name}", expected the ending' in err
+        assert not (tmp_path / name).exists()
+
+
 def test_scipy_reads_our_matrix_market(tmp_path):
     path = tmp_path / "k.mtx"
     K = expected_stiffness()

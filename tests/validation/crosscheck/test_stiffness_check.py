@@ -93,6 +93,26 @@ def test_a_road_that_is_too_uncertain_decides_nothing():
     assert not replace(answer, simulated=noisy).passed
 
 
+def test_platforms_that_stand_elsewhere_are_in_another_equilibrium():
+    answer = check_stiffness(home_posture(load_robot("four_bar")), [0, 0, 0, 0, 50, 0])
+    assert answer.moved == pytest.approx(answer.simulated_moved, abs=1e-9)
+    there = answer.simulated.platform.copy()
+    there[:3, 3] += 0.2 * answer.moved[3:]
+    elsewhere = replace(answer.simulated, platform=there, stable=False)
+    # as long as the tangents agree it does not matter
+    assert replace(answer, simulated=elsewhere).passed
+    stiffer = replace(elsewhere, linearised=0.5 * elsewhere.linearised)
+    other = replace(answer, simulated=stiffer)
+    assert not other.passed
+    assert other.another_equilibrium
+    assert "undecided: another equilibrium" in other.text()
+    assert "(unstable)" in other.text()
+    stiffer = replace(answer.simulated, linearised=0.5 * elsewhere.linearised)
+    other = replace(answer, simulated=stiffer)
+    assert not other.another_equilibrium
+    assert "FAILED" in other.text()
+
+
 def test_a_joint_that_is_locked_and_elastic_is_named_where_it_is_bent():
     robot = load_robot("four_bar")
     frames = [

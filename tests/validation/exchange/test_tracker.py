@@ -110,6 +110,26 @@ def test_spatial_analyzer_text_joined_by_name(lab, run):
     assert 'robot = "../robot.toml"' in declared
 
 
+def test_one_command_from_a_device_s_file_to_the_verdict(lab, run):
+    """Readings of the declared arm itself, noise apart: it lacks nothing."""
+    noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
+    lab.export("\n".join(points(
+        "A", "p{k}, {x!r}, {y!r}, {z!r}", lambda k, name, p: p + 1e-5 * noise[k]
+    )))  # fmt: skip
+    lab.targets("A")
+    report = lab.folder / "diagnosis.html"
+    status, _, err = run(*lab.words(), "--report", report)
+    assert status == 2
+    assert "--report: expected --diagnose" in err
+    assert not (lab.folder / "campaign").exists()
+    status, out, err = run(
+        *lab.words(), "--diagnose", "--json", "-", "--report", report
+    )
+    assert status == 0, err
+    assert json.loads(out)["verdict"] == "none_needed"
+    assert report.stat().st_size < 5e6
+
+
 @pytest.mark.skipif(
     "points" not in Campaign.__dataclass_fields__, reason="campaigns have no points yet"
 )

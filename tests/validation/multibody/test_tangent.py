@@ -12,9 +12,12 @@ from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.robots import load_robot
 from validation.crosscheck.link_models import link_models
+from validation.multibody import tangent
 from validation.multibody.conservative_springs import far_couple, middle_wrench
+from validation.multibody.exudyn_model import Regularisation
 from validation.multibody.motion import exponential, logarithm, turn_of, turned
 from validation.multibody.simulation import SimulationModel
+from validation.multibody.simulation import without_clearance as without_play
 from validation.multibody.tangent import simulated_tangent
 
 pytestmark = pytest.mark.exudyn
@@ -107,6 +110,76 @@ def test_a_spring_bent_by_half_a_radian_is_as_stiff_as_its_energy_says():
     expected = exact_tangent(equilibrium).compliance
     assert relative(expected, simulated.linearised) < 1e-8
     assert relative(expected, simulated.stepped) < 1e-6
+
+
+def soft_four_bar():
+    """Four bars on soft springs, forced together from 0.2 rad and 0.2 m apart."""
+    K = np.diag([10.0, 10.0, 10.0, 300.0, 400.0, 500.0])
+    frames = (
+        Frame("crank", joint="revolute"),
+        Frame("crank_end", "crank", [0.3, 0.1, 0], link=MatrixLink(K)),
+        Frame("pin", "crank_end", joint="revolute"),
+        Frame("coupler", "pin", [0.1, 0.6, 0]),
+        Frame("ground", translation=[0.5, 0.5, 0]),
+        Frame("rocker", "ground", joint="revolute"),
+        Frame("rocker_end", "rocker", [-0.1, 0.2, 0], link=MatrixLink(K)),
+    )
+    errors = np.zeros((7, 6))
+    errors[3] = [0, 0, 0.2, 0.15, -0.1, 0]
+    robot = Robot("soft", "coupler", frames, (("coupler", "rocker_end"),))
+    return home_posture(robot.with_errors(errors))
+
+
+def test_the_weak_springs_of_free_joints_do_not_move_the_robot(monkeypatch):
+    """Joints turn by radians, and springs of 1e-4 N m/rad would bend it elsewhere."""
+    weak = (Regularisation(1e8, 1e-4),)
+    monkeypatch.setattr(tangent, "_REGULARISATIONS", weak)
+    posture = soft_four_bar()
+    expected = exact_tangent(solve_exact(posture)).compliance
+    simulated = simulated_tangent(posture, link_models(posture.robot, "spring"))
+    # where they are bent by them: 2e-5 and 1e-4
+    assert relative(expected, simulated.linearised) < 1e-8
+    assert relative(expected, simulated.stepped) < 1e-7
+
+
+def loaded_orthoglide(share):
+    """Orthoglide and a load beside which its platform tilts, from two thirds on."""
+    robot = without_play(load_robot("orthoglide"))
+    errors = np.random.default_rng(4).uniform(-1, 1, (len(robot.frames), 6))
+    robot = robot.with_errors(errors * np.repeat([1e-3, 1e-4], 3))
+    load = share * np.array([800.0, 4400.0, 300.0, 88e3, 58e3, 11e3])
+    couples = np.zeros((len(robot.frames), 6))
+    couples[robot.index(robot.platform), :3] = load[:3]
+    posture = home_posture(robot)
+    return solve_exact(posture, load * [0, 0, 0, 1, 1, 1], bodies=couples), load
+
+
+def test_a_closure_of_finite_stiffness_keeps_its_wrench():
+    """It is off by a mm under 1e5 N, which left 1e-7 of the compliance."""
+    equilibrium, load = loaded_orthoglide(0.5)
+    posture = equilibrium.posture
+    model = link_models(posture.robot, "spring")
+    simulated = simulated_tangent(posture, model, load, steps=False)
+    expected = exact_tangent(equilibrium).compliance
+    assert relative(expected, simulated.linearised) < 5e-9
+
+
+@pytest.mark.slow
+def test_smaller_load_steps_lead_to_the_stable_equilibrium(monkeypatch):
+    """Beyond a fork large ones stay where the platform hardly tilts: unstable."""
+    equilibrium, load = loaded_orthoglide(1.0)
+    assert equilibrium.least_curvature > 0
+    posture = equilibrium.posture
+    model = link_models(posture.robot, "spring")
+    expected = exact_tangent(equilibrium).compliance
+    simulated = simulated_tangent(posture, model, load, steps=False)
+    assert simulated.stable
+    assert relative(expected, simulated.linearised) < 5e-9
+    monkeypatch.setattr(tangent, "_SMALLER_STEPS", ())
+    straight = simulated_tangent(posture, model, load, steps=False)
+    assert not straight.stable
+    apart = straight.platform[:3, 3] - simulated.platform[:3, 3]
+    assert np.abs(apart).max() > 1e-3
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 1.0, 3.0, 3.14159265])
