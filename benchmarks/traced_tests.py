@@ -21,7 +21,7 @@ from coverage import Coverage, CoverageData
 from benchmarks.faults import ROOT, Fault
 
 PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
-BESIDE = ("tests/test_answers.py", "tests/test_hand_overs.py")
+BESIDE = ("tests/test_answers.py",)
 # of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
 UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
 UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
