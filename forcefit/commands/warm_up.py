@@ -37,15 +37,16 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
     perfect = prepared.solve(np.zeros((1, *errors.shape)))  # clearances undetermined
     rngs = [np.random.default_rng(1)]
     computations: tuple[Callable[[], object], ...] = (
-        # what the fallback calls
         lambda: reference_margin(posture, "rigid"),
-        lambda: reference_pose_error(reference_assembly(posture), Asked()),
-        lambda: reachable_screws(reference_assembly(posture), "frozen").support(
-            np.eye(6)[3]
-        ),
         *(
             partial(_by_each_method, compute)
             for compute in (
+                # what the fallback calls
+                lambda: reference_pose_error(reference_assembly(posture), Asked()),
+                lambda: reachable_screws(reference_assembly(posture), "frozen").support(
+                    np.eye(6)[3]
+                ),
+                lambda: bound_pose_errors(robot, T),
                 lambda: place_robot(robot, {"tx": posture.pose()["tx"]}),
                 lambda: minimise_energies(robot, T),
                 lambda: zone_margins(robot, T),
@@ -53,7 +54,6 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
                 lambda: platform_stiffnesses(robot, T),
             )
         ),
-        lambda: bound_pose_errors(robot, T),
         lambda: prepare_margins(posture).solve(errors[None]),
         lambda: position_clearances(prepared, perfect, "uniform", rngs),
         lambda: position_clearances(prepared, perfect, "contact", rngs),
