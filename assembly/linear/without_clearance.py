@@ -153,6 +153,26 @@ class Flexibility:
         return self.platform @ screws
 
 
+@lru_cache(maxsize=4)
+def responses_to(
+    flexible: Flexibility, columns: bytes, shape: tuple[int, int]
+) -> tuple[NDArray, NDArray, NDArray]:
+    """What stress-free screws at the frames cause, once for the same ones.
+
+    Args:
+        flexible: at c postures.
+        columns: of (6n, s) screws, as bytes.
+        shape: (6n, s).
+
+    Returns:
+        (c, 6, s) platform screws, (c, s, s) generalised forces that resist on each, and
+        (c, 6n, s) wrenches at every joint, per unit of each.
+    """
+    screws = np.frombuffer(columns).reshape(shape)
+    everywhere = flexible.self_stress(screws, np.eye(shape[0]))
+    return flexible.platform_of(screws), screws.T @ everywhere, everywhere
+
+
 @dataclass(frozen=True, eq=False)
 class FlexibleAssembly:
     """R assemblies of a robot without clearances.

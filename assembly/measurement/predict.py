@@ -21,7 +21,7 @@ from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.without_clearance import flexibility
+from assembly.linear.without_clearance import at_postures, flexibility, responses_to
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.contacts import (
     CONVERGED,
@@ -367,13 +367,14 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
     deflections = np.zeros((len(conditions), 0))
     if conditions.laws:
         columns = contact_columns(conditions)
-        w = wrenches @ columns
-        A = flexible.self_stress(columns)[which]
-        deflections, settled = contact_deflections(conditions.laws, w, A)
-        platform_screws = flexible.platform_of(columns)[which]
-        screws = screws + np.einsum("rij,rj->ri", platform_screws, deflections)
-        everywhere = flexible.self_stress(columns, np.eye(len(columns)))[which]
-        wrenches = wrenches + np.einsum("rij,rj->ri", everywhere, deflections)
+        w, times = wrenches @ columns, at_postures(which)
+        platform, own, everywhere = responses_to(
+            flexible, columns.tobytes(), columns.shape
+        )
+        deflections, settled = contact_deflections(conditions.laws, w, own[which])
+        screws = screws + times(platform, deflections)
+        if flexible.system.size:  # an open chain's wrenches are those of the loads
+            wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled
     if conditions.exact:
         screws, converged = solve_rows(conditions, deflections)
