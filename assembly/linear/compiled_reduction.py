@@ -39,6 +39,7 @@ from assembly.solvers.vectors import (
     divide,
     fill,
     indices,
+    inner,
     matrices,
     matrix,
     vector,
@@ -85,16 +86,19 @@ def spring_rows(s: Structure, Z: Matrix, L: Matrices) -> Matrix:
 def eliminate_springs(
     Z: Matrix, Y: Matrix, diagonal: Vector, order: Indices, rank: int
 ) -> None:
-    """Order Z like Y's triangle, and divide by it: rows that springs enter first."""
+    """Order Z like Y's triangle, and divide by it: rows that springs enter first.
+
+    The others have length 1: what is rounding there has their size.
+    """
     rows = Z.copy()
     for i in range(len(Z)):
         copy(rows[order[i]], Z[i])
         for l in range(min(i, rank)):
             for a in range(Z.shape[1]):
                 Z[i, a] -= Y[i, l] * Z[l, a]
-        if i < rank:
-            for a in range(Z.shape[1]):
-                Z[i, a] /= diagonal[i]
+        size = diagonal[i] if i < rank else np.sqrt(inner(Z[i], Z[i]))
+        for a in range(Z.shape[1]):
+            Z[i, a] /= size
 
 
 class Triangle(NamedTuple):

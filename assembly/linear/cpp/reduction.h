@@ -145,10 +145,10 @@ inline void Reduction::eliminate_springs(int rank, int count) {
         const int before = std::min(i, rank);
         for (int l = 0; l < before; ++l) weights[l] = -Y[l];
         combine(Z.data(), before, weights.data(), m, Z[i]);
-        if (i < rank) {
-            const Real over = 1.0 / springs.diagonal[i];
-            for (int a = 0; a < m; ++a) Z[i][a] *= over;
-        }
+        // rows that no spring enters have length 1: what is rounding there has their size
+        const Real size = i < rank ? springs.diagonal[i] : root(inner(Z[i], Z[i], m));
+        const Real over = 1.0 / size;
+        for (int a = 0; a < m; ++a) Z[i][a] *= over;
     }
 }
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear import zone
+from assembly.linear import energy, zone
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
@@ -64,6 +64,18 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa):
     lanes = minimise_energies(robot, T, kappa * robot.errors, mismatch)
     assert lanes.fallbacks() == {}
     assert_both_proved(lanes, numbas_energies(robot, T, kappa * robot.errors, mismatch))
+
+
+@needs_compiler
+def test_no_point_of_the_papers_robot_is_left_to_numba(grid, monkeypatch):
+    """Rows that no spring enters are told from rounding, whatever their length."""
+    left = []
+    monkeypatch.setattr(energy, "_by_numba", lambda *given: left.append(given))
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    for kappa in (0.1, 1.0):
+        minimise_energies(robot, T, kappa * robot.errors, mismatch)
+    assert not left
 
 
 @needs_compiler
