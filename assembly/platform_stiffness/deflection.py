@@ -36,6 +36,10 @@ from forcefit.inputs.display import html_table, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
+_CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed
+# contacts followed within a step of the load: symmetric robots have some that carry
+# rounding alone, and change with it
+_CHANGES = 8
 _JUMP = 5.0  # times what the tangents on both sides explain
 _BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
 _NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
@@ -186,7 +190,9 @@ def _solve(
         if start is None:
             raise
         equilibrium = solve_exact(posture, wrench, gravity=gravity)
-    active, _ = active_clearances(equilibrium.expansion)
+    active, force = active_clearances(equilibrium.expansion)
+    # what carries rounding alone changes with it
+    active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "letting go"), names)
 
@@ -221,7 +227,9 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
     return frozenset(names)
 
 
-def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[Event]:
+def _events(
+    before: _Point, after: _Point, at: _Solver, component: int, most: int = _CHANGES
+) -> list[Event]:
     """What changed between two neighbouring loads, and at which load."""
     events = []
     if before.pressed != after.pressed:
@@ -235,8 +243,8 @@ def _events(before: _Point, after: _Point, at: _Solver, component: int) -> list[
             for kind, names in changes
             if names
         ]
-        if high.load != after.load and high.pressed != after.pressed:
-            return events + _events(high, after, at, component)
+        if high.load != after.load and high.pressed != after.pressed and most > 1:
+            return events + _events(high, after, at, component, most - 1)
     if before.tangent.stable != after.tangent.stable:
         stable = before.tangent.stable
         low, high = _bracket(before, after, at, lambda p: p.tangent.stable == stable)

@@ -18,6 +18,7 @@ from assembly.platform_stiffness.linear_tangent import (
     without_clearance,
 )
 from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label
@@ -66,6 +67,7 @@ def stiffness_of(
             equilibrium = solve_exact(posture, load, gravity=gravity)
             platform = equilibrium.placement.platform
             sides = [exact_tangent(equilibrium)]
+            results["remarks"] = far_from_linear(equilibrium)
             away = exact_tangent(equilibrium, "letting go")
             if away.free.shape[1] > sides[0].free.shape[1]:
                 sides.append(away)
@@ -218,6 +220,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
     if results.get("letting_go"):
         lines += ["", "clearances that touch their bound without a force let go:"]
         lines += _state_lines(results["letting_go"])
+    lines += results.get("remarks", [])
     return "\n".join(lines)
 
 

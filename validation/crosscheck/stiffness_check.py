@@ -216,6 +216,11 @@ class StiffnessCheck:
             if not self._decided:
                 outcome = "undecided"
             lines.append(f"{outcome}: exact within {self.tolerance:.2g}")
+            if outcome == "FAILED" and self.links == "beam" and self.bent:
+                lines.append(
+                    "one spring a link bends otherwise than a beam under a load: "
+                    '"pieces" of a link in the robot file make it one'
+                )
         return "\n".join(lines)
 
 

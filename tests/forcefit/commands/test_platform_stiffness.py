@@ -173,3 +173,14 @@ def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
     assert status == 1
     assert answer["status"] == "solver failed"
     assert "out of balance" in answer["reason"]
+
+
+def test_a_platform_pushed_through_its_legs_is_said_to_be_far(run):
+    """By 10 MN, from 0.5 m below the base to above it; by 300 N by micrometres."""
+    for load, far in (("fz=1e7", True), ("fz=-300", False)):
+        _, out, _ = run(
+            "assembly", "stiffness", "irsbot2", "--exact", "--load", load, "--json", "-"
+        )
+        found = json.loads(out)
+        assert (found["point"][2] > 0) == far
+        assert len(found["remarks"]) == far

@@ -93,6 +93,22 @@ def test_a_road_that_is_too_uncertain_decides_nothing():
     assert not replace(answer, simulated=noisy).passed
 
 
+def test_links_in_pieces_are_beams_where_one_spring_is_none():
+    """The error of n pieces falls as 1/n^2, down to that of Exudyn's elements."""
+    robot, off = load_robot("four_bar"), []
+    for pieces in (1, 2, 4):
+        frames = [
+            replace(f, link=replace(f.link, pieces=pieces)) if f.link else f
+            for f in robot.frames
+        ]
+        cut = home_posture(replace(robot, frames=tuple(frames)))
+        answer = check_stiffness(cut, [0, 0, 0, 20, 0, -100], links="beam")
+        assert ('"pieces" of a link' in answer.text()) == (not answer.passed)
+        off.append(answer.differences["linearised"])
+    assert off[0] == pytest.approx(0.02, rel=0.1)
+    assert np.array(off[:-1]) / off[1:] == pytest.approx(4.0, rel=0.1)
+
+
 def test_platforms_that_stand_elsewhere_are_in_another_equilibrium():
     answer = check_stiffness(home_posture(load_robot("four_bar")), [0, 0, 0, 0, 50, 0])
     assert answer.moved == pytest.approx(answer.simulated_moved, abs=1e-9)
