@@ -2,8 +2,8 @@
 
 A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``) are
 left out: what they show is tested where it is a number.  So is what compiles loops and
-loads them (``compiled.py``, ``native.py``): it works out no number, and runs once, in
-processes of its own, which no fork of one that has loaded it can try again.
+loads them (``compiled.py``): it works out no number, and runs once, in processes of its
+own, which no fork of one that has loaded it can try again.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
@@ -33,7 +33,7 @@ SWAPS: dict[type, type] = {
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
 LARGE = 10  # numbers above it become one
-LEFT_OUT = {"report.py", "plot.py", "compiled.py", "native.py"}
+LEFT_OUT = {"report.py", "plot.py", "compiled.py"}
 
 
 @dataclass(frozen=True)

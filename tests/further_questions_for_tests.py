@@ -150,7 +150,8 @@ def left_free(name: str, nudge: float) -> Any:
     reachable = reachable_screws(solve_assembly(posture), "frozen")
     for part in ("rotation", "translation"):
         if not reachable.unbounded(0 if part == "rotation" else 3):
-            found[part] = error_body(reachable, part, 20)
+            body = error_body(reachable, part, 20)
+            found[part] = [body.points, body.directions, body.heights]
     for state in ("contact", "exact"):
         found[state] = draw_stiffnesses(posture, errors, state, np.array(LOAD) / 10)
     return found

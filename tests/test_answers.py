@@ -10,11 +10,11 @@ from tests.answers_for_tests import QUESTIONS, STORED, close, leaves
 ANSWERS = json.loads(STORED.read_text())
 RELATIVE = 1e-6
 BOUNDS = 1e-4  # bounds may differ by the tolerance asked for, 1e-6 of some hundredths
-
-
-# others of their kind are asked always
 LINEAR = ("linear", "loaded", "drawn", "at once", "of any kind", "placed")
-LONG = ("inaccurate", "planar", "diagnosis constant_temperature", "tube")
+# others of their kind are asked always
+LONG = (
+    "inaccurate", "planar", "diagnosis constant_temperature", "diagnosis stand", "tube",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

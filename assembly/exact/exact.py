@@ -385,7 +385,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
     moved = motions.T @ linear.clearance_screws.ravel() / np.sum(motions**2, axis=0)
     x = np.concatenate([linear.elastic, moved])
     turned = np.linalg.norm(place(model, x).screws[..., :3], axis=-1)
-    x *= min(1.0, LONGEST_STEP / max(float(turned.max(initial=0.0)), 1e-300))
+    x *= LONGEST_STEP / turned.max(initial=LONGEST_STEP)
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)
     return x
 

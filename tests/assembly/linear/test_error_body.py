@@ -1,11 +1,13 @@
 """The body of possible errors: closed forms, and both sides of it."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.error_body import error_body, even_directions
+from assembly.linear.error_body import ErrorBody, error_body, even_directions
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.model.robot import Clearance, Frame, Robot
@@ -66,6 +68,18 @@ def test_directions_are_unit_vectors_spread_over_all_octants():
     assert np.allclose(np.linalg.norm(directions, axis=1), 1, rtol=0, atol=1e-14)
     octants = (directions > 0) @ [1, 2, 4]
     assert np.bincount(octants).min() >= 20
+
+
+def test_the_slack_is_the_farthest_height_beyond_all_points():
+    """A cube's four corners of even parity within it: the others miss 2 / sqrt 3."""
+    corners = np.array(list(product([-1.0, 1.0], repeat=3)))
+    even = corners[corners.prod(axis=1) > 0]
+    directions = np.vstack([corners / np.sqrt(3), np.eye(3)])
+    heights = np.abs(directions).sum(axis=1)
+    body = ErrorBody("translation", even, np.zeros((0, 3), int), directions, heights)
+    assert body.slack == pytest.approx(3 / np.sqrt(3) - 1 / np.sqrt(3))
+    assert body.contains([0.9, -0.9, 0.9])
+    assert not body.contains([0.0, 0.0, 1.1])
 
 
 @pytest.mark.slow

@@ -290,3 +290,17 @@ def test_intervals_are_of_95_per_cent_unless_asked_otherwise(stiff):
     widths = [t.sel(estimate="upper") - t.sel(estimate="lower") for t in tables]
     assert tables[0].equals(tables[1])
     assert float(widths[2].sum()) < float(widths[0].sum())
+
+
+def test_shares_of_linear_results_are_their_squared_slopes_times_variances(stiff):
+    """Uniform errors within 1 and 2: variances in the ratio 1 to 4."""
+    limits = stiff.sources.limit * 0 + [1.0, 2.0]
+    sources = replace(stiff.sources, scale=limits, least=0 * limits, centre=0 * limits)
+    slopes = np.array([[3.0, 1.0], [0.0, 5.0]])
+    groups = [("one", np.array([0])), ("two", np.array([1])), ("all", np.arange(2))]
+    ratio = sources.variance[1] / sources.variance[0]
+    assert ratio == pytest.approx(4.0)
+    np.testing.assert_allclose(
+        linear_importance(slopes, sources, groups),
+        [[9 / 13, 4 / 13, 1.0], [0.0, 1.0, 1.0]],
+    )

@@ -11,6 +11,7 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import read_surface
+from stiffness.surface.surface_files import _sides
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
 SIDES = [
@@ -195,3 +196,42 @@ def test_a_face_of_points_that_are_not_there_is_refused(face, tmp_path):
     path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{face}\n")
     with pytest.raises(BadInput, match=r"found a cell of point \d+, expected 1 to 3"):
         read_surface(path)
+
+
+class Model:
+    """What gmsh's model says of an assembly: solids by tag, and their faces."""
+
+    def __init__(self, **faces):
+        self.faces = faces
+        self.tags = dict(enumerate(faces, 11))
+
+    def getEntities(self, dimension):
+        if dimension == 3:
+            return [(3, tag) for tag in self.tags]
+        return [(2, face) for one in self.faces.values() for face in one]
+
+    def getEntityName(self, dimension, tag):
+        name = self.tags[tag]
+        return "" if name.startswith("_") else f"Shapes/{name.partition('__')[0]}"
+
+    def getBoundary(self, solids, oriented):
+        assert not oriented
+        ((_, tag),) = solids
+        return [(2, face) for face in self.faces[self.tags[tag]]]
+
+
+def test_the_faces_are_those_of_the_solid_that_is_named(tmp_path):
+    path = tmp_path / "arm.step"
+    assert _sides(Model(arm=[1, 2]), path, "") == [1, 2]
+    both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
+    assert _sides(both, path, "bolt") == [3]
+    assert _sides(both, path, "bolt-13") == [4, 5]
+    assert _sides(both, path, "solid14") == [6]
+    with pytest.raises(BadInput, match=r"no solid .*bolz.*bolt"):
+        _sides(both, path, "bolz")
+    several = r"found 4 solids \(arm, bolt, bolt-13, solid14\).*arm\.step#arm"
+    with pytest.raises(BadInput, match=several):
+        _sides(both, path, "")
+    crowd = Model(**{f"part{k}": [k] for k in range(25)})
+    with pytest.raises(BadInput, match=r"found 25 solids .*part19\)"):
+        _sides(crowd, path, "")

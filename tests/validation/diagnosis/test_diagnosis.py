@@ -355,3 +355,10 @@ def test_practice_campaigns_of_another_program(tmp_path):
         if truth[name]["verdict"] == "explained":
             assert row["after"] <= 1.15 * row["floor"]
             assert row["before"] > 2 * row["floor"]
+
+
+def test_noise_that_is_more_than_stated_is_told_however_little_more(diagnosed):
+    found = diagnosed("none")
+    assert "repeats scatter" not in text(found)
+    noisier = replace(found, noise_factor=np.array([1, 1, 1, 1.2, 1.2, 1.2]))
+    assert "was taken 1.2 times (positions)" in text(noisier)

@@ -1,12 +1,15 @@
 """A learned function as a formula a person can read."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from assembly.model.function import Function
 from validation.diagnosis.report import _tiles
-from validation.diagnosis.sentence import formula
+from validation.diagnosis.sentence import calibration_text, formula, noise_text
+from validation.diagnosis.verdict import Calibration
 
 
 @pytest.mark.parametrize(
@@ -36,3 +39,24 @@ def test_the_tiles_say_the_error_before_and_after_and_nothing_not_measured():
     assert (before.value, after.value) == (2e-3, 5e-4)
     assert cause.answer == ["self weight + drift"]
     assert "0.750" in str(cause)
+
+
+def test_a_calibration_is_said_in_shares():
+    tally = Calibration(
+        20, {"none_needed": 19, "explained": 1}, {"explained": 18, "ambiguous": 2},
+        0.85, 0.025,
+    )  # fmt: skip
+    assert calibration_text(tally) == (
+        "simulated on this design, 20 campaigns each: with noise alone explained 1, "
+        "none_needed 19; with what was found ambiguous 2, explained 18; 85 % named it; "
+        "false claims 2.5 %"
+    )
+    unnamed = calibration_text(replace(tally, right=float("nan")))
+    assert "named it" not in unnamed
+
+
+def test_noise_that_repeats_show_is_said_of_what_it_is_larger():
+    both = noise_text(np.array([1.5, 1.5, 1.5, 2.25, 2.25, 2.25]))
+    assert both.endswith("taken 1.5 times (rotations) and 2.2 times (positions)")
+    one = noise_text(np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]))
+    assert one.endswith("taken 3 times (positions)")

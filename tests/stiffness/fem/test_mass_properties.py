@@ -1,0 +1,57 @@
+"""Masses, centres and inertias of solids with points of mass, by the books."""
+
+import numpy as np
+import pytest
+
+from stiffness.fem.elements import isoparametric
+from stiffness.fem.mass_properties import PointMass, mass_properties
+from stiffness.mesh.edge_grading import layered
+from tests.solids_for_tests import box_solid
+
+SIZE = np.array([0.1, 0.2, 0.4])
+
+
+def box():
+    solid = box_solid((1, 2, 2), SIZE)
+    return isoparametric(solid, 3, layered(solid, (0, 1)))
+
+
+def inertia_of_points(masses, places):
+    """About their centre: sum m (x.x I - x x^T)."""
+    centre = masses @ places / masses.sum()
+    x = places - centre
+    squares = np.einsum("i,ij,ij->", masses, x, x)
+    return centre, squares * np.eye(3) - np.einsum("i,ij,ik->jk", masses, x, x)
+
+
+def test_a_box_with_two_points_follows_steiners_rule():
+    mesh = box()
+    density = np.full(len(mesh.cells), 2000.0)
+    body = 2000.0 * SIZE.prod()
+    x, y, z = SIZE**2
+    own = body / 12 * np.diag([y + z, x + z, x + y])
+    places = np.array([[0.3, -0.1, 0.2], [-0.2, 0.4, 0.5], SIZE / 2])
+    masses = np.array([3.0, 5.0, body])
+    points = [PointMass(m, p) for m, p in zip(masses[:2], places[:2], strict=True)]
+    mass, centre, inertia = mass_properties(mesh, density, points)
+    expected, about = inertia_of_points(masses, places)
+    assert mass == pytest.approx(masses.sum())
+    np.testing.assert_allclose(centre, expected, rtol=1e-10)
+    np.testing.assert_allclose(inertia, about + own, rtol=1e-10, atol=1e-12)
+
+
+def test_without_a_density_there_are_the_points_alone_or_nothing():
+    mesh = box()
+    nothing = np.zeros(len(mesh.cells))
+    mass, centre, inertia = mass_properties(mesh, nothing)
+    assert (mass, centre.tolist(), inertia.tolist()) == (
+        0.0,
+        [0.0] * 3,
+        [[0.0] * 3] * 3,
+    )
+    mass, centre, inertia = mass_properties(
+        mesh, nothing, [PointMass(2.0, np.array([1.0, 2.0, 3.0]))]
+    )
+    assert mass == 2.0
+    np.testing.assert_allclose(centre, [1, 2, 3])
+    np.testing.assert_allclose(inertia, 0.0, atol=1e-12)

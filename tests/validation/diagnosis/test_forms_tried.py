@@ -1,0 +1,93 @@
+"""Forms in which a readings' remainder may depend on a variable."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.forms_tried import MANY, all_shapes, first_shapes
+from validation.diagnosis.signatures import conditions_of
+
+CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "base_compliance_drift"
+
+
+@pytest.fixture(scope="module")
+def conditions():
+    return conditions_of(read_campaign(CAMPAIGN))
+
+
+def shapes(conditions, name, kind="screw"):
+    """The names of each form's columns, and what is given, by form."""
+    found = {}
+    for shape in all_shapes(conditions, name, kind):
+        found.setdefault(shape.form, []).append((shape.names, dict(shape.given)))
+    return found
+
+
+def angle_of(conditions):
+    robot = conditions.robot
+    return next(f.name for f in robot.frames if f.actuated and f.joint == "revolute")
+
+
+def test_an_angle_has_waves_of_every_order_up_to_eight(conditions):
+    name = f"q.{angle_of(conditions)}"
+    found = shapes(conditions, name)
+    single = [(f"{k}.sine", f"{k}.cosine") for k in range(1, 9)]
+    waves = [names for names, _ in found["waves"]]
+    assert waves[:8] == single
+    assert [len(names) for names in waves[8:]] == [4, 8, 16]
+    assert waves[9] == tuple(one for pair in single[:4] for one in pair)
+    assert found["reversal"] == [(("0",), {})]
+    # where a spring yields, its mean counts as well
+    yields = shapes(conditions, name, "compliance")["waves"]
+    assert [names for names, _ in yields][len(waves):] == [
+        ("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)
+    ]  # fmt: skip
+
+
+def test_many_rows_are_looked_at_for_many_waves(conditions):
+    some = np.resize(np.arange(len(conditions)), MANY)
+    name = f"q.{angle_of(conditions)}"
+    for rows, orders in ((some, [20, 40]), (some[1:], [])):
+        waves = shapes(conditions.take(rows), name)["waves"]
+        assert [len(names) // 2 for names, _ in waves[11:]] == orders
+
+
+def test_times_of_a_step_a_lag_and_a_wave_are_within_the_campaign(conditions):
+    span = float(np.ptp(conditions.time))
+    low, high = conditions.time.min(), conditions.time.max()
+    found = shapes(conditions, "cov.time")
+    periods = [given["period"] for _, given in found["slow_wave"]]
+    np.testing.assert_allclose(span / np.array(periods), [0.5, 1, 1.5, 2, 3, 4, 6])
+    at = np.array([given["at"] for _, given in found["step"]])
+    assert len(at) == 9
+    assert ((low < at) & (at < high)).all()
+    # of evenly spread rows a tenth lies between one and the next
+    between = [np.mean(conditions.time < one) for one in at]
+    np.testing.assert_allclose(between, np.arange(1, 10) / 10, atol=1 / len(conditions))
+    lags = [given["time_constant"] for _, given in found["lag"]]
+    np.testing.assert_allclose(np.array(lags) / span, [0.02, 0.05, 0.1, 0.2, 0.5])
+    assert found["spline"] == [(tuple("1234567"), {"first": low, "last": high})]
+    powers = [names for names, _ in found["powers"]]
+    assert powers == [tuple(one) for one in ("1", "2", "3", "01", "012", "0123")]
+
+
+def test_the_side_from_which_one_comes_has_a_sign_and_no_more(conditions):
+    assert shapes(conditions, "approach") == {"powers": [(("1",), {})]}
+    (one,) = first_shapes(conditions.robot, "approach")
+    assert one.names == ("1",)
+
+
+def test_a_load_has_no_steps(conditions):
+    assert shapes(conditions, "load.fx").keys() <= {"powers", "spline"}
+
+
+def test_a_first_look_takes_the_general_forms(conditions):
+    robot = conditions.robot
+    angle = first_shapes(robot, f"q.{angle_of(conditions)}")
+    assert [one.form for one in angle] == ["waves", "powers", "reversal"]
+    assert len(angle[0].names) == 8
+    assert angle[1].names == ("0", "1", "2")
+    (other,) = first_shapes(robot, "cov.temperature")
+    assert (other.form, other.names) == ("powers", ("0", "1", "2", "3"))
