@@ -19,7 +19,7 @@ SOURCE = "assembly/kinematics/continuation.cpp"
 _ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
 
 
-class Tree(ctypes.Structure):
+class TreeAddresses(ctypes.Structure):
     """``Tree`` of continuation.cpp; ``arrays`` are kept as long as it is."""
 
     _fields_ = (
@@ -39,7 +39,7 @@ class _Targets(ctypes.Structure):
     )
 
 
-def tree_of(fields: dict[str, Any]) -> Tree:
+def tree_of(fields: dict[str, Any]) -> TreeAddresses:
     """A robot's tree for C++.
 
     Args:
@@ -48,7 +48,7 @@ def tree_of(fields: dict[str, Any]) -> Tree:
     Returns:
         The addresses of its arrays.
     """
-    tree = Tree(
+    tree = TreeAddresses(
         len(fields["parents"]), len(fields["pairs"]), fields["platform"],
         fields["size"], *(address(fields[name]) for name in _ARRAYS),
     )  # fmt: skip
@@ -57,7 +57,7 @@ def tree_of(fields: dict[str, Any]) -> Tree:
 
 
 def follow_side_by_side(
-    tree: Tree, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
+    tree: TreeAddresses, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: "Track",
 ) -> bool:  # fmt: skip
     """Follow every target along its straight line.
@@ -97,7 +97,7 @@ def follow_side_by_side(
 
 
 def _follow(
-    library: ctypes.CDLL, tree: Tree, given: tuple[NDArray, NDArray, NDArray],
+    library: ctypes.CDLL, tree: TreeAddresses, given: tuple[NDArray, NDArray, NDArray],
     guess: bool, out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
     """Targets that ask for the same entries: start, poses and held coordinates."""

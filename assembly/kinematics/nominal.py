@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.continuation_side_by_side import (
-    Tree,
+    TreeAddresses,
     follow_side_by_side,
     tree_of,
 )
@@ -118,7 +118,7 @@ def _tree(robot: Robot) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=64)
-def _tree_side_by_side(robot: Robot) -> Tree:
+def _tree_side_by_side(robot: Robot) -> TreeAddresses:
     """The same for C++."""
     return tree_of(_tree(robot))
 
@@ -136,7 +136,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         The ends of the tracks, and their progress.
     """
     tree, start = _tree(robot), np.array(start, dtype=float)
-    side_by_side = _tree_side_by_side(robot)
+    addresses = _tree_side_by_side(robot)
     count, n = len(target), len(robot.frames)
     held = np.full((count, n), np.nan)
     if target.coordinates is not None:
@@ -147,11 +147,11 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         np.zeros((count, len(tree["pairs"]))),
     )  # fmt: skip
     track.transforms[..., 3, 3] = 1.0
-    if not follow_side_by_side(side_by_side, start, poses, held, guess, track):
-        from assembly.kinematics import compiled_continuation as compiled
+    if not follow_side_by_side(addresses, start, poses, held, guess, track):
+        from assembly.kinematics.compiled_continuation import Tree, follow_all
 
-        compiled.follow_all(
-            compiled.Tree(**tree), start, poses, held, guess, track.coordinates,
-            track.progress, track.transforms, track.closure_mismatch,
+        follow_all(
+            Tree(**tree), start, poses, held, guess, track.coordinates, track.progress,
+            track.transforms, track.closure_mismatch,
         )  # fmt: skip
     return track

@@ -19,48 +19,47 @@ struct Limits {
 
 namespace {
 
-// The problem in every lane.
-void read(const Given *given, const Cones &cones, Programme &q) {
-    const int r = q.r = int(given->r), p = q.p = int(given->p), nu = cones.nu;
-    q.loaded = true;
+// Overwrites a first guess u (nu,) and the multipliers y (r + p,), of H's rows last, with
+// what a method makes of the problem, which stands in every lane.
+template <typename Method>
+void solve(const Given *given, double *u, double *y, Method method) {
+    const Cones cones(given->starts, int(given->cones));
+    const int r = int(given->r), p = int(given->p), nu = cones.nu;
+    Programme q(cones, r + p);
+    q.r = r, q.p = p, q.loaded = true;
     for (int c = 0; c < nu; ++c) {
         const int64_t own = cones.column[c];
         for (int i = 0; i < r; ++i) q.M[i][c] = real(given->G[i * nu + own]);
         for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given->H[i * nu + own]);
         q.d[c] = real(given->d[own]);
+        q.u[c] = real(u[own]);
     }
     for (int i = 0; i < r; ++i) q.h[i] = real(given->h[i]);
     for (int i = 0; i < p; ++i) q.e[i] = real(given->k[i]);
+    for (int i = 0; i < r + p; ++i) q.y[i] = real(y[i]);
+    Solver solver(cones, r + p);
+    method(solver, q);
+    for (int c = 0; c < nu; ++c) u[cones.column[c]] = q.u[c][0];
+    for (int i = 0; i < r + p; ++i) y[i] = q.y[i][0];
 }
 
 }  // namespace
 
-// Overwrites u (nu,) and the multipliers y (r + p,), of H's rows last.
+// From within, whatever the guess; y of G's rows stays as it is.
 EXPORTED void interior_point(
     const Given *given, const Limits *limits, double *u, double *y) {
-    const Cones cones(given->starts, int(given->cones));
-    const int rows = int(given->r + given->p);
-    Programme q(cones, rows);
-    read(given, cones, q);
-    Solver(cones, rows).interior_point(
-        q, real(limits->absolute), limits->relative, whole(-1));
-    for (int c = 0; c < cones.nu; ++c) u[cones.column[c]] = q.u[c][0];
-    for (int i = q.r; i < rows; ++i) y[i] = q.y[i][0];
+    solve(given, u, y, [&](Solver &solver, Programme &q) {
+        solver.interior_point(q, real(limits->absolute), limits->relative, whole(-1));
+    });
 }
 
-// The same from a first guess of u and of H's multipliers.
+// From the guess of u and of H's multipliers.
 EXPORTED void newton(const Given *given, const Limits *limits, double *u, double *y) {
-    const Cones cones(given->starts, int(given->cones));
-    const int rows = int(given->r + given->p);
-    Programme q(cones, rows);
-    read(given, cones, q);
-    for (int c = 0; c < cones.nu; ++c) q.u[c] = real(u[cones.column[c]]);
-    for (int i = q.r; i < rows; ++i) q.y[i] = real(y[i]);
-    Solver(cones, rows).dual_newton(
-        q, int(limits->steps), limits->first_sigma, limits->relative,
-        real(limits->absolute), whole(-1));
-    for (int c = 0; c < cones.nu; ++c) u[cones.column[c]] = q.u[c][0];
-    for (int i = 0; i < rows; ++i) y[i] = q.y[i][0];
+    solve(given, u, y, [&](Solver &solver, Programme &q) {
+        solver.dual_newton(
+            q, int(limits->steps), limits->first_sigma, limits->relative,
+            real(limits->absolute), whole(-1));
+    });
 }
 
 // A body of platform screws; the half, 0 or 3, that is meant, and what is asked of upper

@@ -154,7 +154,7 @@ def _digest(source: str) -> str:
     """Of all that the machine code depends on."""
     parts = [" ".join(_OPTIONS), _processor()]
     package = _ROOT / Path(source).parts[0]
-    for file in (_ROOT / source, *sorted(package.rglob("cpp/*.h"))):
+    for file in (_ROOT / source, *sorted(package.glob("*/cpp/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 

@@ -13,7 +13,6 @@ struct Compliances {
 enum { COMPLIANT, LOOSE, UNCLEAR };
 constexpr double STILL = 1e-9;
 
-
 // Blocks of points of one robot, one after the other.
 class Compliance : public Reduction {
 public:

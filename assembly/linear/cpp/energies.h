@@ -19,7 +19,6 @@ struct Solutions {
         *multipliers, *residual, *elastic;
 };
 
-
 // Solves blocks of points of one robot, one after the other.
 class Energies : public Reduction {
 public:

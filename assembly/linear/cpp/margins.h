@@ -16,7 +16,6 @@ struct Margins {
     int64_t *outcome;
 };
 
-
 // Solves blocks of points of one robot, one after the other.
 class ZoneMargins : public Rows {
 public:
